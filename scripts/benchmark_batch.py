@@ -29,7 +29,7 @@ import jax
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -163,7 +163,7 @@ def seconds_alone(posterior: LogDensity) -> float:
     programs = walker_programs(posterior, settings)
     for _ in range(2):
         begin = time.perf_counter()
-        sample(Sampling(posterior, maximum_posterior(posterior, objective), settings, 1), programs)
+        sample(SamplingRequest(posterior, maximum_posterior(posterior, objective), settings, 1), programs)
     return time.perf_counter() - begin
 
 

@@ -30,9 +30,9 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
+from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -177,10 +177,10 @@ class Bench:
         return np.array(left)
 
     def _curves(self, posterior: LogDensity) -> Any:
-        return for_each_draw(curves_of(posterior.model, np.array(LENGTHS)), posterior.model.space.size)
+        return for_each_draw(curve_function(posterior.model, np.array(LENGTHS)), posterior.model.space.size)
 
     def _values(self, posterior: LogDensity) -> Any:
-        return for_each_draw(named_values(posterior.model), posterior.model.space.size)
+        return for_each_draw(value_function(posterior.model), posterior.model.space.size)
 
     def _program(self, posterior: LogDensity, what: str, make: Callable[[LogDensity], Any]) -> Any:
         shapes = what + str(jax.tree.map(np.shape, posterior.data))
@@ -196,7 +196,7 @@ class Bench:
         objective = self._program(posterior, "objective", make_objective)
         programs = self._program(posterior, "walkers", lambda p: walker_programs(p, SAMPLER))
         start = maximum_posterior(posterior, objective)
-        z = sample(Sampling(posterior, start, SAMPLER, seed), programs).z
+        z = sample(SamplingRequest(posterior, start, SAMPLER, seed), programs).z
         return z.reshape(-1, posterior.model.space.size)
 
     def _refit(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, diagnose_all, shortfalls
+from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, convergence_shortfalls, diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 
@@ -52,7 +52,7 @@ class Chain:
 
 
 @dataclass(frozen=True)
-class Sampling:
+class SamplingRequest:
     """What a sampler is asked for: to sample until converged, or until the stated maximum of steps.
 
     Args:
@@ -83,7 +83,7 @@ class Sampling:
         derived = {name: np.asarray(values).reshape(z.shape[:2]) for name, values in flat.items()}
         draws = {p.name: z[..., i] for i, p in enumerate(self.posterior.model.space.free)} | derived
         diagnostics = self.diagnose(draws, n_ensembles)
-        reasons = shortfalls(diagnostics, self.settings.target_r_hat, self.settings.target_ess)
+        reasons = convergence_shortfalls(diagnostics, self.settings.target_r_hat, self.settings.target_ess)
         return Chain(z, derived, diagnostics, n_ensembles, reasons=reasons, **of_sampler)
 
 
@@ -95,7 +95,7 @@ def stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
     return (f"{count} of {len(z)} sampled paths did not move in their second half, far from where the others are",)
 
 
-def worst(chain: Chain) -> tuple[float, float]:
+def worst_diagnostics(chain: Chain) -> tuple[float, float]:
     """Highest R-hat and lowest effective sample size of all quantities."""
     diagnostics = chain.diagnostics.values()
     return max(d.r_hat for d in diagnostics), min(min(d.ess_bulk, d.ess_tail) for d in diagnostics)

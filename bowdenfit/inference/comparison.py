@@ -8,16 +8,16 @@ import numpy as np
 
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
-SMALL = 100  # readings below which the standard error of a difference is too small more often than not
+FEW_READINGS = 100  # readings below which the standard error of a difference is too small more often than not
 _DECISIVE = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
 _NOTICEABLE = 4.0
 
-How = Literal["importance sampling", "moment matching", "refit", "rough"]
+LooMethod = Literal["importance sampling", "moment matching", "refit", "rough"]
 Verdict = Literal["clear", "leaning", "open"]
 
 
 @dataclass(frozen=True)
-class Prediction:
+class LooPrediction:
     """Of one model, reading by reading; a run of forces, whose samples belong together, counts as one.
 
     Args:
@@ -32,7 +32,7 @@ class Prediction:
     pareto_k: np.ndarray
     error: np.ndarray = field(default_factory=lambda: np.zeros(0))
     readings: tuple[tuple[str, str], ...] = ()
-    how: tuple[How, ...] = ()
+    how: tuple[LooMethod, ...] = ()
 
     def of_reading(self, i: int) -> dict[str, Any]:
         """What is known of one reading, as plain data."""
@@ -52,7 +52,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Difference:
+class ElpdDifference:
     """How much worse a model predicts than the best.
 
     Args:
@@ -82,10 +82,10 @@ class Difference:
         """
         if not self.is_seen:
             return "open"
-        return "leaning" if n_readings < SMALL and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
+        return "leaning" if n_readings < FEW_READINGS and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
 
 
-def weigh_without_each(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Prediction:
+def psis_loo(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> LooPrediction:
     """Leave-one-out by Pareto-smoothed importance sampling.
 
     Args:
@@ -101,10 +101,10 @@ def weigh_without_each(log_likelihood: Mapping[str, np.ndarray], n_effective: fl
     share = min(n_effective / len(draws), 1.0)
     parts = [weighted_elpd(-draws[:, i], draws[:, i], share) for i in range(draws.shape[1])]
     elpd, pareto_k, error = (np.array(part) for part in zip(*parts, strict=True))
-    return Prediction(elpd, pareto_k, error)
+    return LooPrediction(elpd, pareto_k, error)
 
 
-def differences(predictions: Mapping[str, Prediction]) -> dict[str, Difference]:
+def compare_predictions(predictions: Mapping[str, LooPrediction]) -> dict[str, ElpdDifference]:
     """Every model against the one that predicts best, which comes first.
 
     Args:
@@ -116,11 +116,11 @@ def differences(predictions: Mapping[str, Prediction]) -> dict[str, Difference]:
     for name in order:
         each = best.elpd - predictions[name].elpd
         error = float(np.sqrt(len(each) * np.var(each, ddof=1))) if len(each) > 1 else float("nan")
-        found[name] = Difference(float(each.sum()), error, max(best.unreliable, predictions[name].unreliable))
+        found[name] = ElpdDifference(float(each.sum()), error, max(best.unreliable, predictions[name].unreliable))
     return found
 
 
-def stacking_weights(predictions: Mapping[str, Prediction]) -> dict[str, float]:
+def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, float]:
     r"""Weights of the mixture of the models that predicts left-out readings best.
 
     .. math:: \max_w \sum_i \log \sum_k w_k \exp(\text{elpd}_{ik}), \quad w_k \ge 0, \quad \sum_k w_k = 1

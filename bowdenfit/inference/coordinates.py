@@ -12,35 +12,35 @@ from jax import Array
 
 from bowdenfit.inference.conditional import Conditional
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.prior_grid import Chart, chart_values
+from bowdenfit.inference.prior_grid import PriorGrid, make_prior_grid
 from bowdenfit.parameters.space import ParameterSpace
 
 # W and z of walkers (rows), and log of the volume in z of a unit of w there: of either of them, of which it is said whether it
 # is z, and of data. NaN where w has no z.
-Frame = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
-Frames = Sequence[tuple[Frame, float]]  # each with its share of all steps
+CoordinateMap = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
+CoordinateMaps = Sequence[tuple[CoordinateMap, float]]  # each with its share of all steps
 
 
-def z_alone(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+def identity(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
     """Of one point: z itself."""
     del is_z, data
     return given, given, jnp.zeros(())
 
 
-in_z: Frame = jax.vmap(z_alone, (0, None, None))
+z_map: CoordinateMap = jax.vmap(identity, (0, None, None))
 
 
-def in_values(chart: Chart) -> Frame:
-    """Values of the parameters, as `Chart` has them."""
+def value_map(chart: PriorGrid) -> CoordinateMap:
+    """Values of the parameters, as `PriorGrid` has them."""
     return lambda given, is_z, _: chart.at(given, is_z)
 
 
-def in_ridge(conditional: Conditional) -> Frame:
+def ridge_map(conditional: Conditional) -> CoordinateMap:
     """Coefficients given everything else, in units of their ridge."""
     return jax.vmap(conditional.at, (0, None, None))
 
 
-def frames_of(posterior: LogDensity) -> Frames:
+def coordinate_maps(posterior: LogDensity) -> CoordinateMaps:
     """In what walkers move, and how often, whatever the posterior is like.
 
     By measurement on simulated on-body data, whose scatter between mountings mixes five times as fast for the ridge. Half of
@@ -51,13 +51,13 @@ def frames_of(posterior: LogDensity) -> Frames:
     Args:
         posterior: The posterior.
     """
-    conditional, without = Conditional(posterior), frames_without_ridge(posterior.model.space)
+    conditional, without = Conditional(posterior), maps_without_ridge(posterior.model.space)
     if not conditional.has_coefficients:
         return without
-    return *((frame, share / 2) for frame, share in without), (in_ridge(conditional), 0.5)
+    return *((frame, share / 2) for frame, share in without), (ridge_map(conditional), 0.5)
 
 
-def frames_without_ridge(space: ParameterSpace) -> Frames:
+def maps_without_ridge(space: ParameterSpace) -> CoordinateMaps:
     """Z and values alone; also for densities that are no model's."""
-    chart = chart_values(space)
-    return (in_z, 0.5), (in_values(chart) if len(chart.which) else in_z, 0.5)
+    chart = make_prior_grid(space)
+    return (z_map, 0.5), (value_map(chart) if len(chart.which) else z_map, 0.5)

@@ -115,7 +115,7 @@ def _drift(scores: np.ndarray) -> float:
     return float(max(abs(second.mean() - first.mean()), abs(second.std() - first.std())))
 
 
-def shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, target_ess: int) -> tuple[str, ...]:
+def convergence_shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, target_ess: int) -> tuple[str, ...]:
     """What keeps the draws from being trusted, in words; empty if nothing does."""
     reasons = []
     for name, d in diagnostics.items():
@@ -126,11 +126,12 @@ def shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, targ
             reasons.append(f"{name} still drifts while it is sampled, by {percent(d.drift, 0)} of its spread")
         low = min(d.ess_bulk, d.ess_tail)
         if not low >= target_ess:
-            reasons.append(too_few(f"the {'middle' if d.ess_bulk <= d.ess_tail else 'ends'} of {name}", low, target_ess))
+            part = "middle" if d.ess_bulk <= d.ess_tail else "ends"
+            reasons.append(describe_low_ess(f"the {part} of {name}", low, target_ess))
     return tuple(reasons)
 
 
-def too_few(what: str, worth: float, least: int) -> str:
+def describe_low_ess(what: str, worth: float, least: int) -> str:
     """That too few effective draws were made, in words.
 
     Args:

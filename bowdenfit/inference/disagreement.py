@@ -9,7 +9,7 @@ would hide the contradiction. Of few readings that scatter is too uncertain; the
 
 A prior is no measurement, and contradicts nobody here: only directions count in which the other tables say much more than the
 priors, whose information keeps the problem linear where nobody says anything. A parameter far out by its prior is said to be
-so in its own words (`bowdenfit.inference.prior_sensitivity.far_out`).
+so in its own words (`bowdenfit.inference.prior_sensitivity.prior_conflicts`).
 
 References:
     Hausman, Specification tests in econometrics, Econometrica 46 (1978), 1251.
@@ -56,7 +56,7 @@ class Disagreement:
     together: float
 
 
-def disagreements(
+def table_disagreements(
     terms: Sequence[Term], parameters: Sequence[Parameter], found: Mapping[str, Any]
 ) -> tuple[Disagreement, ...]:
     """How well each of several tables agrees with the others by what was found near the best fit; empty of one table."""

@@ -17,16 +17,16 @@ from bowdenfit.model import Model
 BATCH = 1024
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
-OfDraws: TypeAlias = Callable[[np.ndarray], Any]
+DrawFunction: TypeAlias = Callable[[np.ndarray], Any]
 
 
 def for_each_draw(
     function: Function, size: int, *data: Any, run_once: bool = False, beside: Executor | None = None
-) -> OfDraws:
+) -> DrawFunction:
     """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
     over_rows, rows = jax.vmap(function, in_axes=(0, *(None for _ in data))), jax.ShapeDtypeStruct((BATCH, size), float)
     program = compile_program(over_rows, rows, *data, run_once=run_once, beside=beside)
-    return lambda z: in_batches(lambda part: program(part, *data), BATCH, z)
+    return lambda z: run_in_batches(lambda part: program(part, *data), BATCH, z)
 
 
 def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: Any) -> Any:
@@ -42,10 +42,10 @@ def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: 
     over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
     rows = {name: jax.ShapeDtypeStruct((BATCH,), float) for name in values}
     program = compile_program(over_rows, rows, *data, run_once=True)
-    return in_batches(lambda part: program(part, *data), BATCH, dict(values))
+    return run_in_batches(lambda part: program(part, *data), BATCH, dict(values))
 
 
-def in_batches(program: Function, batch: int, rows: Any) -> Any:
+def run_in_batches(program: Function, batch: int, rows: Any) -> Any:
     """What a program compiled for so many rows, of one array or of several, gives for any number of them."""
     parts, count = [], len(jax.tree.leaves(rows)[0])
     for start in range(0, count, batch):
@@ -56,7 +56,7 @@ def in_batches(program: Function, batch: int, rows: Any) -> Any:
     return jax.tree.map(lambda x: x[:count], whole)
 
 
-def named_values(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+def value_function(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
     """Function of z: free parameters and derived curve coefficients by name, in the units they are shown in."""
     return lambda z: shown_values(model, model.space.constrain(z))
 
@@ -74,7 +74,7 @@ def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
-def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> OfDraws:
+def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> DrawFunction:
     """Compiled function of draws (rows): what each draw implies for every reading.
 
     Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
@@ -100,7 +100,7 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 
-def curves_of(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
+def curve_function(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
     """Function of z: wrap angle of every curved contact [deg] and the efficiency [1] at route values."""
     return lambda z: curves_at(model, model.space.constrain(z), route)
 
@@ -146,5 +146,5 @@ def output_force_at(
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
     """Efficiency of every draw (rows) at route values (columns); any one number where the cable has no route."""
-    curves = curves_of(model, np.atleast_1d(np.asarray(route, dtype=float)))
+    curves = curve_function(model, np.atleast_1d(np.asarray(route, dtype=float)))
     return for_each_draw(lambda one: curves(one)["efficiency"], model.space.size)(z)

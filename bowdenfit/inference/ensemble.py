@@ -21,13 +21,13 @@ import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
+from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, stuck_walkers, worst_diagnostics
 from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
 from bowdenfit.inference.engines.memory import ENSEMBLES_AT_ONCE
 from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
-from bowdenfit.inference.engines.processes import cores
+from bowdenfit.inference.engines.processes import available_cores
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.sweep import Chosen
+from bowdenfit.inference.sweep import SweepChoices
 from bowdenfit.inference.walkers import WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
@@ -37,7 +37,7 @@ _OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
 
-class Sweep(emcee.moves.Move):
+class EnsembleMove(emcee.moves.Move):
     """Some steps of independent ensembles side by side: proposals stay within an ensemble.
 
     Each ensemble is split in two at random. At each step one of the moves is made: the walkers of one half are proposed places
@@ -53,7 +53,7 @@ class Sweep(emcee.moves.Move):
     def __init__(self, programs: WalkerPrograms, data: Any, n_ensembles: int, stored: int = 0) -> None:
         super().__init__()
         self.programs, self.data, self.n_ensembles, self.stored = programs, jax.device_put(data), n_ensembles, stored
-        self.threads = ThreadPoolExecutor(min(cores(), n_ensembles, ENSEMBLES_AT_ONCE))
+        self.threads = ThreadPoolExecutor(min(available_cores(), n_ensembles, ENSEMBLES_AT_ONCE))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
         """`THIN` steps of every walker, and the share that was accepted."""
@@ -69,7 +69,7 @@ class Sweep(emcee.moves.Move):
             state.coords[order], state.log_prob[order], accepted[order] = moved.result()
         return state, accepted / THIN
 
-    def _moved(self, chosen: Chosen, z: np.ndarray) -> Any:
+    def _moved(self, chosen: SweepChoices, z: np.ndarray) -> Any:
         with jax.enable_x64(True):  # the setting is each thread's own
             return jax.block_until_ready(self.programs.sweep(chosen, z, self.data))
 
@@ -87,13 +87,13 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     return start.z + (centers + walkers) @ root.T
 
 
-def start_of(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
+def initial_state(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
     """A state of emcee that walkers begin with; a sweep finds the log densities itself."""
     return emcee.State(points, log_prob=np.zeros(len(points)), random_state=generator.get_state())
 
 
 @linear_algebra_in_one_thread()
-def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain:
+def sample(asked: SamplingRequest, programs: WalkerPrograms, data: Any = None) -> Chain:
     """Sample by ensembles of walkers.
 
     Args:
@@ -104,12 +104,12 @@ def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain
     settings, start, seed = asked.settings, asked.start, asked.seed
     data = asked.posterior.data if data is None else data
     points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
-    backend = Checkpointed(points.shape, asked.checkpoint, asked.resume)
-    moves = Sweep(programs, data, settings.n_ensembles, int(backend.iteration))
+    backend = CheckpointedBackend(points.shape, asked.checkpoint, asked.resume)
+    moves = EnsembleMove(programs, data, settings.n_ensembles, int(backend.iteration))
 
     sampler = emcee.EnsembleSampler(*points.shape, asked.posterior.log_density, backend=backend, moves=moves)
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
-    state = None if backend.iteration else start_of(points, generator)
+    state = None if backend.iteration else initial_state(points, generator)
     limit = max(settings.max_steps // THIN, 2)
     target = _FIRST_LOOK
     while target < int(backend.iteration):  # the looks of a sampling that nothing interrupted
@@ -122,7 +122,7 @@ def sample(asked: Sampling, programs: WalkerPrograms, data: Any = None) -> Chain
             state = None
             asked.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
         chain = _summarized(asked, backend)
-        seen = worst(chain)
+        seen = worst_diagnostics(chain)
         asked.report(Progress(chain.steps, settings.max_steps, *seen))
         if not chain.reasons or target >= limit:
             return chain
@@ -134,7 +134,7 @@ def _next_look(stored: int) -> int:
     return stored + stored // 3
 
 
-class Checkpointed(emcee.backends.Backend):
+class CheckpointedBackend(emcee.backends.Backend):
     """States in memory, and one after the other in a checkpoint.
 
     Args:
@@ -176,7 +176,7 @@ class Checkpointed(emcee.backends.Backend):
             )  # fmt: skip
 
 
-def _summarized(asked: Sampling, backend: emcee.backends.Backend) -> Chain:
+def _summarized(asked: SamplingRequest, backend: emcee.backends.Backend) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     wanted = max(_KEPT_PER_WALKER, 2 * asked.settings.target_ess // backend.shape[0])

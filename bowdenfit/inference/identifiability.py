@@ -18,9 +18,9 @@ import numpy as np
 
 from bowdenfit.words import significant
 
-OWN = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
+IDENTIFIABLE = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
 RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
-NOTHING = 0.9  # share above which the measurements say nothing of a combination
+UNINFORMED = 0.9  # share above which the measurements say nothing of a combination
 _DETERMINED = 0.25  # share below which a combination counts as determined
 _TANGLED = 0.3  # weight in a combination that rests on the prior, beyond which a parameter is not known by itself
 _INFLATED, _BOUNDED = 100.0, 0.1  # variance inflation and share beyond which a parameter is only bounded by a sum
@@ -29,7 +29,7 @@ _SHARPER = 0.5  # a combination is worth naming if it is known to less than this
 
 
 @dataclass(frozen=True)
-class Known:
+class ParameterContraction:
     """What is known of one parameter, in its shown unit.
 
     Args:
@@ -95,7 +95,7 @@ class Combination:
 
 
 @dataclass(frozen=True)
-class Knowledge:
+class CovarianceAnalysis:
     """What is known of several parameters together.
 
     Args:
@@ -108,7 +108,7 @@ class Knowledge:
             are told apart, beyond 1000 where they are not.
     """
 
-    parameters: tuple[Known, ...]
+    parameters: tuple[ParameterContraction, ...]
     tangled: tuple[str, ...]
     directions: tuple[Combination, ...]
     determined: tuple[Combination, ...]
@@ -124,12 +124,12 @@ class Knowledge:
     )
 
     @property
-    def by_themselves(self) -> tuple[Known, ...]:
+    def by_themselves(self) -> tuple[ParameterContraction, ...]:
         """Parameters that are known each by itself."""
         return tuple(p for p in self.parameters if p.name not in self.tangled)
 
     @property
-    def on_prior(self) -> tuple[Known, ...]:
+    def on_prior(self) -> tuple[ParameterContraction, ...]:
         """Parameters that rest on their priors and belong to no combination that is determined."""
         return tuple(p for p in self._left if p.share > RESTS_ON_PRIOR)
 
@@ -144,12 +144,12 @@ class Knowledge:
         return [p.name for p in self.on_prior]
 
     @property
-    def partly(self) -> tuple[Known, ...]:
+    def partly(self) -> tuple[ParameterContraction, ...]:
         """Parameters that measurements and prior determine about equally."""
         return tuple(p for p in self._left if p.share <= RESTS_ON_PRIOR)
 
     @property
-    def _left(self) -> tuple[Known, ...]:
+    def _left(self) -> tuple[ParameterContraction, ...]:
         """Parameters known neither by themselves nor in a combination."""
         combined = {name for combination in self.determined for name in combination.weights}
         return tuple(p for p in self.parameters if p.name in self.tangled and p.name not in combined)
@@ -158,10 +158,12 @@ class Knowledge:
     def undetermined(self) -> Combination | None:
         """The least known combination, where the measurements say nothing of it; else None."""
         worst = max(self.directions, key=lambda d: d.share, default=None)
-        return worst if worst is not None and worst.share > NOTHING else None
+        return worst if worst is not None and worst.share > UNINFORMED else None
 
 
-def knowledge(names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> Knowledge:
+def analyze_covariance(
+    names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
+) -> CovarianceAnalysis:
     """What the covariance that measurements leave says of parameters, by their estimates and independent priors."""
     scaled = covariance / np.outer(prior_sd, prior_sd)
 
@@ -177,7 +179,7 @@ def knowledge(names: Sequence[str], value: np.ndarray, covariance: np.ndarray, p
                 yield Combination(by_name, float(weights @ value), sd, float(np.clip(share, 0.0, 1.0)))
 
     directions, tangled = tuple(combinations(np.arange(len(names)))), _tangled(scaled)
-    return Knowledge(
+    return CovarianceAnalysis(
         _one_by_one(names, value, covariance, prior_sd),
         tuple(names[i] for i in tangled),
         directions,
@@ -196,7 +198,7 @@ def _tangled(scaled: np.ndarray) -> np.ndarray:
     share, inflation = np.diag(scaled), np.diag(scaled) * np.diag(np.linalg.inv(scaled))
     open_ends = np.any((np.abs(vectors) > _TANGLED) & (shares > RESTS_ON_PRIOR), axis=1)
     bounded = (inflation > _INFLATED) & (share > _BOUNDED)
-    return np.flatnonzero((share >= OWN) | open_ends | bounded)
+    return np.flatnonzero((share >= IDENTIFIABLE) | open_ends | bounded)
 
 
 def _as_printed(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -220,7 +222,7 @@ def _sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: 
 
 def _one_by_one(
     names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
-) -> tuple[Known, ...]:
+) -> tuple[ParameterContraction, ...]:
     sd, found = np.sqrt(np.diag(covariance)), []
     for i, name in enumerate(names):
         correlation = covariance[i] / np.maximum(sd[i] * sd, 1e-300)
@@ -229,9 +231,8 @@ def _one_by_one(
         alike = (names[other], float(correlation[other])) if len(names) > 1 else ("", 0.0)
         # Information on one parameter with all others known: that of the measurements and that of the prior.
         alone = float(np.linalg.inv(covariance)[i, i])
-        found.append(
-            Known(name, float(value[i]), float(sd[i]), float(prior_sd[i]), *alike, float(covariance[i, i] * alone))
-        )
+        inflation = float(covariance[i, i] * alone)
+        found.append(ParameterContraction(name, float(value[i]), float(sd[i]), float(prior_sd[i]), *alike, inflation))
     return tuple(found)
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
-from bowdenfit.inference.residual_groups import Readings, System, readings_to_test
-from bowdenfit.inference.scalar_priors import near_z
+from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, group_residuals
+from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model
@@ -48,7 +48,7 @@ def departures(
         reach: Half of the 90 % interval of each parameter that is identified, in its shown unit.
     """
     model = basin.problem.posterior.model
-    system = readings_to_test(model, _weighed_by_scatter(basin, model, scale))
+    system = group_residuals(model, _weighed_by_scatter(basin, model, scale))
     asked = [each for readings in system.readings for each in _departures_of(system, readings)]
     corrected = (replace(each, chance=min(each.chance * len(asked), 1.0)) for each in asked)
     judged = (_drifting(basin, reach, system, each) if each.against == ZERO else each for each in corrected)
@@ -56,7 +56,7 @@ def departures(
     return found, _far_readings(system)
 
 
-def _drifting(basin: Basin, reach: Mapping[str, float], system: System, found: Departure) -> Departure:
+def _drifting(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, found: Departure) -> Departure:
     """By how much a zero drifts, and how much that moves the coefficients: by a fit with the drift taken off the readings."""
     readings = next(r for r in system.readings if r.table == found.table and r.inside)
     x, whole = readings.at[ZERO], np.zeros(len(system.residuals))
@@ -84,7 +84,7 @@ def _without(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any
     return data | {"mean": data["mean"] - mean}
 
 
-def _far_readings(system: System) -> tuple[FarReading, ...]:
+def _far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
     """By externally studentized residuals, which a reading itself does not enlarge (Draper and Smith, chapter 8).
 
     Not of readings inside runs, whose noise may well grow with the load.
@@ -118,13 +118,13 @@ def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
                 at = index[name]
                 value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
                 prior = model.space.free[at].prior
-                pin[at] = near_z(prior, value)
+                pin[at] = clipped_z(prior, value)
             start += count
     again = problem.solve(found["z"], basin.at_end, pin)
     return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found
 
 
-def _departures_of(system: System, readings: Readings) -> Iterator[Departure]:
+def _departures_of(system: ResidualGroups, readings: ResidualGroup) -> Iterator[Departure]:
     """Of the readings of one table."""
     for group in dict.fromkeys(readings.group):
         mine = readings.used & (np.array(readings.group) == group)
@@ -160,7 +160,7 @@ def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> I
         yield np.polynomial.legendre.legvander(np.where(mine, 2 * (x - low) / (high - low) - 1, 0.0), degree)
 
 
-def _tested(system: System, readings: Readings, columns: np.ndarray) -> tuple[float, float] | None:
+def _tested(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
     """Probability of a departure as large by chance, and its size; None where it cannot be asked about."""
     from scipy.special import fdtrc
 
@@ -185,7 +185,7 @@ def _tested(system: System, readings: Readings, columns: np.ndarray) -> tuple[fl
     return chance, float(np.sqrt(np.mean(moved**2) / max(np.mean(of**2), 1e-300)))
 
 
-def _ends(readings: Readings, x: np.ndarray, mine: np.ndarray) -> Sequence[float]:
+def _ends(readings: ResidualGroup, x: np.ndarray, mine: np.ndarray) -> Sequence[float]:
     """Where the lowest and the highest third were taken, and how much more is read there than the model says."""
     low, high = np.quantile(x[mine], (1 / 3, 2 / 3))
     thirds = [mine & (x <= low), mine & (x >= high)]

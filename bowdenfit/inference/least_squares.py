@@ -15,15 +15,15 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.departure import Departure, FarReading
-from bowdenfit.inference.disagreement import Disagreement, disagreements
+from bowdenfit.inference.disagreement import Disagreement, table_disagreements
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.lack_of_fit import departures
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.minimum import FoundMinimum, lowest_minimum
-from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total
+from bowdenfit.inference.minimum import LocalMinimum, lowest_minimum
+from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total_squares
 from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
-from bowdenfit.inference.profiles import UNKNOWN, Limits
-from bowdenfit.inference.scalar_priors import near_z
+from bowdenfit.inference.profiles import UNKNOWN, ProfileIntervals
+from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.parameters.space import Parameter
@@ -145,11 +145,11 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
 def _starts(parameter: Parameter) -> tuple[float, ...]:
     if np.isnan(parameter.first_look):
         return parameter.starts
-    return (*parameter.starts, near_z(parameter.prior, parameter.first_look))
+    return (*parameter.starts, clipped_z(parameter.prior, parameter.first_look))
 
 
 def _squares_with_priors(found: Solution) -> float:
-    squares = total(found)
+    squares = total_squares(found)
     return squares if np.isfinite(squares) else float("inf")
 
 
@@ -185,13 +185,13 @@ def least_squares(
         found["z"],
         not message,
         message,
-        disagreements(terms, space.free, found),
+        table_disagreements(terms, space.free, found),
         *departures(basin, at.scale, {name: each.reach for name, each in estimates.items() if each.identified}),
         units={p.name: p.unit for p in space.parameters},
     )
 
 
-def _stopped(found: Solution, profiled: Limits) -> str:
+def _stopped(found: Solution, profiled: ProfileIntervals) -> str:
     """Why the solver has found no minimum; empty where it has."""
     if not found["succeeded"]:
         return "the solver stopped before it met its tolerance"
@@ -211,7 +211,7 @@ def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
 
 
 def _estimates(
-    at: FoundMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
+    at: LocalMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
 ) -> dict[str, Estimate]:
     """Estimates of the free parameters but for noise scales, from their standard errors in z and their limits."""
     basin, error, determined = at.basin, at.error, at.determined

@@ -13,12 +13,12 @@ from jaxtyping import Float
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
-from bowdenfit.inference.chain import Chain, Sampling
-from bowdenfit.inference.comparison import How, Prediction, weigh_without_each
+from bowdenfit.inference.chain import Chain, SamplingRequest
+from bowdenfit.inference.comparison import LooMethod, LooPrediction, psis_loo
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import frames_without_ridge
+from bowdenfit.inference.coordinates import maps_without_ridge
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
-from bowdenfit.inference.draws import in_batches
+from bowdenfit.inference.draws import run_in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
@@ -34,7 +34,7 @@ _LARGEST_ERROR = 0.3  # Monte Carlo error of a log density beyond which it is ca
 
 
 @dataclass(frozen=True)
-class ReadingsToLeaveOut:
+class LooDensity:
     """The readings of a posterior, any of which may be left out of its density; compiled once for all of them.
 
     Args:
@@ -94,7 +94,7 @@ class ReadingsToLeaveOut:
     def programs(self) -> WalkerPrograms:
         """Of fits without any of the readings."""
         space = self.posterior.model.space
-        given, frames = self.without(None), frames_without_ridge(space)
+        given, frames = self.without(None), maps_without_ridge(space)
         return compiled_walkers(lambda z, given: self._density(z, given)[0], given, space.size, self.refits, frames)
 
     def without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
@@ -110,12 +110,12 @@ class ReadingsToLeaveOut:
             without: Position of a reading that the density leaves out; none if omitted.
         """
         given = self.without(without)
-        density, each = in_batches(lambda part: self._program(part, given), _ROWS, z)
+        density, each = run_in_batches(lambda part: self._program(part, given), _ROWS, z)
         return density, each
 
 
 @dataclass(frozen=True)
-class LeavingOut:
+class LooRefits:
     """Draws of the posterior with all readings, and what finds out how it predicts one of them without it.
 
     Args:
@@ -126,13 +126,13 @@ class LeavingOut:
         seed: Seed of the refits.
     """
 
-    readings: ReadingsToLeaveOut
+    readings: LooDensity
     z: np.ndarray
     each: np.ndarray
     share: float
     seed: int
 
-    def without(self, reading: int, limit: float) -> tuple[float, float, How]:
+    def without(self, reading: int, limit: float) -> tuple[float, float, LooMethod]:
         """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
 
         Args:
@@ -177,19 +177,19 @@ class LeavingOut:
         weights = np.exp(smooth_weights(-self.each[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        asked = Sampling(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
+        asked = SamplingRequest(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
         return sample(asked, readings.programs, readings.without(reading))
 
 
 def leave_one_out(
-    readings: ReadingsToLeaveOut,
+    readings: LooDensity,
     z: np.ndarray,
     log_likelihood: Mapping[str, np.ndarray],
     n_effective: float,
     seed: int,
     wanted: Sequence[int] | None = None,
     report: Callable[[str], None] = lambda _: None,
-) -> Prediction:
+) -> LooPrediction:
     """Leave-one-out, with readings whose importance weights cannot be trusted treated one by one.
 
     Pareto k above the limit calls for moment matching; where that does not bring it down, the model is fitted again
@@ -210,14 +210,14 @@ def leave_one_out(
         each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
     chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
     flat, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
-    leaving_out = LeavingOut(readings, flat, each.reshape(len(flat), -1), min(n_effective / len(flat), 1.0), seed)
-    quick = weigh_without_each({"": each[..., chosen]}, n_effective)
+    leaving_out = LooRefits(readings, flat, each.reshape(len(flat), -1), min(n_effective / len(flat), 1.0), seed)
+    quick = psis_loo({"": each[..., chosen]}, n_effective)
     elpd, error = quick.elpd.copy(), quick.error.copy()
-    how: list[How] = ["importance sampling"] * len(chosen)
+    how: list[LooMethod] = ["importance sampling"] * len(chosen)
     for place in np.flatnonzero(~(quick.pareto_k <= limit)):
         report(f"leaving out {' '.join(readings.names[chosen[place]])}")
         elpd[place], error[place], how[place] = leaving_out.without(chosen[place], limit)
-    return Prediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
+    return LooPrediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
 
 
 def _without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.linearized import Linearized, linearize, scatter_about
-from bowdenfit.inference.objective import LOWER_END, Problem, may_end, sum_of_squares, total
-from bowdenfit.inference.profiles import Basin, Limits, is_stuck, limits
-from bowdenfit.inference.scalar_priors import near_z
+from bowdenfit.inference.objective import LOWER_END, Problem, has_lower_end, sum_of_squares, total_squares
+from bowdenfit.inference.profiles import Basin, ProfileIntervals, is_stuck, profile_intervals
+from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -24,7 +24,7 @@ _FARTHEST_PLACE = 1.0  # of each from there [z]
 
 
 @dataclass(frozen=True)
-class FoundMinimum:
+class LocalMinimum:
     """A minimum, and what residuals and Jacobian say there.
 
     Args:
@@ -51,21 +51,21 @@ class FoundMinimum:
         return is_stuck(self.basin.found["fall"], (NORMAL_90 * float(np.min(self.scale, initial=1.0))) ** 2)
 
 
-def lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) -> tuple[FoundMinimum, Limits]:
+def lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) -> tuple[LocalMinimum, ProfileIntervals]:
     """The minimum and its limits, if `intervals`; where a profile leads to a lower one it is followed there."""
     at = _found(problem, start)
     if not intervals:
-        return at, Limits()
-    profiled = limits(at.basin, at.scale, at.determined)
+        return at, ProfileIntervals()
+    profiled = profile_intervals(at.basin, at.scale, at.determined)
     for _ in range(_FOLLOWED):
         if profiled.lower is None:
             break
         at = _found(at.basin.problem, profiled.lower["z"])
-        profiled = limits(at.basin, at.scale, at.determined)
+        profiled = profile_intervals(at.basin, at.scale, at.determined)
     return at, profiled
 
 
-def _found(problem: Problem, start: np.ndarray) -> FoundMinimum:
+def _found(problem: Problem, start: np.ndarray) -> LocalMinimum:
     """The minimum; where the solver is stuck, the lowest that it finds from where other scatter would have led it."""
     at = _described(_weighed(_minimum(problem, start)))
     if not at.is_stuck:
@@ -75,11 +75,11 @@ def _found(problem: Problem, start: np.ndarray) -> FoundMinimum:
     for _ in range(_PLACES):
         place = first.copy()
         place[active] += np.clip(moves @ draw.standard_normal(moves.shape[1]), -_FARTHEST_PLACE, _FARTHEST_PLACE)
-        lowest = min(lowest, at.basin.problem.solve(place, at.basin.at_end, first), key=total)
+        lowest = min(lowest, at.basin.problem.solve(place, at.basin.at_end, first), key=total_squares)
     return _described(replace(at.basin, found=lowest))
 
 
-def _described(basin: Basin) -> FoundMinimum:
+def _described(basin: Basin) -> LocalMinimum:
     found = basin.found
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
     about = linearize(found["jacobian"][:, active])
@@ -87,7 +87,7 @@ def _described(basin: Basin) -> FoundMinimum:
     error, determined = np.full(len(found["z"]), np.nan), basin.at_end.copy()
     error[active] = np.linalg.norm(about.moves(scale), axis=1)
     determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
-    return FoundMinimum(basin, about, active, scale, residual_sd, error, determined)
+    return LocalMinimum(basin, about, active, scale, residual_sd, error, determined)
 
 
 def _minimum(problem: Problem, start: np.ndarray) -> Basin:
@@ -127,11 +127,11 @@ def _weighed(basin: Basin) -> Basin:
     noise_z = np.zeros(space.size)
     for name in weighed:
         at = space.index[name]
-        noise_z[at] = near_z(space.free[at].prior, float(told[name]))
+        noise_z[at] = clipped_z(space.free[at].prior, float(told[name]))
     return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
 
 
 def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
     """Which parameters may be on their way to an end of their range."""
     limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
-    return (may_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
+    return (has_lower_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))

@@ -1,8 +1,8 @@
 """How walkers are moved: emcee's stretch and differential evolution, and draws from a distribution fitted to other walkers.
 
-A move takes `Numbers` drawn at random and the two halves of one ensemble, the one that moves and the one that rests, (walker,
-parameter). It gives places for the moving half, and the log of what the ratio of densities there is to be multiplied by. That
-numbers come from outside keeps random generators, slow to compile, out.
+A move takes random numbers and the two halves of one ensemble, (walker, parameter): the half that moves and the half that rests.
+It returns proposed positions for the moving half, and the log of the factor by which the ratio of densities there is multiplied.
+Random numbers come from outside because XLA is slow to compile generators.
 
 References:
     Goodman and Weare 2010, "Ensemble samplers with affine invariance" (Communications in Applied Mathematics and
@@ -26,8 +26,8 @@ FREEDOM = 5  # degrees of freedom of the t distribution: tails wider than a post
 JITTER = 1e-10  # of each variance; keeps the covariance of walkers on a narrow ridge positive
 
 
-class Numbers(NamedTuple):
-    """What is drawn at random for a move, (walker, `numbers_of_move`).
+class RandomNumbers(NamedTuple):
+    """What is drawn at random for a move, (walker, `count_move_numbers`).
 
     Args:
         uniform: Between 0 and 1.
@@ -38,21 +38,21 @@ class Numbers(NamedTuple):
     normal: Array
 
 
-Move = Callable[[Numbers, Array, Array], tuple[Array, Array]]
+Move = Callable[[RandomNumbers, Array, Array], tuple[Array, Array]]
 Moves = Sequence[tuple[Move, float]]
 
 
-def numbers_of_move(size: int) -> int:
+def count_move_numbers(size: int) -> int:
     """How many numbers a walker of so many parameters needs for any move."""
     return size + FREEDOM
 
 
-def numbers_at(uniform: Array) -> Numbers:
+def random_numbers(uniform: Array) -> RandomNumbers:
     """Of uniform numbers; for all steps at once, since XLA would work a quantile out again wherever a move uses it."""
-    return Numbers(uniform, 2**0.5 * jax.lax.erf_inv(2 * uniform - 1))
+    return RandomNumbers(uniform, 2**0.5 * jax.lax.erf_inv(2 * uniform - 1))
 
 
-def stretch(numbers: Numbers, moving: Array, resting: Array) -> tuple[Array, Array]:
+def stretch(numbers: RandomNumbers, moving: Array, resting: Array) -> tuple[Array, Array]:
     """Places on the line through a resting walker; `emcee.moves.StretchMove` (equation 7 of Goodman and Weare)."""
     factor = ((WIDEST_STRETCH - 1) * numbers.uniform[:, 0] + 1) ** 2 / WIDEST_STRETCH
     anchor = resting[_whole_number(numbers.uniform[:, 1], len(resting))]
@@ -60,7 +60,7 @@ def stretch(numbers: Numbers, moving: Array, resting: Array) -> tuple[Array, Arr
 
 
 def differential_evolution(
-    numbers: Numbers, moving: Array, resting: Array, gamma: float | None = None
+    numbers: RandomNumbers, moving: Array, resting: Array, gamma: float | None = None
 ) -> tuple[Array, Array]:
     """Places shifted by the difference of two resting walkers; `emcee.moves.DEMove` (section 2 of Nelson and others).
 
@@ -78,7 +78,7 @@ def differential_evolution(
     return moving + spread * (resting[second] - resting[first]), jnp.zeros(n)
 
 
-def independent(numbers: Numbers, moving: Array, resting: Array) -> tuple[Array, Array]:
+def fitted_t(numbers: RandomNumbers, moving: Array, resting: Array) -> tuple[Array, Array]:
     """Places drawn from a t distribution fitted to the resting half, as `emcee.moves.KDEMove` draws from a kernel density.
 
     It brings walkers in from far outside in tens of steps, and forgets where they were where the posterior is about normal.
@@ -102,7 +102,7 @@ def _log_t(standardized: Array) -> Array:
     return -(FREEDOM + standardized.shape[-1]) / 2 * jnp.log1p(jnp.sum(standardized**2, axis=-1) / FREEDOM)
 
 
-def shares_of_moves(fitted: Move = independent) -> Moves:
+def weighted_moves(fitted: Move = fitted_t) -> Moves:
     """The moves of an ensemble, and how often each is made, by measurement on every data set here.
 
     Draws from a fitted t distribution find the bulk, and mix best where the posterior is about normal; differential evolution
@@ -116,10 +116,10 @@ def shares_of_moves(fitted: Move = independent) -> Moves:
 
 
 def default_moves(size: int, n_walkers: int) -> Moves:
-    """What walkers do: see `shares_of_moves`.
+    """What walkers do: see `weighted_moves`.
 
     Args:
         size: Number of parameters.
         n_walkers: Walkers of an ensemble; a few cannot tell the shape of a t distribution.
     """
-    return shares_of_moves(independent if n_walkers >= WALKERS_PER_PARAMETER * size else differential_evolution)
+    return weighted_moves(fitted_t if n_walkers >= WALKERS_PER_PARAMETER * size else differential_evolution)

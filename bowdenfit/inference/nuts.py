@@ -25,7 +25,7 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Progress, Sampling, stuck_walkers, worst
+from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, stuck_walkers, worst_diagnostics
 from bowdenfit.inference.checkpoint import append, records
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
@@ -126,7 +126,7 @@ def starting_points(
     return np.where(noise_scales(posterior), np.abs(z), z)
 
 
-def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
+def sample(asked: SamplingRequest, program: Callable[..., Any]) -> Chain:
     """Sample by chains of trajectories.
 
     Args:
@@ -144,7 +144,7 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
     seen: tuple[float | None, float | None] = (None, None)
     while True:
         while len(blocks) < target:
-            z, tuning, mass = before(blocks, points, asked.start.covariance)
+            z, tuning, mass = next_block_state(blocks, points, asked.start.covariance)
             numbers = np.uint32(seed), np.uint32(len(blocks))
             done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
             blocks.append(jax.tree.map(np.asarray, done))
@@ -152,7 +152,7 @@ def sample(asked: Sampling, program: Callable[..., Any]) -> Chain:
                 append(asked.checkpoint, blocks[-1])
             asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
         chain, could_improve = _summarized(asked, blocks)
-        seen = worst(chain)
+        seen = worst_diagnostics(chain)
         asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
         if not could_improve or target >= limit:
             return chain
@@ -170,7 +170,7 @@ def _next_look(blocks: int) -> int:
     return blocks + (blocks - WARM_UP + 2) // 3
 
 
-def before(
+def next_block_state(
     blocks: Sequence[Block], points: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions, tuning and inverse mass matrix that the next block starts with.
@@ -212,7 +212,7 @@ def _shrunk_variances(draws: np.ndarray) -> np.ndarray:
     return n / (n + 5) * draws.var(axis=0, ddof=1) + 5 / (n + 5)
 
 
-def _summarized(asked: Sampling, blocks: Sequence[Block]) -> tuple[Chain, bool]:
+def _summarized(asked: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     """The draws after warm-up, with their diagnostics, and whether more of them could change what those say."""
     drawn = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
     steps, chains = drawn["energy"].shape

@@ -139,7 +139,7 @@ def sum_of_squares(found: Solution) -> float:
     return float(sum(np.sum(r**2) for r in found["residuals"].values()))
 
 
-def total(found: Solution) -> float:
+def total_squares(found: Solution) -> float:
     """Sum of squares of everything that counts, priors too where they do."""
     return float(found["stacked"] @ found["stacked"])
 
@@ -149,7 +149,7 @@ def noise_scales(posterior: LogDensity) -> np.ndarray:
     return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
 
 
-def may_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
+def has_lower_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
     """Which parameters have a lower end that an estimate can run to."""
     bounded = LogNormal | HalfNormal | HalfCauchy | TruncatedNormal | Uniform
     return np.array([isinstance(p.prior, bounded) for p in parameters], dtype=bool)

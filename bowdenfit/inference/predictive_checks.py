@@ -26,7 +26,7 @@ _SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays 
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LooPredictive:
     """Predictions of readings from everything but the reading itself, and where the reading lies in each.
 
     Args:
@@ -48,9 +48,9 @@ class LeftOut:
     pareto_k: np.ndarray
 
 
-def predict_without_each(
+def loo_predictive(
     log_likelihood: np.ndarray, replicated: np.ndarray, observed: np.ndarray, at_most: np.ndarray, n_effective: float
-) -> LeftOut:
+) -> LooPredictive:
     """Predictions of the readings of one table, each from everything else.
 
     Args:
@@ -66,27 +66,27 @@ def predict_without_each(
         log_weights, k = smooth_weights(-likelihood, share)
         weights = np.exp(log_weights - log_weights.max())[::every]
         rows.append((*_place(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
-    return LeftOut(*np.array(rows).reshape(-1, len(fields(LeftOut))).T)
+    return LooPredictive(*np.array(rows).reshape(-1, len(fields(LooPredictive))).T)
 
 
-def predict_by_refit(found: LeftOut, place: int, drawn: np.ndarray, reading: float, at_most: bool) -> LeftOut:
+def replace_by_refit(found: LooPredictive, place: int, drawn: np.ndarray, reading: float, at_most: bool) -> LooPredictive:
     """The predictions with one from a fit without its reading; how far the fit with it leans on it stays.
 
     Args:
         found: The predictions of a table.
         place: Which of its readings is meant.
         drawn: The reading drawn anew, by draws of the fit without it.
-        reading, at_most: See `predict_without_each`.
+        reading, at_most: See `loo_predictive`.
     """
     row = (*_place(drawn, np.full(len(drawn), 1 / len(drawn)), reading, at_most), found.pareto_k[place])
-    changed = {field.name: np.array(getattr(found, field.name)) for field in fields(LeftOut)}
+    changed = {field.name: np.array(getattr(found, field.name)) for field in fields(LooPredictive)}
     for column, value in zip(changed.values(), row, strict=True):
         column[place] = value
-    return LeftOut(**changed)
+    return LooPredictive(**changed)
 
 
 def _place(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
-    """The fields of `LeftOut` of one reading, but for its Pareto k."""
+    """The fields of `LooPredictive` of one reading, but for its Pareto k."""
     within = np.clip(np.nan_to_num(drawn, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
     order = np.argsort(within)
     x, w = within[order], weights[order]
@@ -132,7 +132,7 @@ def _pareto_survival(excess: float, shape: float) -> float:
     return float(np.exp(-excess) if shape < 1e-6 else (1 + shape * excess) ** (-1 / shape))
 
 
-def place_at_random(found: LeftOut, generator: np.random.Generator) -> np.ndarray:
+def randomized_pit(found: LooPredictive, generator: np.random.Generator) -> np.ndarray:
     """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
 
     Of a bound only an interval is known; it takes a place at random inside.
@@ -173,7 +173,7 @@ class Uniformity:
         return "lie lower than the fit says" if low + high > 0 else "lie higher than the fit says"
 
 
-def uniformity(places: np.ndarray, probability: float) -> Uniformity:
+def check_uniformity(places: np.ndarray, probability: float) -> Uniformity:
     """The distribution function of numbers between 0 and 1 beside the band that uniform ones would stay in.
 
     Args:

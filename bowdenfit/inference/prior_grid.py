@@ -21,7 +21,7 @@ _BENT = 1e-6  # relative change of slope below which a value is linear in z, and
 
 
 @dataclass(frozen=True)
-class Chart:
+class PriorGrid:
     """A one-to-one map from z to other coordinates: parameter by parameter, linear between nodes and beyond the last.
 
     Any such map leaves the sampler's target what it is, because its slopes are known exactly; this one follows the priors.
@@ -71,7 +71,7 @@ class Chart:
 
 
 @lru_cache(maxsize=8)
-def chart_values(space: ParameterSpace) -> Chart:
+def make_prior_grid(space: ParameterSpace) -> PriorGrid:
     """The chart of the values of free parameters, noise scales and values that are linear in z excepted."""
     grid = np.repeat(NODES[:, None], space.size, axis=1)
     shape = jax.ShapeDtypeStruct(grid.shape, jnp.float64)
@@ -80,4 +80,4 @@ def chart_values(space: ParameterSpace) -> Chart:
     rising = np.all(np.isfinite(values), axis=0) & np.all(slopes > 0, axis=0)
     bent = np.ptp(slopes, axis=0) > _BENT * np.max(np.abs(slopes), axis=0)
     which = np.flatnonzero(rising & bent & np.array([p.role != "noise" for p in space.free], dtype=bool))
-    return Chart(space.size, which, values[:, which])
+    return PriorGrid(space.size, which, values[:, which])

@@ -31,7 +31,7 @@ _TAILS = (0.05, 0.5, 0.95)
 
 
 @dataclass(frozen=True)
-class Width:
+class WidthSensitivity:
     """How the width of a quantity's 90 % interval follows the scale of one prior.
 
     Args:
@@ -77,7 +77,7 @@ class Sensitivity:
     sd: float
     wider: float
     prior_sds: float
-    widths: tuple[Width, ...] = ()
+    widths: tuple[WidthSensitivity, ...] = ()
 
     JSON: ClassVar = (..., "diagnosis")
 
@@ -91,7 +91,7 @@ class Sensitivity:
         return "conflict" if abs(self.prior_sds) > _ODD else "both count"
 
     @property
-    def followed(self) -> list[Width]:
+    def followed(self) -> list[WidthSensitivity]:
         """Priors that its width follows, the strongest first."""
         return sorted((w for w in self.widths if w.size > FOLLOWS), key=lambda w: -w.size)
 
@@ -102,7 +102,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class FarOut:
+class PriorConflict:
     """A parameter that the readings put where its prior hardly allows it.
 
     Args:
@@ -114,19 +114,19 @@ class FarOut:
     prior_sds: float
 
 
-def far_out(z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]) -> tuple[FarOut, ...]:
+def prior_conflicts(z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]) -> tuple[PriorConflict, ...]:
     """Parameters beyond 3 standard deviations of their priors, but for those at an end that the prior allows.
 
     Args:
         z: Draws of each parameter in z, by name.
         parameters: The parameters.
     """
-    found = [FarOut(name, _inside(parameters[name].prior.allowed_ends, float(np.median(at)))) for name, at in z.items()]
+    found = [PriorConflict(name, _inside(parameters[name].prior.allowed_ends, float(np.median(at)))) for name, at in z.items()]
     return tuple(sorted((f for f in found if abs(f.prior_sds) > FAR), key=lambda f: -abs(f.prior_sds)))
 
 
 @dataclass(frozen=True)
-class OtherScales:
+class RescaledPrior:
     """What other scales of one prior would do to every draw.
 
     Args:
@@ -139,17 +139,17 @@ class OtherScales:
     allowed_ends: tuple[bool, bool]
 
 
-def other_scales(prior: "Prior", values: np.ndarray) -> OtherScales:
+def rescale_prior(prior: "Prior", values: np.ndarray) -> RescaledPrior:
     """Of draws of a parameter [internal units]."""
     doubled, halved = (np.asarray(prior.widening(values.ravel(), factor)) for factor in (2.0, 0.5))
-    return OtherScales(doubled, halved, prior.allowed_ends)
+    return RescaledPrior(doubled, halved, prior.allowed_ends)
 
 
 def sensitivities(
     quantities: Mapping[str, np.ndarray],
     z: Mapping[str, np.ndarray],
     log_likelihood: np.ndarray,
-    priors: Mapping[str, OtherScales],
+    priors: Mapping[str, RescaledPrior],
 ) -> tuple[Sensitivity, ...]:
     """How much each quantity depends on the priors and on the readings.
 
@@ -201,17 +201,17 @@ class _Weighted:
     k_halved: float
 
     @classmethod
-    def of(cls, prior: OtherScales) -> "_Weighted":
+    def of(cls, prior: RescaledPrior) -> "_Weighted":
         """By what other scales do."""
         (doubled, k_doubled), (halved, k_halved) = (_weights(ratio) for ratio in (prior.doubled, prior.halved))
         return cls(doubled, halved, k_doubled, k_halved)
 
-    def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> Width:
+    def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> WidthSensitivity:
         """What it does to the width of a quantity's interval."""
         wide, narrow = (_quantiles(values, order, weights) for weights in (self.doubled, self.halved))
         whole = plain[2] - plain[0]  # none of an optimum that nine of ten draws have at the end of the range
         doubled, halved = (float((q[2] - q[0]) / whole) if whole > 0 else float("nan") for q in (wide, narrow))
-        return Width(parameter, doubled, halved, self.k_doubled, self.k_halved)
+        return WidthSensitivity(parameter, doubled, halved, self.k_doubled, self.k_halved)
 
 
 def _weights(log_ratio: np.ndarray) -> tuple[np.ndarray, float]:

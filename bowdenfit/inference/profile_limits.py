@@ -19,7 +19,7 @@ _MOST_STEPS = 50
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
 
 
-def interval(
+def interval_ends(
     rise: Callable[[float], float], center: float, error: float, ratio: float, freedom: float
 ) -> tuple[float, float]:
     """Limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
@@ -59,7 +59,7 @@ def _limit(above: Callable[[float], float], center: float, step: float) -> float
         if abs(reached) <= close:
             return outside
         if reached > 0:
-            return _crossing(known, inside, outside, _PRECISION * abs(ahead), close)
+            return find_crossing(known, inside, outside, _PRECISION * abs(ahead), close)
         if np.isnan(reached):
             step = ahead = ahead / 4
         else:
@@ -71,7 +71,7 @@ def _limit(above: Callable[[float], float], center: float, step: float) -> float
     return float(np.copysign(np.inf, step))
 
 
-def _crossing(
+def find_crossing(
     above: Callable[[float], float], inside: float, outside: float, tolerance: float, close: float = 0.0
 ) -> float:
     """Where a function goes through zero between two points at which it has either sign.

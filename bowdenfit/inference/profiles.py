@@ -25,8 +25,8 @@ import numpy as np
 
 from bowdenfit.inference.linearized import blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.objective import Objective, Problem, Solution, may_end, total
-from bowdenfit.inference.profile_limits import FARTHEST, interval, quantile
+from bowdenfit.inference.objective import Objective, Problem, Solution, has_lower_end, total_squares
+from bowdenfit.inference.profile_limits import FARTHEST, interval_ends, quantile
 from bowdenfit.inference.solver import QUICK, gauss_newton
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
@@ -92,7 +92,7 @@ class Basin:
         side = np.sign(self.found["z"])
         if not ended.any() or not np.any(ended & (side * self._gradient(np.where(ended, side * _AT_END, found["z"])) > 0)):
             return found
-        return min(found, self._solved(np.where(ended, side * _INSIDE, found["z"]), this, pin), key=total)
+        return min(found, self._solved(np.where(ended, side * _INSIDE, found["z"]), this, pin), key=total_squares)
 
     def _toward(self, near: Solution, this: np.ndarray, z: float) -> np.ndarray:
         """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""
@@ -118,7 +118,7 @@ class Basin:
         parameter = self.parameters[index]
         if z > 0 and not (isinstance(parameter.prior, Uniform) or np.isfinite(z)):
             return float("inf")
-        if z < 0 and not (may_end((parameter,))[0] or np.isfinite(z)):
+        if z < 0 and not (has_lower_end((parameter,))[0] or np.isfinite(z)):
             return float("-inf")
         at = np.clip(np.full(len(self.parameters), z), -FARTHEST, FARTHEST)
         values = self._solved(at, True, at)["values"]
@@ -138,22 +138,22 @@ class Rise:
     def __init__(self, basin: Basin, index: int) -> None:
         self._basin, self._index = basin, index
         self._known = {float(basin.found["z"][index]): basin.found}
-        self._center, self._least = float(basin.found["z"][index]), total(basin.found)
+        self._center, self._least = float(basin.found["z"][index]), total_squares(basin.found)
 
     def __call__(self, z: float) -> float:
         """The rise at z."""
         if z not in self._known:
             way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._told(at)]
             self._known[z] = self._basin.moved(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
-        return total(self._known[z]) - self._least if self._told(z) else float("nan")
+        return total_squares(self._known[z]) - self._least if self._told(z) else float("nan")
 
     def _told(self, z: float) -> bool:
-        return bool(np.isfinite(total(self._known[z])))
+        return bool(np.isfinite(total_squares(self._known[z])))
 
     @property
     def lowest(self) -> Solution:
         """Where the sum of squares was the least."""
-        return min((found for at, found in self._known.items() if self._told(at)), key=total)
+        return min((found for at, found in self._known.items() if self._told(at)), key=total_squares)
 
     @property
     def most_fall(self) -> float:
@@ -192,7 +192,7 @@ def profile(
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProfileIntervals:
     """The 90 % intervals about a minimum.
 
     Args:
@@ -206,7 +206,7 @@ class Limits:
     lower: Solution | None = None
 
 
-def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
+def profile_intervals(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> ProfileIntervals:
     """90 % intervals of determined parameters, by the scatter of each residual about the minimum."""
     found, lowest, least_level = {}, basin.found, np.inf
     cheap = basin.found["jacobian"].size <= _SMALL
@@ -215,12 +215,12 @@ def limits(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> Limits:
             error, ratio, freedom = _spread(basin, scale, i)
             if ratio > 0:
                 rise, level = Rise(basin, i), ratio * quantile(freedom) ** 2
-                ends = interval(rise, float(basin.found["z"][i]), error, ratio, freedom)
+                ends = interval_ends(rise, float(basin.found["z"][i]), error, ratio, freedom)
                 of_this = basin.value(i, ends[0]), basin.value(i, ends[1])
                 found[p.name] = UNKNOWN if is_stuck(rise.most_fall, level) else of_this
-                lowest, least_level = min(lowest, rise.lowest, key=total), min(level, least_level)
-    lower = total(lowest) < total(basin.found) - max(_LOWER * least_level, _ROUNDING)
-    return Limits(found, is_stuck(basin.found["fall"], least_level), lowest if lower else None)
+                lowest, least_level = min(lowest, rise.lowest, key=total_squares), min(level, least_level)
+    lower = total_squares(lowest) < total_squares(basin.found) - max(_LOWER * least_level, _ROUNDING)
+    return ProfileIntervals(found, is_stuck(basin.found["fall"], least_level), lowest if lower else None)
 
 
 def is_stuck(fall: float, level: float) -> bool:
@@ -247,10 +247,10 @@ def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, 
         for _, rows, _, freedom in blocks(terms, basin.found["residuals"], about.leverage)
     ]
     variance = float(np.sum(moves))
-    return float(np.sqrt(variance)), variance / float(about.unit_error[place]) ** 2, freedom_of(*np.array(parts).T)
+    return float(np.sqrt(variance)), variance / float(about.unit_error[place]) ** 2, satterthwaite_freedom(*np.array(parts).T)
 
 
-def freedom_of(parts: np.ndarray, freedom: np.ndarray) -> float:
+def satterthwaite_freedom(parts: np.ndarray, freedom: np.ndarray) -> float:
     """Satterthwaite's degrees of freedom of a variance; at least 1.
 
     Args:

@@ -18,7 +18,7 @@ _LEAST_SCATTER = 1e-5  # in units of what is expected: readings that agree bette
 
 
 @dataclass(frozen=True)
-class Readings:
+class ResidualGroup:
     """Readings that scatter alike.
 
     Args:
@@ -39,7 +39,7 @@ class Readings:
         count: How many independent ones there are.
         extra: Sum of squares inside what was taken together.
         freedom: Degrees of freedom that are left.
-        scatter: Standard deviation of the residuals; what they are divided by in `System`.
+        scatter: Standard deviation of the residuals; what they are divided by in `ResidualGroups`.
     """
 
     table: str
@@ -69,7 +69,7 @@ class Readings:
 
 
 @dataclass(frozen=True)
-class System:
+class ResidualGroups:
     """All residuals, divided by the scatter of their table.
 
     Args:
@@ -80,10 +80,10 @@ class System:
 
     residuals: np.ndarray
     followed: np.ndarray
-    readings: tuple[Readings, ...]
+    readings: tuple[ResidualGroup, ...]
 
 
-def readings_to_test(model: Model, found: Mapping[str, Any]) -> System:
+def group_residuals(model: Model, found: Mapping[str, Any]) -> ResidualGroups:
     """Every residual of least squares in its place.
 
     Args:
@@ -92,7 +92,7 @@ def readings_to_test(model: Model, found: Mapping[str, Any]) -> System:
     """
     values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
     values |= dict(zip((p.name for p in model.space.free), found["values"], strict=True))
-    blocks, start, position = list[Readings](), 0, 0
+    blocks, start, position = list[ResidualGroup](), 0, 0
     for term in model.terms:
         size = len(found["residuals"][term.name])
         of_term = found["residuals"][term.name], found["jacobian"][position : position + size]
@@ -104,7 +104,7 @@ def readings_to_test(model: Model, found: Mapping[str, Any]) -> System:
     return _weighed(blocks)
 
 
-def _weighed(blocks: list[Readings]) -> System:
+def _weighed(blocks: list[ResidualGroup]) -> ResidualGroups:
     """Weighed by the scatter that the parameters leave, which needs the parameters' share of each residual first."""
     residuals, followed = _projected(blocks)
     for i, block in enumerate(blocks):
@@ -119,10 +119,10 @@ def _weighed(blocks: list[Readings]) -> System:
         for block, freedom in zip(blocks, freedoms, strict=True)
         if freedom > _LEAST_FREEDOM and block.scatter > _LEAST_SCATTER and block.at and np.any(block.reading)
     )
-    return System(residuals, followed, tuple(tested))
+    return ResidualGroups(residuals, followed, tuple(tested))
 
 
-def _projected(blocks: list[Readings]) -> tuple[np.ndarray, np.ndarray]:
+def _projected(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
     """Residuals less what can be followed, and orthonormal columns of that."""
     residuals = np.concatenate([block.residuals / block.scatter for block in blocks])
     n_runs = sum(block.of_runs.shape[1] for block in blocks)
@@ -145,7 +145,7 @@ def _blocks(
     jacobian: np.ndarray,
     expected: np.ndarray,
     values: Mapping[str, float],
-) -> Iterator[Readings]:
+) -> Iterator[ResidualGroup]:
     """Readings of a term that scatter alike: the first are told apart, further ones only where they are inside runs."""
     first, *others = term.residual_blocks
     of_labels = _of_labels(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
@@ -162,18 +162,18 @@ def _blocks(
         start = rows.stop
 
 
-def _untold(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> Readings:
+def _untold(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> ResidualGroup:
     """Residuals that nothing is known of but their scatter."""
     n = len(residuals)
     nothing, none = np.zeros(n), np.zeros(n, dtype=bool)
-    return Readings(
+    return ResidualGroup(
         term.name, False, slice(0), residuals, jacobian, np.zeros((n, 0)), nothing, nothing, nothing, none, ("",) * n, {}, count
     )  # fmt: skip
 
 
 def _of_labels(
     term: Term, places: Places | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
-) -> Readings:
+) -> ResidualGroup:
     """The readings that results name, or whole runs."""
     n = len(residuals)
     untold = _untold(term, residuals, jacobian, float(np.count_nonzero(residuals)))
@@ -198,14 +198,14 @@ def _of_labels(
 
 def _inside(
     term: Any, inside: InsideRuns, residuals: np.ndarray, jacobian: np.ndarray, values: Mapping[str, float]
-) -> Readings:
+) -> ResidualGroup:
     """Readings inside runs, one by one: the residual of their cell, and how far they lie from it."""
     noise, root = float(values[term.reading_noise]), np.sqrt(inside.weight)
     share = root / np.sqrt(np.maximum(term.data["weight"][inside.cell], 1e-300))
     runs = inside.run[:, None] == np.unique(inside.run)[None, :]
     mean = np.bincount(inside.run, inside.weight * inside.log_ratio) / np.bincount(inside.run, inside.weight)
     n = len(root)
-    return Readings(
+    return ResidualGroup(
         term.name, True, slice(0), share * residuals[inside.cell] + root * inside.apart / noise,
         share[:, None] * jacobian[inside.cell], runs * root[:, None], noise / root, inside.log_ratio,
         np.abs(mean[inside.run]), np.ones(n, dtype=bool), ("",) * n, inside.at, inside.count,

@@ -10,7 +10,7 @@ import numpy as np
 FALSE_ALARM = 0.001  # probability that two samplers that are right are said to disagree
 SUMMARIES = ("mean", "sd", "5 % quantile", "95 % quantile")
 NOTICEABLE = 0.1  # sd; smaller differences change no answer
-NAMES = {"emcee": "emcee", "nuts": "NUTS"}
+SAMPLER_NAMES = {"emcee": "emcee", "nuts": "NUTS"}
 MANY_PARAMETERS = 25  # above which ensembles of walkers mix slowly
 
 
@@ -85,7 +85,7 @@ class SamplerAgreement:
 
     def sentence(self) -> str:
         """What was found, for people."""
-        one, two, most = NAMES[self.first], NAMES[self.second], self.largest
+        one, two, most = SAMPLER_NAMES[self.first], SAMPLER_NAMES[self.second], self.largest
         if self.agree:
             sharper = " A larger sampler.target_ess compares more sharply." if abs(most.sds) > NOTICEABLE else ""
             return (
@@ -106,7 +106,7 @@ class SamplerAgreement:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SamplerDraws:
     """What one sampler drew.
 
     Args:
@@ -135,7 +135,7 @@ class Drawn:
         return float(np.sqrt(max(np.mean(ratios), 1.0))) if ratios else 1.0
 
 
-def compare_samplers(first: Drawn, second: Drawn) -> SamplerAgreement:
+def compare_samplers(first: SamplerDraws, second: SamplerDraws) -> SamplerAgreement:
     """Whether two samplers, the first of which drew the result, agree on every quantity.
 
     The limit is Bonferroni's over all comparisons, so that two samplers that are right are said to disagree once in a
@@ -147,7 +147,7 @@ def compare_samplers(first: Drawn, second: Drawn) -> SamplerAgreement:
     return SamplerAgreement(first.sampler, second.sampler, found, limit)
 
 
-def _differences(name: str, first: Drawn, second: Drawn, scales: tuple[float, float]) -> list[SamplerDifference]:
+def _differences(name: str, first: SamplerDraws, second: SamplerDraws, scales: tuple[float, float]) -> list[SamplerDifference]:
     draws, others = first.draws[name], second.draws[name]
     sd = float(np.sqrt((np.var(draws) + np.var(others)) / 2)) or 1.0
     found = []

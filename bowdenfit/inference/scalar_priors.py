@@ -25,7 +25,7 @@ def z_at(prior: Prior, value: float) -> float:
     return _through(prior, "unconstrain", value)
 
 
-def near_z(prior: Prior, value: float) -> float:
+def clipped_z(prior: Prior, value: float) -> float:
     """The same, no farther out than a solve may start from or a noise scale be pinned at."""
     return float(np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST))
 

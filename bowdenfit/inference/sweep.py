@@ -9,17 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.inference.coordinates import Frame, Frames
-from bowdenfit.inference.moves import Moves, Numbers, numbers_at, numbers_of_move
+from bowdenfit.inference.coordinates import CoordinateMap, CoordinateMaps
+from bowdenfit.inference.moves import Moves, RandomNumbers, count_move_numbers, random_numbers
 
 
-class Chosen(NamedTuple):
+class SweepChoices(NamedTuple):
     """What is drawn at random for some steps.
 
     Args:
         frame: Number of the coordinates that walkers move in.
         kinds: Number of the move of each step.
-        bits: (step, half, walker, `numbers_of_walker`), as unsigned integers.
+        bits: (step, half, walker, `count_walker_numbers`), as unsigned integers.
     """
 
     frame: Array | np.ndarray
@@ -43,13 +43,13 @@ class Walkers(NamedTuple):
     accepted: Array
 
 
-def numbers_of_walker(size: int) -> int:
+def count_walker_numbers(size: int) -> int:
     """How many uniform numbers a step of a walker of so many parameters needs."""
-    return 1 + numbers_of_move(size)
+    return 1 + count_move_numbers(size)
 
 
-def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:
-    """Steps of all walkers of an ensemble, of what is `Chosen`, z (walker, parameter), and data.
+def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps) -> Callable[..., Any]:
+    """Steps of all walkers of an ensemble, of what is `SweepChoices`, z (walker, parameter), and data.
 
     They give z and log densities after them, and how many proposals of every walker were accepted. The halves of the ensemble
     move in turns, so that walkers should be put in another order from one sweep to the next.
@@ -61,7 +61,7 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
     """
     proposals = [move for move, _ in moves]
 
-    def sweep(chosen: Chosen, z: Array, data: Any) -> tuple[Array, Array, Array]:
+    def sweep(chosen: SweepChoices, z: Array, data: Any) -> tuple[Array, Array, Array]:
         def place(given: Array, is_z: bool) -> Walkers:
             ways = [partial(_through, frame, is_z) for frame, _ in frames]
             w, z, volume = jax.lax.switch(chosen.frame, ways, given, data)
@@ -72,7 +72,7 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
             value_in_w = jnp.where(known, value + jnp.where(known, volume, 0.0), beyond)
             return Walkers(w, z, value_in_w, value, jnp.zeros_like(value))
 
-        def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, Numbers]) -> Any:
+        def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, RandomNumbers]) -> Any:
             (moving, resting), (kind, chance, numbers) = halves, turn
             w, factors = jax.lax.switch(kind, proposals, numbers, moving.w, resting.w)
             proposed = place(w, is_z=False)._replace(accepted=moving.accepted + 1)
@@ -83,14 +83,14 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         begin, half = place(z, is_z=True), len(z) // 2
         halves = jax.tree.map(lambda rows: rows[:half], begin), jax.tree.map(lambda rows: rows[half:], begin)
         uniform = to_uniform(chosen.bits).reshape(-1, *chosen.bits.shape[2:])
-        turns = jnp.repeat(chosen.kinds, 2), uniform[..., 0], numbers_at(uniform[..., 1:])
+        turns = jnp.repeat(chosen.kinds, 2), uniform[..., 0], random_numbers(uniform[..., 1:])
         ended = jax.tree.map(lambda *rows: jnp.concatenate(rows), *jax.lax.scan(half_step, halves, turns)[0])
         return ended.z, ended.value, ended.accepted
 
     return sweep
 
 
-def _through(frame: Frame, is_z: bool, given: Array, data: Any) -> tuple[Array, Array, Array]:
+def _through(frame: CoordinateMap, is_z: bool, given: Array, data: Any) -> tuple[Array, Array, Array]:
     """W, z and log volume of walkers, of either of the first two."""
     return frame(given, jnp.asarray(is_z), data)
 

@@ -14,10 +14,10 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import Frames, frames_of, frames_without_ridge, in_z
+from bowdenfit.inference.coordinates import CoordinateMaps, coordinate_maps, maps_without_ridge, z_map
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, default_moves
-from bowdenfit.inference.sweep import Chosen, numbers_of_walker, walker_sweep
+from bowdenfit.inference.sweep import SweepChoices, count_walker_numbers, walker_sweep
 
 
 class Shares(NamedTuple):
@@ -31,13 +31,13 @@ class Shares(NamedTuple):
     moves: tuple[float, ...]
     frames: tuple[float, ...]
 
-    def choose(self, random: np.random.RandomState, shape: tuple[int, int]) -> Chosen:
+    def choose(self, random: np.random.RandomState, shape: tuple[int, int]) -> SweepChoices:
         """What is drawn at random for a sweep of walkers, (walker, parameter)."""
         walkers, size = shape
-        return Chosen(
+        return SweepChoices(
             np.asarray(random.choice(len(self.frames), p=self.frames), dtype=np.int32),
             random.choice(len(self.moves), size=THIN, p=self.moves).astype(np.int32),
-            random.randint(2**32, size=(THIN, 2, walkers // 2, numbers_of_walker(size)), dtype=np.uint32),
+            random.randint(2**32, size=(THIN, 2, walkers // 2, count_walker_numbers(size)), dtype=np.uint32),
         )
 
 
@@ -72,15 +72,15 @@ def walker_programs(
     space = posterior.model.space
     of_what = posterior.log_density, posterior.data, space.size, settings
     if moves is not None:
-        return compiled_walkers(*of_what, ((in_z, 1.0),), moves, beside)
+        return compiled_walkers(*of_what, ((z_map, 1.0),), moves, beside)
     if Conditional(posterior).is_narrow:
-        return compiled_walkers(*of_what, frames_of(posterior), beside=beside)
-    plain = frames_without_ridge(space)
+        return compiled_walkers(*of_what, coordinate_maps(posterior), beside=beside)
+    plain = maps_without_ridge(space)
     first = compiled_walkers(*of_what, plain, beside=beside)
 
     @cache
     def later() -> WalkerPrograms:
-        frames = frames_of(posterior)
+        frames = coordinate_maps(posterior)
         return compiled_walkers(*of_what, frames) if len(frames) > len(plain) else first
 
     return first._replace(later=later)
@@ -91,7 +91,7 @@ def compiled_walkers(
     data: Any,
     size: int,
     settings: SamplerSettings,
-    frames: Frames,
+    frames: CoordinateMaps,
     moves: Moves | None = None,
     beside: Executor | None = None,
 ) -> WalkerPrograms:

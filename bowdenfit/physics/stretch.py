@@ -104,7 +104,7 @@ def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Arra
     return tension, jnp.where(jnp.broadcast_to(extended > 0, tension.shape), step, 0.0)
 
 
-def with_springs(
+def stiffness_with_springs(
     stiffness: Float[Array, "*batch"], spring: Float[Array, "*#batch"], sides: int
 ) -> Float[Array, "*batch"]:
     r"""Stiffness of a cable whose ropes each have a spring in series.

@@ -14,7 +14,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics, Trajectories
-from bowdenfit.inference.draws import OfDraws, derived_units, efficiency_at
+from bowdenfit.inference.draws import DrawFunction, derived_units, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.sampler_agreement import SamplerAgreement
@@ -123,9 +123,9 @@ class DrawPrograms:
         along_route: See `compile_along_route`; None without a route.
     """
 
-    values: OfDraws
-    implied: OfDraws
-    along_route: OfDraws | None
+    values: DrawFunction
+    implied: DrawFunction
+    along_route: DrawFunction | None
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -299,6 +299,6 @@ def some_values(fit: Record, n: int) -> dict[str, np.ndarray]:
 
 
 @once
-def along_route_program(fit: Record) -> OfDraws:
+def along_route_program(fit: Record) -> DrawFunction:
     """See `compile_along_route`."""
     return fit.programs.along_route if fit.programs and fit.programs.along_route else compile_along_route(fit.model)

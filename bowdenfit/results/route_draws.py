@@ -14,7 +14,7 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.description import Description, Route
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.draws import OfDraws, curves_at, for_each_draw
+from bowdenfit.inference.draws import DrawFunction, curves_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
@@ -51,7 +51,7 @@ class RouteDraws(Display):
         return {"route": self.grid} | columns, {name: "1" if name.startswith("efficiency") else "deg" for name in columns}
 
 
-def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws:
+def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFunction:
     """Curves and efficiencies of a cable with a route, of draws of z with the effect of a new mounting on the exponent.
 
     Args:
@@ -76,7 +76,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> OfDraws
         return for_each_draw(implied, model.space.size + 1, run_once=True, beside=beside)
 
 
-def route_draws(model: Model, program: OfDraws, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
+def route_draws(model: Model, program: DrawFunction, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
     """What draws imply along the route.
 
     Args:

@@ -11,7 +11,7 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.engines.memory import refuse_shortage
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -67,7 +67,7 @@ def fit_posterior(
             programs = compile_programs(density, seed, compiling)
         with watch.stage("wait for the start"):
             _, start = maximum.result()
-        request = Sampling(
+        request = SamplingRequest(
             density, start, settings, seed, programs.quantities, start_checkpoint(), resume, _with_memory(report)
         )
         posterior, reasons = draw_posterior(programs, request, watch)

@@ -11,10 +11,10 @@ from typing import Any
 import jax
 import numpy as np
 
-from bowdenfit.inference.chain import Chain, Sampling
+from bowdenfit.inference.chain import Chain, SamplingRequest
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.sampler_agreement import NAMES, Drawn, compare_samplers
+from bowdenfit.inference.sampler_agreement import SAMPLER_NAMES, SamplerDraws, compare_samplers
 from bowdenfit.inference.walkers import walker_programs
 from bowdenfit.model import Model
 from bowdenfit.results.optimum import optimum_of
@@ -82,13 +82,13 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
     return Programs(programs, optimum, DrawPrograms(lambda z: implied(z)["values"], implied, along_route))
 
 
-def draw_posterior(programs: Programs, request: Sampling, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:
+def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatch) -> tuple[Draws, tuple[str, ...]]:
     """Sample the posterior by each of the samplers; return the draws, and why they should not be trusted."""
     model, chains = request.posterior.model, list[Chain]()
     for name, program in programs.samplers.items():
         with watch.stage(f"import {LIBRARIES[name]}"):
             sampler = import_module(_MODULES[name])
-        with watch.stage(f"sample with {NAMES[name]}" if chains else "sample"):
+        with watch.stage(f"sample with {SAMPLER_NAMES[name]}" if chains else "sample"):
             chains.append(sampler.sample(request, program))
     with watch.stage("replicate"):
         posterior = _posterior(model, chains[0], programs.of_draws.implied, request.seed)
@@ -96,13 +96,13 @@ def draw_posterior(programs: Programs, request: Sampling, watch: Stopwatch) -> t
         return posterior, chains[0].reasons
     with watch.stage("compare samplers"):
         agreement = compare_samplers(*(_drawn(model, chain) for chain in chains))
-    of_other = [f"{NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
+    of_other = [f"{SAMPLER_NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
     return replace(posterior, agreement=agreement), (*chains[0].reasons, *of_other, *agreement.reasons())
 
 
-def _drawn(model: Model, chain: Chain) -> Drawn:
+def _drawn(model: Model, chain: Chain) -> SamplerDraws:
     draws = {p.name: chain.z[..., i] for i, p in enumerate(model.space.free)} | chain.quantities
-    return Drawn(chain.sampler, draws, chain.n_ensembles)
+    return SamplerDraws(chain.sampler, draws, chain.n_ensembles)
 
 
 def _posterior(model: Model, chain: Chain, implied: Callable[[np.ndarray], Any], seed: int) -> Draws:

@@ -23,9 +23,9 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.batch.ensembles import walker_round
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import in_values
+from bowdenfit.inference.coordinates import value_map
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moves import independent
+from bowdenfit.inference.moves import fitted_t
 from bowdenfit.model import build_model
 
 pytestmark = pytest.mark.extended
@@ -54,12 +54,12 @@ def test_the_moves_of_a_batch_leave_a_heavy_tailed_target_as_it_is():
 @pytest.mark.filterwarnings("ignore:Precision loss")  # all ensembles without any tails
 def test_the_same_test_sees_that_a_factor_is_missing_in_a_batch():
     """The negative control of the test above."""
-    assert p_value(below_quantiles(states([(without_its_factor(independent), 1.0)], seed=3, rounds=6)[30:])) < 1e-4
+    assert p_value(below_quantiles(states([(without_its_factor(fitted_t), 1.0)], seed=3, rounds=6)[30:])) < 1e-4
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
 def test_the_same_test_sees_that_the_volume_of_coordinates_is_missing():
-    frames = ((without_its_volume(in_values(CHART)), 1.0),)
+    frames = ((without_its_volume(value_map(CHART)), 1.0),)
     assert p_value(below_quantiles(states(MOVES, seed=3, rounds=6, frames=frames)[30:])) < 1e-4
 
 

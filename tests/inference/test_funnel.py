@@ -15,9 +15,9 @@ from slow_cases import some_slow
 from test_proposals import LEVELS, PROPOSALS, run_side_by_side, without_its_volume
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import in_ridge
+from bowdenfit.inference.coordinates import ridge_map
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
@@ -106,7 +106,7 @@ class Funnel:
         middle = np.linalg.lstsq(self.angles, self.read, rcond=None)[0]
         start = MaximumPosterior(np.append(middle, 0.0), np.diag([0.01, 0.01, 0.01, 1.0]))
         programs = programs or walker_programs(self.posterior, settings, moves)
-        z = sample(Sampling(self.posterior, start, settings, 1, **options), programs).z
+        z = sample(SamplingRequest(self.posterior, start, settings, 1, **options), programs).z
         return z.reshape(ENSEMBLES, WALKERS, -1, COUNT + 1).transpose(2, 0, 1, 3)
 
 
@@ -127,7 +127,7 @@ def wide() -> Funnel:
 
 def moved_along_the_ridge(funnel, moves, change=lambda frame: frame) -> np.ndarray:
     """States of walkers that start in the posterior and move in these coordinates alone."""
-    frames, posterior = ((change(in_ridge(Conditional(funnel.posterior))), 1.0),), funnel.posterior
+    frames, posterior = ((change(ridge_map(Conditional(funnel.posterior))), 1.0),), funnel.posterior
     return run_side_by_side(moves, posterior.log_density, funnel.draw(3), 1200, 3, frames, posterior.data)[30:]
 
 
@@ -210,7 +210,7 @@ def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interru
 
 def test_the_way_along_the_ridge_and_back_are_inverse(narrow):
     posterior = narrow.posterior
-    frame, z = jax.jit(in_ridge(Conditional(posterior))), jnp.asarray(narrow.draw(1)[0])
+    frame, z = jax.jit(ridge_map(Conditional(posterior))), jnp.asarray(narrow.draw(1)[0])
     w, given, volume = frame(z, True, posterior.data)
     kept, back, same = frame(w, False, posterior.data)
     np.testing.assert_array_equal(given, z)

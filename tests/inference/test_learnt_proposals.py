@@ -9,9 +9,9 @@ from rows import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.inference.batch.mixture import Students, students_among
+from bowdenfit.inference.batch.mixture import StudentMixture, mixture_among
 from bowdenfit.inference.batch.programs import BatchPrograms
-from bowdenfit.inference.batch.proposals import AboutMaxima, Learnt, Places, learnt
+from bowdenfit.inference.batch.proposals import LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.extended
 ANGLES = np.deg2rad([(200.0, 30.0), (60.0, 90.0), (90.0, 30.0), (150.0, 60.0)])
 CENTERS = np.array([[0.0, 0.0, 0.0], [2.0, -1.0, 0.5]])
 ROOTS = np.array([np.eye(3), [[0.5, 0.0, 0.0], [0.2, 0.3, 0.0], [0.0, 0.1, 0.4]]])
-TWO = Students(CENTERS, ROOTS, np.array([0.3, 0.7]))
+TWO = StudentMixture(CENTERS, ROOTS, np.array([0.3, 0.7]))
 
 
 def test_student_ts_have_the_density_that_scipy_says():
@@ -45,7 +45,7 @@ def test_draws_of_student_ts_are_of_their_density():
 
 def test_student_ts_move_to_where_draws_are():
     rows = TWO.draw(np.random.default_rng(4), 8000)
-    begun = students_among(rows, 2)
+    begun = mixture_among(rows, 2)
     moved = begun.moved(rows).moved(rows).moved(rows)
     gains = [np.mean(each.log_density(rows)) for each in (begun, moved, TWO)]
     assert gains[0] < gains[1]
@@ -63,16 +63,16 @@ def bent():
         programs = BatchPrograms(posterior, RANKS)
         places = programs.places
 
-    def evaluate(given: np.ndarray, is_z: np.ndarray) -> Places:
+    def evaluate(given: np.ndarray, is_z: np.ndarray) -> ProposedPoints:
         with jax.enable_x64(True):
-            return Places(*map(np.asarray, places(given, is_z, posterior.data)))
+            return ProposedPoints(*map(np.asarray, places(given, is_z, posterior.data)))
 
     size = posterior.model.space.size
-    students = Students(np.zeros((1, size)), 1.5 * np.eye(size)[None], np.ones(1))
-    return evaluate, AboutMaxima(students), programs.friction
+    students = StudentMixture(np.zeros((1, size)), 1.5 * np.eye(size)[None], np.ones(1))
+    return evaluate, MaximaProposal(students), programs.friction
 
 
-def sum_of_first(evaluate, found: Learnt, density) -> tuple[float, float]:
+def sum_of_first(evaluate, found: LearntProposal, density) -> tuple[float, float]:
     """Of the first proposal's density, from draws of what is learnt, by what is said to be their density; and its error.
 
     No ratio is above 10, because a tenth of what is learnt is the first proposal.
@@ -85,11 +85,11 @@ def sum_of_first(evaluate, found: Learnt, density) -> tuple[float, float]:
     return float(every.mean()), float(every.std() / np.sqrt(len(every)))
 
 
-def proposal_of(bent) -> Learnt:
+def proposal_of(bent) -> LearntProposal:
     evaluate, first, friction = bent
     at = evaluate(*first.draw(np.random.default_rng(6), BLOCK))
     weights = np.exp(at.log_density - first.log_density(at) - np.max(at.log_density - first.log_density(at)))
-    return learnt(first, at.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction)
+    return learn_proposal(first, at.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction)
 
 
 def test_what_is_learnt_is_drawn_with_its_density(bent):

@@ -14,7 +14,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.checkpoint import heading
 from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -80,7 +80,7 @@ def program():
 
 def sampled(log_density, program, covariance: np.ndarray, settings: SamplerSettings = SETTINGS, **options):
     start = MaximumPosterior(np.zeros(3), covariance)
-    return nuts.sample(Sampling(Target(log_density), start, settings, 1, **options), program)
+    return nuts.sample(SamplingRequest(Target(log_density), start, settings, 1, **options), program)
 
 
 def z_scores(chain, true_means) -> list[float]:

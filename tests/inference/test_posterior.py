@@ -14,8 +14,8 @@ from snooker import snooker_mixture
 
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Sampling, stuck_walkers
-from bowdenfit.inference.draws import for_each_draw, named_values
+from bowdenfit.inference.chain import Chain, SamplingRequest, stuck_walkers
+from bowdenfit.inference.draws import for_each_draw, value_function
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -75,7 +75,7 @@ class Bench:
     """One density and what follows from its z; compiled once."""
 
     def __init__(self, posterior: LogDensity):
-        names, optimum = named_values(posterior.model), optimum_of(posterior.model)
+        names, optimum = value_function(posterior.model), optimum_of(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
         self._programs = cache(lambda walkers: walker_programs(posterior, SamplerSettings(n_walkers=walkers)))
@@ -96,7 +96,7 @@ class Bench:
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
         walkers = settings.walkers(self.posterior.model.space.size)
         programs = self._programs(walkers) if moves is None else walker_programs(self.posterior, settings, moves)
-        return sample(Sampling(self.posterior, self._start, settings, seed), programs)
+        return sample(SamplingRequest(self.posterior, self._start, settings, seed), programs)
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.inference.prior_grid import NODES, Chart, chart_values
+from bowdenfit.inference.prior_grid import NODES, PriorGrid, make_prior_grid
 from bowdenfit.model import build_model
 
 DIMENSIONS = 5
-CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
+CHART = PriorGrid(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
 
 
 def test_a_chart_leads_back_and_knows_its_slopes():
@@ -30,7 +30,7 @@ def test_a_chart_leads_back_and_knows_its_slopes():
 def test_coefficients_and_curvatures_are_charted_and_noise_scales_are_not(on_body):
     """Levels and slopes of curves are linear in z as they are."""
     space = build_model(load_dataset(on_body)).space
-    chart = chart_values(space)
+    chart = make_prior_grid(space)
     charted = {space.free[i].name for i in chart.which}
     assert charted == {"mu1", "mu2", "mu3", "free_sheath_angle_c", "squeezed_sheath_angle_c"}
     z = np.repeat(np.asarray(NODES)[100:140:10, None], space.size, axis=1)

@@ -15,8 +15,8 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.profile_limits import _crossing, interval
-from bowdenfit.inference.profiles import freedom_of, profile
+from bowdenfit.inference.profile_limits import find_crossing, interval_ends
+from bowdenfit.inference.profiles import profile, satterthwaite_freedom
 from bowdenfit.inference.solver import minimize, orthogonal
 from bowdenfit.model import build_model
 
@@ -106,7 +106,7 @@ def _profiled(given: Problem, index: int) -> tuple[float, float, float, float]:
 
         return minimize(pinned, best[others]).sum_of_squares - given.residual_sum_of_squares
 
-    low, high = interval(rise, 0.0, 1.0, given.residual_sum_of_squares / spare, float(spare))
+    low, high = interval_ends(rise, 0.0, 1.0, given.residual_sum_of_squares / spare, float(spare))
     return center, error, center + error * low, center + error * high
 
 
@@ -135,28 +135,28 @@ def test_standard_errors_by_qr_are_those_of_the_normal_equations_where_these_are
 
 
 def test_degrees_of_freedom_follow_what_decides():
-    assert freedom_of(np.array([1.0, 0.0]), np.array([3.0, 50.0])) == pytest.approx(3.0)
-    assert freedom_of(np.array([1.0, 1.0]), np.array([6.0, 6.0])) == pytest.approx(12.0)
-    assert freedom_of(np.array([1.0]), np.array([np.inf])) > 1e8  # a scatter that is known, not estimated
-    assert freedom_of(np.array([1.0]), np.array([0.6])) == 1.0
+    assert satterthwaite_freedom(np.array([1.0, 0.0]), np.array([3.0, 50.0])) == pytest.approx(3.0)
+    assert satterthwaite_freedom(np.array([1.0, 1.0]), np.array([6.0, 6.0])) == pytest.approx(12.0)
+    assert satterthwaite_freedom(np.array([1.0]), np.array([np.inf])) > 1e8  # a scatter that is known, not estimated
+    assert satterthwaite_freedom(np.array([1.0]), np.array([0.6])) == 1.0
 
 
 # Bounds and open ends ---------------------------------------------------------------------------------------------
 
 
 def test_an_interval_is_open_where_the_sum_of_squares_stops_rising():
-    low, high = interval(lambda z: z**2 if z < 0 else 1.5 * np.tanh(z) ** 2, 0.0, 1.0, 1.0, 1e9)
+    low, high = interval_ends(lambda z: z**2 if z < 0 else 1.5 * np.tanh(z) ** 2, 0.0, 1.0, 1.0, 1e9)
     assert low == pytest.approx(-stats.norm.ppf(0.95), abs=1e-3)
     assert high == np.inf
 
 
 def test_an_interval_is_open_where_the_model_cannot_be_computed():
-    low, high = interval(lambda z: z**2 if z < 1.0 else float("nan"), 0.0, 1.0, 1.0, 1e9)
+    low, high = interval_ends(lambda z: z**2 if z < 1.0 else float("nan"), 0.0, 1.0, 1.0, 1e9)
     assert np.isfinite(low) and high == np.inf
 
 
 def test_where_the_model_cannot_be_computed_short_of_the_limit_the_interval_is_the_wider_one():
-    low, high = interval(lambda z: float("nan") if 1.6 < z < 1.7 else z**2, 0.0, 1.0, 1.0, 1e9)
+    low, high = interval_ends(lambda z: float("nan") if 1.6 < z < 1.7 else z**2, 0.0, 1.0, 1.0, 1e9)
     assert -low == pytest.approx(stats.norm.ppf(0.95), abs=1e-3)
     assert stats.norm.ppf(0.95) < high <= 1.71
 
@@ -165,10 +165,10 @@ def test_a_limit_just_beyond_a_step_or_far_beyond_a_flat_stretch_is_found():
     """A first step that falls short by any little must not leave steps too small to get on with."""
     quantile = stats.norm.ppf(0.95)
     for short in 10.0 ** -np.arange(1, 14):
-        _, high = interval(lambda z, s=short: z**2 * (1 - s) ** 2, 0.0, 1.0, 1.0, 1e9)
+        _, high = interval_ends(lambda z, s=short: z**2 * (1 - s) ** 2, 0.0, 1.0, 1.0, 1e9)
         assert high == pytest.approx(quantile / (1 - short), rel=1e-3)
         flat = (quantile * (1 - short)) ** 2  # where it stays from the first step to 20, and then rises
-        _, high = interval(lambda z, f=flat: max(min(z**2, f), (z - 20.0) ** 3), 0.0, 1.0, 1.0, 1e9)
+        _, high = interval_ends(lambda z, f=flat: max(min(z**2, f), (z - 20.0) ** 3), 0.0, 1.0, 1.0, 1e9)
         near = quantile if short < 3e-4 else 20.0 + quantile ** (2 / 3)  # within the precision of a limit, or not
         assert near - 0.01 < high < 20.0 + quantile ** (2 / 3) + 0.01
 
@@ -182,7 +182,7 @@ def test_an_interval_takes_few_solves(bend, most):
         asked.add(z)
         return (z / 0.1) ** 2 * (1 + bend * z / 0.1)
 
-    low, high = interval(rise, 0.0, 0.1, 1.0, 1e9)
+    low, high = interval_ends(rise, 0.0, 0.1, 1.0, 1e9)
     assert [rise(low), rise(high)] == pytest.approx([quantile**2] * 2, rel=1e-3)
     assert len(asked - {0.0, low, high}) + 2 <= most
 
@@ -317,12 +317,12 @@ def test_a_limit_is_found_to_its_tolerance_between_any_two_points_and_on_plateau
     rng = np.random.default_rng(1)
     for power in (0.3, 0.5, 1.0, 2.0, 5.0):
         for at in rng.uniform(0.01, 0.99, 40):
-            found = _crossing(lambda x, p=power, r=at: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
+            found = find_crossing(lambda x, p=power, r=at: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
             assert found == pytest.approx(-at, abs=1e-3)
-            assert _crossing(lambda x, r=at: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(at, abs=1e-3)
+            assert find_crossing(lambda x, r=at: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(at, abs=1e-3)
 
 
 def test_a_limit_is_looked_for_between_its_points_even_where_these_are_nearer_than_the_tolerance():
     asked = []
-    found = _crossing(lambda x: asked.append(x) or x - 37.99995, 37.9999, 38.0, 1e-2)
+    found = find_crossing(lambda x: asked.append(x) or x - 37.99995, 37.9999, 38.0, 1e-2)
     assert all(37.9999 <= x <= 38.0 for x in (found, *asked))

@@ -13,17 +13,17 @@ from snooker import snooker
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.coordinates import Frame, in_values, in_z
-from bowdenfit.inference.ensemble import Sweep, start_of
+from bowdenfit.inference.coordinates import CoordinateMap, value_map, z_map
+from bowdenfit.inference.ensemble import EnsembleMove, initial_state
 from bowdenfit.inference.moves import (
+    count_move_numbers,
     default_moves,
     differential_evolution,
-    independent,
-    numbers_at,
-    numbers_of_move,
+    fitted_t,
+    random_numbers,
     stretch,
 )
-from bowdenfit.inference.prior_grid import NODES, Chart
+from bowdenfit.inference.prior_grid import NODES, PriorGrid
 from bowdenfit.inference.walkers import compiled_walkers
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5
@@ -33,9 +33,9 @@ INVERSE = np.linalg.inv(ROOT)
 
 
 # Two coordinates are bent, as those of positive quantities are; walkers leave the nodes on both sides.
-CHART = Chart(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
-IN_Z, IN_VALUES = ((in_z, 1.0),), ((in_values(CHART), 1.0),)
-IN_BOTH = ((in_z, 0.5), (in_values(CHART), 0.5))
+CHART = PriorGrid(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))
+IN_Z, IN_VALUES = ((z_map, 1.0),), ((value_map(CHART), 1.0),)
+IN_BOTH = ((z_map, 0.5), (value_map(CHART), 0.5))
 MOVES = default_moves(DIMENSIONS, 64)
 
 
@@ -71,9 +71,9 @@ def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: in
     with jax.enable_x64(True):
         find = compiled_once if data is None else programs_of
         programs = find(log_density, data, walkers, dimensions, tuple(frames), tuple(moves))
-        sweep, flat = Sweep(programs, data, ensembles), start.reshape(-1, dimensions)
+        sweep, flat = EnsembleMove(programs, data, ensembles), start.reshape(-1, dimensions)
         sampler = emcee.EnsembleSampler(*flat.shape, log_density, moves=sweep)
-        sampler.run_mcmc(start_of(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)
+        sampler.run_mcmc(initial_state(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)
         return sampler.get_chain().reshape(-1, ensembles, walkers, dimensions)
 
 
@@ -126,7 +126,7 @@ PROPOSALS = {
     "stretch": stretch,
     "differential evolution": differential_evolution,
     "gamma 1": partial(differential_evolution, gamma=1.0),
-    "independent": independent,
+    "independent": fitted_t,
 }
 ALONE = {name: (proposal, IN_Z) for name, proposal in PROPOSALS.items()}
 ALONE |= {f"{name} in values": (proposal, IN_VALUES) for name, proposal in PROPOSALS.items()}
@@ -145,20 +145,20 @@ def without_its_factor(proposal):
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")  # all ensembles without any tails
-@pytest.mark.parametrize("name", ["stretch", "independent"])
+@pytest.mark.parametrize("name", ["stretch", "fitted_t"])
 def test_the_same_test_sees_that_a_factor_is_missing(name):
     """The negative control of the test above."""
     assert p_value(below_quantiles(sampled_t([(without_its_factor(PROPOSALS[name]), 1.0)], seed=3)[30:])) < 1e-4
 
 
-def without_its_volume(frame: Frame) -> Frame:
+def without_its_volume(frame: CoordinateMap) -> CoordinateMap:
     """The same places, as if a unit were as large everywhere."""
     return lambda places, is_z, data: (*frame(places, is_z, data)[:2], jnp.zeros(len(places)))
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")
 def test_the_same_test_sees_that_the_volume_of_coordinates_is_missing_in_a_single_fit():
-    frames = ((without_its_volume(in_values(CHART)), 1.0),)
+    frames = ((without_its_volume(value_map(CHART)), 1.0),)
     moves = [(differential_evolution, 1.0)]
     assert p_value(below_quantiles(sampled_t(moves, seed=3, frames=frames)[30:])) < 1e-4
 
@@ -177,13 +177,13 @@ class Told:
 def told() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Uniform numbers, moving and resting walkers, (walker, number or dimension)."""
     random = np.random.default_rng(1)
-    return random.uniform(size=(9, numbers_of_move(DIMENSIONS))), *random.standard_normal((2, 9, DIMENSIONS))
+    return random.uniform(size=(9, count_move_numbers(DIMENSIONS))), *random.standard_normal((2, 9, DIMENSIONS))
 
 
 def proposed(move, told):
     with jax.enable_x64(True):
         uniform, moving, resting = map(jnp.asarray, told)
-        return tuple(np.asarray(part) for part in move(numbers_at(uniform), moving, resting))
+        return tuple(np.asarray(part) for part in move(random_numbers(uniform), moving, resting))
 
 
 def test_stretch_moves_are_emcee_s_own_given_the_same_random_numbers(told):
@@ -234,7 +234,7 @@ def test_the_snooker_move_of_controls_is_emcee_s_own_given_the_same_random_numbe
 def test_draws_from_a_fitted_distribution_have_the_factors_of_their_places(told):
     """The t distribution's density at both, with the mean and covariance of the resting walkers."""
     uniform, moving, resting = told
-    places, factors = proposed(independent, told)
+    places, factors = proposed(fitted_t, told)
     fitted = stats.multivariate_t(resting.mean(axis=0), np.cov(resting.T), df=5)
     np.testing.assert_allclose(factors, fitted.logpdf(moving) - fitted.logpdf(places), rtol=1e-6, atol=1e-6)
 
@@ -286,7 +286,7 @@ def test_walkers_that_start_where_the_density_cannot_be_computed_come_in_and_non
 
 
 def without_coordinates_below_zero(given, is_z, data):
-    w, z, volume = in_z(given, is_z, data)
+    w, z, volume = z_map(given, is_z, data)
     return w, z, jnp.where(z[:, 0] > 0, volume, jnp.nan)
 
 

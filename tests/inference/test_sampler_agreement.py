@@ -11,7 +11,13 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.inference import nuts
-from bowdenfit.inference.sampler_agreement import FALSE_ALARM, Drawn, SamplerAgreement, compare_samplers, recommendation
+from bowdenfit.inference.sampler_agreement import (
+    FALSE_ALARM,
+    SamplerAgreement,
+    SamplerDraws,
+    compare_samplers,
+    recommendation,
+)
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.words import full_text
 
@@ -24,7 +30,7 @@ YARN = DATA / "yarn-on-cylinder"
 def compared(draws: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> SamplerAgreement:
     """Of chains that are an ensemble each."""
     n = [len(next(iter(both.values()))) for both in (draws, others)]
-    return compare_samplers(Drawn("emcee", draws, n[0]), Drawn("nuts", others, n[1]))
+    return compare_samplers(SamplerDraws("emcee", draws, n[0]), SamplerDraws("nuts", others, n[1]))
 
 
 def autocorrelated(generator, chains: int = 8, draws: int = 400, quantities: int = 12) -> dict[str, np.ndarray]:
@@ -79,9 +85,9 @@ def test_walkers_that_depend_on_each_other_get_larger_errors():
     generator = np.random.default_rng(4)
     common = np.repeat(generator.standard_normal((12, 4, 10)), 64, axis=1)
     draws = {f"q{i}": np.sqrt(0.5) * (c + generator.standard_normal((256, 10))) for i, c in enumerate(common)}
-    assert Drawn("emcee", draws, 4).error_scale() > 3
+    assert SamplerDraws("emcee", draws, 4).error_scale() > 3
     free = {name: generator.standard_normal((256, 10)) for name in draws}
-    assert Drawn("emcee", free, 4).error_scale() < 1.3
+    assert SamplerDraws("emcee", free, 4).error_scale() < 1.3
 
 
 def test_the_limit_is_bonferroni_s():

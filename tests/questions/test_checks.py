@@ -18,13 +18,13 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.draws import shown_values
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.inference.predictive_checks import place_at_random, predict_without_each, uniformity
+from bowdenfit.inference.predictive_checks import check_uniformity, loo_predictive, randomized_pit
 from bowdenfit.inference.prior_sensitivity import (
     SENSITIVE,
     Sensitivity,
-    Width,
-    far_out,
-    other_scales,
+    WidthSensitivity,
+    prior_conflicts,
+    rescale_prior,
     sensitivities,
 )
 from bowdenfit.kinds import KINDS
@@ -78,7 +78,7 @@ def test_predictions_without_a_reading_are_those_of_the_textbook():
     x = np.linspace(-1, 1, 15)
     y = 1 + 2 * x + 0.3 * np.random.default_rng(1).standard_normal(15)
     log_likelihood, replicated = line_through(x, y, 0.3)
-    found = predict_without_each(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
+    found = loo_predictive(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
     mean, sd = textbook(x, y, 0.3)
     np.testing.assert_allclose((found.mean - mean) / sd, 0.0, atol=0.06)
     np.testing.assert_allclose(found.sd / sd, 1.0, atol=0.06)
@@ -91,21 +91,21 @@ def test_a_tail_beyond_all_draws_is_small_but_never_smaller_than_a_normal_one(z)
     """The Pareto tail is exponential at the least, so it errs to the side of no alarm, and by less than two sds."""
     draws = np.random.default_rng(0).standard_normal((20_000, 1))
     flat = np.zeros_like(draws)
-    (tail,) = predict_without_each(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
+    (tail,) = loo_predictive(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
     assert 0.7 * 2 * stats.norm.sf(z) < tail < 2 * stats.norm.sf(z - 1.0)
-    (other,) = predict_without_each(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
+    (other,) = loo_predictive(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
     assert other == pytest.approx(tail, rel=1.0)
 
 
 def test_a_bound_takes_a_place_below_itself_and_stands_out_only_where_more_was_expected():
     draws = np.random.default_rng(0).normal(20.0, 2.0, (8000, 2))
     at_most = np.array([True, True])
-    found = predict_without_each(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
+    found = loo_predictive(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
     assert found.below[0] == 0.0
     assert found.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
     assert found.tail[0] == pytest.approx(found.up_to[0], abs=1e-9)
     assert found.tail[1] < 1e-3
-    places = [place_at_random(found, np.random.default_rng(i))[0] for i in range(200)]
+    places = [randomized_pit(found, np.random.default_rng(i))[0] for i in range(200)]
     assert min(places) > 0.0
     assert max(places) < found.up_to[0]
 
@@ -114,7 +114,7 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
     draws = np.random.default_rng(0).standard_normal((4000, 2))
     log_likelihood = np.zeros((4000, 2))
     log_likelihood[7, 0] = -800.0
-    found = predict_without_each(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
+    found = loo_predictive(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
     assert np.isinf(found.pareto_k[0])
     assert found.pareto_k[1] == 0.0
     np.testing.assert_allclose(found.median, 0.0, atol=0.06)
@@ -124,19 +124,19 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
 def test_readings_that_a_draw_puts_beyond_all_numbers_are_far_out_without_a_warning():
     replicated = np.random.default_rng(1).standard_normal((2000, 1))
     replicated[:3, 0] = np.inf, -np.inf, np.nan
-    found = predict_without_each(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
+    found = loo_predictive(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
     assert abs(found.median[0]) < 0.1 and abs(found.below[0] - stats.norm.cdf(0.5)) < 0.05
 
 
 def test_uniform_numbers_stay_in_the_band_and_others_do_not():
     """Of 100 uniform samples 1 leaves a 99 % band on average; more than 6 do in 1 of 10 000 runs, and the seed is fixed."""
     rng = np.random.default_rng(3)
-    assert sum(not uniformity(rng.uniform(size=30), 0.99).holds for _ in range(100)) <= 6
+    assert sum(not check_uniformity(rng.uniform(size=30), 0.99).holds for _ in range(100)) <= 6
     normal = rng.standard_normal(60)
-    assert uniformity(stats.norm.cdf(2.0 * normal), 0.99).fault == "scatter more than the fit says"
-    assert uniformity(stats.norm.cdf(0.3 * normal), 0.99).fault == "scatter less than the fit says"
-    assert uniformity(stats.norm.cdf(normal + 1.5), 0.99).fault == "lie higher than the fit says"
-    assert uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit says"
+    assert check_uniformity(stats.norm.cdf(2.0 * normal), 0.99).fault == "scatter more than the fit says"
+    assert check_uniformity(stats.norm.cdf(0.3 * normal), 0.99).fault == "scatter less than the fit says"
+    assert check_uniformity(stats.norm.cdf(normal + 1.5), 0.99).fault == "lie higher than the fit says"
+    assert check_uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit says"
 
 
 def parameter(name, prior):
@@ -145,7 +145,7 @@ def parameter(name, prior):
 
 def weighed(quantities, drawn, log_likelihood):
     """Sensitivities where every prior is a standard normal."""
-    priors = {name: other_scales(Normal(0.0, 1.0), values) for name, values in drawn.items()}
+    priors = {name: rescale_prior(Normal(0.0, 1.0), values) for name, values in drawn.items()}
     return sensitivities(quantities, drawn, log_likelihood, priors)
 
 
@@ -203,7 +203,8 @@ def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_
 
 
 def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
-    widths = (Width("mu2", 1.4, 0.7, 0.1, 0.1), Width("tau", 1.38, 0.71, 0.1, 0.1), Width("mu1", 1.1, 0.9, 0.1, 0.1))
+    ratios = {"mu2": (1.4, 0.7), "tau": (1.38, 0.71), "mu1": (1.1, 0.9)}
+    widths = tuple(WidthSensitivity(name, *ratio, 0.1, 0.1) for name, ratio in ratios.items())
     sensitivity = Sensitivity("mu2", "mu2", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths)
     told = [priors_text(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
     assert told == [
@@ -216,7 +217,7 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
 
 def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_it():
     def said(doubled, told_by):
-        widths = (Width("tau", doubled, 0.95, 0.1, 0.1),)
+        widths = (WidthSensitivity("tau", doubled, 0.95, 0.1, 0.1),)
         return assumed_widths(Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by))
 
     assert said(1.5, {"tau": (2, 1)}) == "Interval widths rest on what was assumed of tau: 2 readings, 1 coefficient."
@@ -247,7 +248,7 @@ def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
 )
 def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, said):
     drawn = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
-    assert bool(far_out(drawn, {"x": parameter("x", prior)})) == said
+    assert bool(prior_conflicts(drawn, {"x": parameter("x", prior)})) == said
 
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")

@@ -12,8 +12,14 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights, weigh_without_each
-from bowdenfit.inference.leave_one_out import REFIT, LeavingOut, ReadingsToLeaveOut, leave_one_out
+from bowdenfit.inference.comparison import (
+    ElpdDifference,
+    LooPrediction,
+    compare_predictions,
+    psis_loo,
+    stacking_weights,
+)
+from bowdenfit.inference.leave_one_out import REFIT, LooDensity, LooRefits, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
@@ -86,11 +92,11 @@ def drawn(on_a_grid):
 
 @pytest.fixture(scope="module")
 def readings(outlier):
-    return ReadingsToLeaveOut(outlier)
+    return LooDensity(outlier)
 
 
 def leaving_out(readings, z, share=1.0, seed=5):
-    return LeavingOut(readings, z, readings.evaluate(z)[1], share, seed)
+    return LooRefits(readings, z, readings.evaluate(z)[1], share, seed)
 
 
 def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, exact):
@@ -101,7 +107,7 @@ def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, e
     assert found.pareto_k[-1] > 0.7
     assert found.how[:-1] == ("importance sampling",) * 7
     assert np.all(np.abs(found.elpd - exact) < 4 * found.error + 0.005)
-    plain = weigh_without_each({"efficiency": each.reshape(4, 1000, -1)}, 4000.0)
+    plain = psis_loo({"efficiency": each.reshape(4, 1000, -1)}, 4000.0)
     assert abs(found.elpd[-1] - exact[-1]) < abs(plain.elpd[-1] - exact[-1])
 
 
@@ -132,10 +138,10 @@ def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, d
 
 
 def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):
-    hasty = ReadingsToLeaveOut(outlier, REFIT.model_copy(update={"max_steps": 200}))
+    hasty = LooDensity(outlier, REFIT.model_copy(update={"max_steps": 200}))
     _, _, settled = leaving_out(hasty, drawn.reshape(-1, 2)).refit_without(7)
     assert not settled
-    assert Prediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
+    assert LooPrediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
 
 
 def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
@@ -160,7 +166,7 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
     assert k < 0.5
     assert error < 0.1
     assert elpd == pytest.approx(truth, abs=4 * error)
-    plain = weigh_without_each({"": likelihood[None, :, None]}, 8000.0)
+    plain = psis_loo({"": likelihood[None, :, None]}, 8000.0)
     assert plain.pareto_k[0] > 0.7
     assert abs(plain.elpd[0] - truth) > 0.3
     found = best_map(draws, density, evaluate, 1.0)
@@ -189,7 +195,7 @@ def test_weights_are_those_of_arviz_and_do_not_mind_a_constant():
         n: stats.norm.logpdf(y, m, 1.0) + np.zeros((4, 500, 1)) for n, m in zip(names, means, strict=True)
     }
     log_likelihood = {n: v + 1e-3 * generator.normal(size=v.shape) for n, v in log_likelihood.items()}
-    predictions = {n: weigh_without_each({"y": v}, 2000.0) for n, v in log_likelihood.items()}
+    predictions = {n: psis_loo({"y": v}, 2000.0) for n, v in log_likelihood.items()}
     weights = stacking_weights(predictions)
     trees = {
         n: arviz_base.from_dict({"posterior": {"x": generator.normal(size=(4, 500))}, "log_likelihood": {"y": v}})
@@ -211,29 +217,29 @@ def test_weights_prefer_the_model_that_readings_come_from():
     y = np.random.default_rng(4).normal(size=80)
     k = np.zeros(80)
     found = stacking_weights(
-        {"right": Prediction(stats.norm.logpdf(y), k), "wrong": Prediction(stats.norm.logpdf(y, 1.0), k)}
+        {"right": LooPrediction(stats.norm.logpdf(y), k), "wrong": LooPrediction(stats.norm.logpdf(y, 1.0), k)}
     )
     assert found["right"] > 0.65
 
 
 def test_with_few_readings_two_standard_errors_lean_and_four_decide():
-    assert Difference(9.0, 3.0, 0).verdict(20) == "leaning"
-    assert Difference(9.0, 3.0, 0).verdict(200) == "clear"
-    assert Difference(13.0, 3.0, 0).verdict(20) == "clear"
-    assert Difference(3.9, 0.1, 0).verdict(200) == "open"
-    assert Difference(50.0, float("nan"), 0).verdict(1) == "open"
+    assert ElpdDifference(9.0, 3.0, 0).verdict(20) == "leaning"
+    assert ElpdDifference(9.0, 3.0, 0).verdict(200) == "clear"
+    assert ElpdDifference(13.0, 3.0, 0).verdict(20) == "clear"
+    assert ElpdDifference(3.9, 0.1, 0).verdict(200) == "open"
+    assert ElpdDifference(50.0, float("nan"), 0).verdict(1) == "open"
 
 
 def by_hand(pointwise, how=("importance sampling",) * 6):
     """A comparison of two fits without parameters, from what the better one gains by each reading."""
     n, labels = len(pointwise), tuple(("efficiency", f"{400 + 10 * i} mm") for i in range(len(pointwise)))
     predictions = {
-        "good": Prediction(np.asarray(pointwise, dtype=float), np.full(n, 0.1), np.zeros(n), labels, how[:n]),
-        "poor": Prediction(np.zeros(n), np.full(n, 0.1), np.zeros(n), labels, how[:n]),
+        "good": LooPrediction(np.asarray(pointwise, dtype=float), np.full(n, 0.1), np.zeros(n), labels, how[:n]),
+        "poor": LooPrediction(np.zeros(n), np.full(n, 0.1), np.zeros(n), labels, how[:n]),
     }
     names = dict.fromkeys(predictions, "capstan")
     return Comparison(
-        differences(predictions), stacking_weights(predictions), predictions, (), names, {}, {}, {}
+        compare_predictions(predictions), stacking_weights(predictions), predictions, (), names, {}, {}, {}
     )  # fmt: skip
 
 
@@ -295,7 +301,7 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
 
 def test_one_reading_that_makes_most_of_a_difference_is_named():
     found = by_hand([9.0, 1.0, 1.1, 0.9, 1.0, 1.2])
-    found = replace(found, differences=found.differences | {"poor": Difference(14.2, 2.0, 0)})
+    found = replace(found, differences=found.differences | {"poor": ElpdDifference(14.2, 2.0, 0)})
     assert "Most of it comes from one reading, efficiency 400 mm (+9.0)." in " ".join(comparison_text(found).split())
 
 
@@ -394,7 +400,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
 
 def test_the_order_of_tables_in_a_stored_fit_does_not_matter(geometries):
     fit = bf.load(geometries / "continuous")
-    readings, of_table = ReadingsToLeaveOut(LogDensity(fit.model)), fit.posterior.log_likelihood
+    readings, of_table = LooDensity(LogDensity(fit.model)), fit.posterior.log_likelihood
     sound = [i for i, (_, label) in enumerate(readings.names) if "430" not in label and "at 4" in label]
     found = [
         leave_one_out(readings, fit.posterior.z, tables, 2000.0, 1, sound)
@@ -438,7 +444,7 @@ def test_every_reading_of_the_on_body_data_is_predicted_as_by_a_fit_without_it(o
     below 0.5; between 0.5 and 0.7 the weights have no finite variance and a quarter of a nat is allowed besides.
     """
     fit = bf.fit(on_body, seed=1)
-    readings = ReadingsToLeaveOut(LogDensity(fit.model))
+    readings = LooDensity(LogDensity(fit.model))
     effective = min(d.ess_bulk for d in fit.posterior.diagnostics.values())
     found = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
     assert found.unreliable == 0

@@ -9,7 +9,7 @@ import bowdenfit as bf
 from bowdenfit.errors import UsageError
 from bowdenfit.physics.friction import rate_factor, rate_slope
 from bowdenfit.physics.loop import dynamic_range, loop_output_force
-from bowdenfit.physics.stretch import with_springs
+from bowdenfit.physics.stretch import stiffness_with_springs
 from bowdenfit.questions.recorded.stick_slip import StickSlip, slopes, stick_slip
 from bowdenfit.questions.summary.words import full_text
 
@@ -17,9 +17,9 @@ QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat
 
 
 def test_springs_in_series_give_with_the_cable():
-    assert float(with_springs(jnp.asarray(60.0), jnp.asarray(30.0), 2)) == pytest.approx(30.0)
-    assert float(with_springs(jnp.asarray(60.0), jnp.asarray(30.0), 1)) == pytest.approx(20.0)
-    assert float(with_springs(jnp.asarray(60.0), jnp.asarray(1e12), 2)) == pytest.approx(60.0)
+    assert float(stiffness_with_springs(jnp.asarray(60.0), jnp.asarray(30.0), 2)) == pytest.approx(30.0)
+    assert float(stiffness_with_springs(jnp.asarray(60.0), jnp.asarray(30.0), 1)) == pytest.approx(20.0)
+    assert float(stiffness_with_springs(jnp.asarray(60.0), jnp.asarray(1e12), 2)) == pytest.approx(60.0)
     # in torques, as the paper has it: 1/K = 1/K_loop + 1/(2 k r^2)
     r_squared = 15.0**2
     in_torques = 1 / (1 / (60.0 * r_squared) + 1 / (2 * 30.0 * r_squared))

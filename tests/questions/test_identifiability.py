@@ -7,7 +7,7 @@ import pytest
 from cables import LENGTHS, cable, measured
 
 import bowdenfit as bf
-from bowdenfit.inference.identifiability import knowledge
+from bowdenfit.inference.identifiability import analyze_covariance
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.identify.verb import identify
@@ -44,7 +44,7 @@ def test_the_sum_that_was_measured_is_the_combination_found():
     """One reading of 2 a + 1.6 b: the combination is a + 0.8 b, and its sd is half the reading's."""
     prior_sd, value = np.array([1.0, 0.5]), np.array([1.0, 2.0])
     weights = np.array([2.0, 1.6])
-    found = knowledge(("a", "b"), value, seen_through((weights, 0.01), prior_sd=prior_sd), prior_sd)
+    found = analyze_covariance(("a", "b"), value, seen_through((weights, 0.01), prior_sd=prior_sd), prior_sd)
     (together,) = found.determined
     assert together.words == "a + 0.8 b"
     assert together.value == pytest.approx(2.6)
@@ -57,7 +57,7 @@ def test_the_sum_that_was_measured_is_the_combination_found():
 def test_parameters_read_one_by_one_are_known_by_themselves_and_others_rest_on_their_priors():
     prior_sd, value = np.full(3, PRIOR_SD), np.ones(3)
     rows = ((np.array([1.0, 0, 0]), 0.05), (np.array([0, 1.0, 0]), 0.7))
-    found = knowledge(("a", "b", "c"), value, seen_through(*rows, prior_sd=prior_sd), prior_sd)
+    found = analyze_covariance(("a", "b", "c"), value, seen_through(*rows, prior_sd=prior_sd), prior_sd)
     assert [p.name for p in found.by_themselves] == ["a"]
     assert [p.name for p in found.partly] == ["b"]
     assert [p.name for p in found.on_prior] == ["c"]
@@ -70,7 +70,7 @@ def test_information_of_each_direction_is_that_of_the_readings():
     prior_sd = np.ones(3)
     q, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))
     covariance = seen_through((q[0], 1 / 3), (q[1], 1 / 2), prior_sd=prior_sd)
-    found = knowledge(("a", "b", "c"), np.ones(3), covariance, prior_sd)
+    found = analyze_covariance(("a", "b", "c"), np.ones(3), covariance, prior_sd)
     assert [d.information for d in found.directions] == pytest.approx([9, 4, 0], abs=1e-9)
 
 

@@ -14,7 +14,7 @@ from slow_cases import some_slow
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut
+from bowdenfit.inference.leave_one_out import LooDensity
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.run_parts import run_parts
 from bowdenfit.kinds.runs import run_sums
@@ -44,7 +44,7 @@ def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, fr
         posterior = LogDensity(build_model(load_dataset(bench(tmp_path, runs=3), [f'friction_model="{friction}"'])))
         (term,) = posterior.model.terms
         parts = run_parts(term, unit)
-        readings = ReadingsToLeaveOut(posterior, parts={term.name: parts})
+        readings = LooDensity(posterior, parts={term.name: parts})
         z = 0.5 * np.random.default_rng(2).standard_normal((5, posterior.model.space.size))
         assert len(parts.labels) == (3 * 2 * 8 if unit == "load" else 180)
         i = len(parts.labels) // 2

@@ -19,7 +19,7 @@ from scipy import stats
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.front_desk import Fit
-from bowdenfit.inference.draws import curves_of, for_each_draw, named_values
+from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
@@ -63,7 +63,7 @@ def pretended(dataset: Dataset, center: np.ndarray | dict[str, float], spread: f
     model = build_model(dataset)
     z = np.asarray(model.space.unconstrain(center)) if isinstance(center, dict) else center
     z = z + spread * np.random.default_rng(4).standard_normal((n, model.space.size))
-    shown = for_each_draw(named_values(model), model.space.size)(z)
+    shown = for_each_draw(value_function(model), model.space.size)(z)
     best = for_each_draw(optimum_of(model), model.space.size)(z) if model.description.route else ()
     optimum = {name: b[None] for name, b in zip(("optimal_length", "optimal_efficiency"), best, strict=False)}
     drawn = Draws(z[None], {k: v[None] for k, v in shown.items()}, optimum, {}, {}, {}, {}, {}, 1, n, 0.3)
@@ -178,7 +178,7 @@ def test_the_expected_reduction_is_what_weighting_the_draws_by_each_outcome_give
     at = 490.0
     found = next_measurement(wide, answer, [name_of(Candidate(kind, at))])
     model, z = wide.model, wide.draws().flat_z
-    curves = for_each_draw(curves_of(model, np.array([at])), model.space.size)(z)
+    curves = for_each_draw(curve_function(model, np.array([at])), model.space.size)(z)
     shown = {k: v.ravel() for k, v in wide.draws().values.items()}
     generator = np.random.default_rng(11)
     outcomes = generator.choice(len(z), 400, replace=False)

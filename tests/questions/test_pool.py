@@ -14,7 +14,7 @@ from scipy import stats
 from scipy.linalg import block_diag
 
 import bowdenfit as bf
-from bowdenfit.inference.population.model import Inspected
+from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
 from bowdenfit.inference.population.summaries import Summaries
 from bowdenfit.multiple_testing import adjust_p_values
@@ -253,7 +253,7 @@ def made_of(shift, error=1.0):
     generator, scale = np.random.default_rng(3), error**2 * np.array([[0.02, 0.01], [0.01, 0.03]])
     summaries = Summaries(np.full((3, 2), shift), np.broadcast_to(scale, (3, 2, 2)), np.array([5.0, 5.0, 30.0]))
     worn, known = np.array([0.0, 0.5, 1.0]), np.ones((3, 2), dtype=bool)
-    inspected = Inspected(np.zeros(3, dtype=int), worn, {}, known, summaries, np.zeros(2), np.ones(2))
+    inspected = Inspections(np.zeros(3, dtype=int), worn, {}, known, summaries, np.zeros(2), np.ones(2))
     mean, spread = 0.02 * generator.standard_normal((1000, 3)), 0.2 + 0.05 * generator.uniform(size=(1000, 3))
     return inspected, PopulationDraws(mean, spread, np.zeros((1000, 0)), np.zeros((1000, 1, 3)), (), 1000.0)
 

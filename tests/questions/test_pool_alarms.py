@@ -9,9 +9,9 @@ import pytest
 from populations import gibbs
 from scipy import stats
 
-from bowdenfit.inference.population.model import Inspected
+from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.inference.population.summaries import Summaries, summarized
+from bowdenfit.inference.population.summaries import Summaries, summarize_likelihoods
 from bowdenfit.questions.pool import unlike
 
 pytestmark = pytest.mark.extended
@@ -40,12 +40,12 @@ def like_cables(seed, cables, inspections=3, error=0.03, freedom=5.0, draws=0, s
         log = -np.sum(((likely - MEAN) / SD) ** 2, axis=2) / 2
         weights = np.exp(log - log.max(axis=1, keepdims=True))
         rows = [g.choice(len(w), draws, p=w / w.sum()) for w in weights]
-        summaries = summarized(np.stack([each[row] for each, row in zip(likely, rows, strict=True)]), MEAN, SD)
+        summaries = summarize_likelihoods(np.stack([each[row] for each, row in zip(likely, rows, strict=True)]), MEAN, SD)
     else:
         summaries = Summaries(seen, root @ root.transpose(0, 2, 1), np.full(len(true), freedom))
     worn = np.tile(cycles, cables) if inspections > 1 else None
     cable, known = np.repeat(np.arange(cables), inspections), np.ones((len(true), COUNT), dtype=bool)
-    return Inspected(cable, worn, {"lubrication": oiled.ravel()}, known, summaries, MEAN, SD)
+    return Inspections(cable, worn, {"lubrication": oiled.ravel()}, known, summaries, MEAN, SD)
 
 
 def least_chances(fleets, seed, sweeps=600):

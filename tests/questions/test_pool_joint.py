@@ -17,12 +17,12 @@ from bowdenfit.inference.population.model import (
     SPREAD,
     WEAR,
     WEAR_SPREAD,
-    Inspected,
+    Inspections,
     PopulationDensity,
     log_likelihood,
 )
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.inference.population.summaries import summarized
+from bowdenfit.inference.population.summaries import summarize_likelihoods
 from bowdenfit.questions.pool.inspected import given
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import read_fleet_draws
@@ -92,9 +92,9 @@ def drawn_fleet(generator, cables=20, inspections=3, draws=768):
     chosen = [generator.choice(len(w), draws, p=w / w.sum()) for w in weights]
     logs = np.stack([each[places] for each, places in zip(likely, chosen, strict=True)])
     known = np.ones((len(cable), count), dtype=bool)
-    summaries = summarized(logs, np.full(count, PRIOR_MEAN), np.full(count, PRIOR_SD))
+    summaries = summarize_likelihoods(logs, np.full(count, PRIOR_MEAN), np.full(count, PRIOR_SD))
     means = np.full(count, PRIOR_MEAN), np.full(count, PRIOR_SD)
-    inspected = Inspected(cable, cycles, {"lubrication": oiled}, known, summaries, *means)
+    inspected = Inspections(cable, cycles, {"lubrication": oiled}, known, summaries, *means)
     return inspected, (wear, wear_spread[0], spread[0], oil, *lasting(start[0], wears[0])), logs
 
 

@@ -8,7 +8,7 @@ from scipy import stats
 from test_pool_alarms import MEAN, SD, like_cables
 
 from bowdenfit.inference.population.sampling import PopulationDraws
-from bowdenfit.inference.population.unpooled import unpooled
+from bowdenfit.inference.population.unpooled import draw_unpooled
 
 pytestmark = pytest.mark.extended
 
@@ -43,7 +43,7 @@ def test_nine_of_ten_intervals_of_odd_cables_hold_their_truth(population, inspec
         drawn = population
         if inspections == 1:
             drawn = replace(population, mean=population.mean[:, :2], spread=population.spread[:, :2])
-        values, told = unpooled(fleet, drawn, 0, 1)
+        values, told = draw_unpooled(fleet, drawn, 0, 1)
         assert told == (inspections > 1)
         low, high = np.quantile(values, (0.05, 0.95), axis=0)
         truth = truth_of([21, i], inspections)
@@ -57,7 +57,7 @@ def test_nine_of_ten_intervals_of_odd_cables_hold_their_truth(population, inspec
 def test_one_inspection_is_what_the_single_fit_says(population):
     """Its draws under the prior of single fits, by weighing 400,000 of a flat one: five Monte Carlo errors of 200 draws."""
     fleet = like_cables([22, 0], 2, inspections=1, error=0.3, freedom=4.0, shift=ODD)
-    ours, _ = unpooled(fleet, replace(population, mean=population.mean[:, :2], spread=population.spread[:, :2]), 0, 1)
+    ours, _ = draw_unpooled(fleet, replace(population, mean=population.mean[:, :2], spread=population.spread[:, :2]), 0, 1)
     s, shift = fleet.summaries, -0.2 * fleet.effects["lubrication"][0]
     flat = stats.multivariate_t(s.center[0] - shift, s.scale[0], s.freedom[0], seed=1).rvs(400_000)
     weights = np.exp(-np.sum(((flat - MEAN) / SD) ** 2, axis=1) / 2)
@@ -71,7 +71,7 @@ def test_wear_is_that_of_the_others_only_where_no_own_inspections_tell_it(popula
     """Of a cable inspected once, or twice within a thousandth of the reference cycles."""
     fleet = like_cables([23, 0], 2, inspections=max(len(after), 2), error=0.03, shift=ODD)
     cycles = np.tile(np.resize(after, 2), 2)
-    values, told = unpooled(replace(fleet, cycles=cycles), population, 0, 1)
+    values, told = draw_unpooled(replace(fleet, cycles=cycles), population, 0, 1)
     assert not told and abs(values[:, 2].mean() - 0.2) < 0.03 and 0.06 < values[:, 2].std() < 0.11
-    values, told = unpooled(replace(fleet, cycles=np.array([0.0, 1.0, 0.0, 1.0])), population, 0, 1)
+    values, told = draw_unpooled(replace(fleet, cycles=np.array([0.0, 1.0, 0.0, 1.0])), population, 0, 1)
     assert told

@@ -11,7 +11,7 @@ from scipy import stats
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference import draws
-from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, named_values, replicator
+from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, replicator, value_function
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.choices import at_edge, best_window, rank_choices
@@ -202,7 +202,7 @@ def test_functions_of_values_are_those_of_every_draw_by_itself(n):
 def test_efficiency_falls_off_with_the_friction_exponent_at_each_length(on_body_model):
     model, lengths = on_body_model, np.array([430.0, 471.3, 530.0])
     z = _draws(model, 5, 4)
-    values = for_each_draw(named_values(model), model.space.size)(z)
+    values = for_each_draw(value_function(model), model.space.size)(z)
     angles = {
         column: np.exp(
             values[f"{column}_a"][:, None]

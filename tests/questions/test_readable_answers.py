@@ -8,8 +8,8 @@ import pytest
 from figure_words import assert_answer_readable
 
 import bowdenfit as bf
-from bowdenfit.inference.comparison import Prediction, differences, stacking_weights
-from bowdenfit.inference.identifiability import Combination, Knowledge, Known
+from bowdenfit.inference.comparison import LooPrediction, compare_predictions, stacking_weights
+from bowdenfit.inference.identifiability import Combination, CovarianceAnalysis, ParameterContraction
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.kinds.candidate import Candidate
@@ -58,14 +58,15 @@ def comparison(n_fits, n_readings, label):
     labels = tuple((table, label.format(i)) for i, table in enumerate(tables))
     how = ("importance sampling",) * n_readings
     predictions = {
-        fit: Prediction(generator.normal(i, 1.0, n_readings), np.full(n_readings, 0.1), np.zeros(n_readings), labels, how)
+        fit: LooPrediction(generator.normal(i, 1.0, n_readings), np.full(n_readings, 0.1), np.zeros(n_readings), labels, how)
         for i, fit in enumerate(fits)
     }
     wide = {fit: Interval.of(generator.normal(0.123, 0.01, 500)) for fit in fits}
     parameters = {f"mu{i}": ComparedParameter(rf"$\mu_{i}$", "1", wide) for i in range(5)}
     lengths = {fit: (Interval.of(generator.normal(471.0, 4.0, 500)), "mm") for fit in fits}
     return Comparison(
-        differences(predictions), stacking_weights(predictions), predictions, (), dict.fromkeys(fits, "capstan"), parameters,
+        compare_predictions(predictions), stacking_weights(predictions), predictions, (),
+        dict.fromkeys(fits, "capstan"), parameters,
         lengths, {},
     )  # fmt: skip
 
@@ -76,7 +77,8 @@ def knowledge(names):
         Combination({n: 1.0 / (1 + abs(i - j)) for j, n in enumerate(names)}, 0.1, 0.01, 0.9 ** (1 + i) / 10)
         for i in range(len(names))
     )
-    return Knowledge(tuple(Known(n, 0.1, 0.05, 0.1, "", 0.0, 1.0) for n in names), (), sums, (), None, 1.0)
+    parameters = tuple(ParameterContraction(n, 0.1, 0.05, 0.1, "", 0.0, 1.0) for n in names)
+    return CovarianceAnalysis(parameters, (), sums, (), None, 1.0)
 
 
 def identifiability(*groups):

@@ -11,7 +11,7 @@ from one_page import faults
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.comparison import Difference, Prediction, differences
+from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compare_predictions
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.forces.table import ForceTable
@@ -206,25 +206,25 @@ def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_dra
 
 def test_the_better_model_is_seen_only_beyond_two_standard_errors():
     good, k = np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4)
-    found = differences({"worse": Prediction(good - [5, 5.1, 4.9, 5], k), "best": Prediction(good, k)})
+    found = compare_predictions({"worse": LooPrediction(good - [5, 5.1, 4.9, 5], k), "best": LooPrediction(good, k)})
     assert list(found) == ["best", "worse"]
     assert found["worse"].elpd == pytest.approx(20.0)
     assert found["worse"].is_seen
-    assert not Difference(20.0, 15.0, 0).is_seen
-    assert not Difference(1.0, 0.1, 0).is_seen
+    assert not ElpdDifference(20.0, 15.0, 0).is_seen
+    assert not ElpdDifference(1.0, 0.1, 0).is_seen
 
 
 def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():
     """Conjugate: readings Normal(mu, 1), flat prior; leaving y_i out its density is Normal(mean of others, 1 + 1/(n - 1))."""
     from scipy import stats
 
-    from bowdenfit.inference.comparison import weigh_without_each
+    from bowdenfit.inference.comparison import psis_loo
 
     generator = np.random.default_rng(5)
     readings = generator.normal(size=12)
     draws = generator.normal(readings.mean(), 1 / np.sqrt(12), size=(8, 4000))
     log_likelihood = stats.norm.logpdf(readings, draws[..., None], 1.0)
-    found = weigh_without_each({"readings": log_likelihood}, draws.size)
+    found = psis_loo({"readings": log_likelihood}, draws.size)
     others = [np.delete(readings, i).mean() for i in range(12)]
     expected = stats.norm.logpdf(readings, others, np.sqrt(1 + 1 / 11))
     np.testing.assert_allclose(found.elpd, expected, atol=0.02)

@@ -20,7 +20,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append, records
-from bowdenfit.inference.ensemble import Checkpointed
+from bowdenfit.inference.ensemble import CheckpointedBackend
 from bowdenfit.inference.versions import versions
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
@@ -139,7 +139,7 @@ def interrupted_fit(place: Path, data: Dataset) -> Path:
     path = start_checkpointing(place, data, 3, resume=False)
     assert path is not None  # a folder has one
     chance = np.random.RandomState(1)
-    backend = Checkpointed(WALKERS, path, resume=False)
+    backend = CheckpointedBackend(WALKERS, path, resume=False)
     import emcee
 
     backend.grow(3, None)
@@ -152,7 +152,7 @@ def interrupted_fit(place: Path, data: Dataset) -> Path:
 def resume_fit(folder: Path, data: Dataset) -> None:
     """What `fit --resume` reads."""
     choose_seed(folder, data, mcmc=True, seed=None, resume=True, force=False)
-    Checkpointed(WALKERS, folder / names.CHAIN, resume=True)
+    CheckpointedBackend(WALKERS, folder / names.CHAIN, resume=True)
 
 
 FINGERPRINT = {"description": {"name": "x"}, "sha256": {"a.csv": "0"}, "seed": 3, "assumed": [], "truths": {}}

@@ -11,7 +11,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch.programs import BatchSettings
-from bowdenfit.inference.chain import Sampling
+from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -50,7 +50,7 @@ class Laboratory:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
         start = maximum_posterior(posterior, self.program(posterior, make_objective))
         programs = self.program(posterior, lambda p: walker_programs(p, self.sampler))
-        asked = Sampling(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
+        asked = SamplingRequest(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
         return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
 
     def program(self, posterior: LogDensity, make: Callable[[LogDensity], Any]) -> Any:

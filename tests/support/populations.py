@@ -6,7 +6,7 @@ normal. Spreads have a grid, and every third sweep cables are stretched with the
 
 import numpy as np
 
-from bowdenfit.inference.population.model import Inspected
+from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws
 
 SPREADS = np.exp(np.linspace(np.log(2e-3), np.log(3.0), 120))
@@ -14,7 +14,7 @@ SPREAD, WEAR, WEAR_SPREAD, OIL = 0.5, 1.0, 0.3, 1.0  # scales of the priors, as 
 
 
 def gibbs(
-    fleets: list[Inspected], without: list[tuple[int, ...]], seed: int, sweeps: int = 1000, before: int = 150
+    fleets: list[Inspections], without: list[tuple[int, ...]], seed: int, sweeps: int = 1000, before: int = 150
 ) -> list[PopulationDraws]:
     """Draws of each population, one a sweep; cables in `without` are not looked at.
 

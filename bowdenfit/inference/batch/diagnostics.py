@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, diagnose_all, too_few
+from bowdenfit.inference.diagnostics import MAXIMUM_DRIFT, Diagnostics, describe_low_ess, diagnose_all
 from bowdenfit.words import percent
 
 _ENOUGH = 1000.0  # effective draws
@@ -23,10 +23,10 @@ def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dic
     return {name: replace(d, drift=float(d.drift / allowed[name]) / 2 * MAXIMUM_DRIFT) for name, d in found.items()}
 
 
-def remembered(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:
+def starts_not_forgotten(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:
     """Where too few effective draws were made for walkers to have forgotten where they started, in words."""
     return tuple(
-        too_few(f"the middle of {name}", d.ess_bulk, least)
+        describe_low_ess(f"the middle of {name}", d.ess_bulk, least)
         for name, d in diagnostics.items()
         if not d.ess_bulk >= least
     )

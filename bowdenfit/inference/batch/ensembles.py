@@ -14,10 +14,10 @@ from jax import Array
 
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.coordinates import Frames, frames_of
+from bowdenfit.inference.coordinates import CoordinateMaps, coordinate_maps
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moves import Moves, shares_of_moves
-from bowdenfit.inference.sweep import Chosen, numbers_of_walker, to_uniform, walker_sweep
+from bowdenfit.inference.moves import Moves, weighted_moves
+from bowdenfit.inference.sweep import SweepChoices, count_walker_numbers, to_uniform, walker_sweep
 
 STORED = 20  # states of a round that are stored, `THIN` steps from one to the next, all in the same coordinates
 STEPS = STORED * THIN
@@ -32,13 +32,13 @@ def make_round(posterior: LogDensity, n_ensembles: int, n_walkers: int) -> Calla
         n_ensembles: Independent ensembles.
         n_walkers: Of each ensemble; a power of two.
     """
-    of_cable = walker_round(posterior.log_density, shares_of_moves(), frames_of(posterior))
+    of_cable = walker_round(posterior.log_density, weighted_moves(), coordinate_maps(posterior))
     seed = number = jax.ShapeDtypeStruct((), jnp.uint32)
     z = jax.ShapeDtypeStruct((n_ensembles, n_walkers, posterior.model.space.size), jnp.float64)
     return compile_program(of_cable, seed, number, z, posterior.data, run_often=True)
 
 
-def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frames: Frames) -> Callable[..., Any]:
+def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps) -> Callable[..., Any]:
     """Stored z of a round of one cable, of seed, number of the round, z and data.
 
     Args:
@@ -50,7 +50,7 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
     ends = [jnp.asarray(np.cumsum([share for _, share in each])[:-1]) for each in (moves, frames)]
 
     def of_ensemble(bits: Array, order: Array, kinds: Array, frame: Array, z: Array, data: Any) -> Array:
-        return z.at[order].set(sweep(Chosen(frame, kinds, bits), z[order], data)[0])
+        return z.at[order].set(sweep(SweepChoices(frame, kinds, bits), z[order], data)[0])
 
     of_ensembles = jax.vmap(of_ensemble, (0, 0, None, None, 0, None))
 
@@ -60,7 +60,7 @@ def walker_round(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         def stored(z: Array, drawn: Any) -> tuple[Array, Array]:
             keys, kinds, frame = drawn
             order = _order(_bits(keys[0], (2, n_ensembles, 1)), n_walkers)
-            bits = _bits(keys[1], (n_ensembles, THIN, 2, n_walkers // 2, numbers_of_walker(size)))
+            bits = _bits(keys[1], (n_ensembles, THIN, 2, n_walkers // 2, count_walker_numbers(size)))
             z = of_ensembles(bits, order, kinds, frame, z, data)
             return z, z
 

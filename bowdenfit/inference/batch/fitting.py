@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import jax
 
 from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, BatchSettings
-from bowdenfit.inference.batch.stages import BatchFit, by_nuts, climb, draw
+from bowdenfit.inference.batch.stages import BatchFit, sample_by_nuts, sample_dataset, start_chunk
 from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.log_density import LogDensity
 
@@ -46,15 +46,15 @@ def fit_batch(
         needed = ("gradients", "places", "noise", "friction", "names")  # by all, so before any
         for one in [pool.submit(_in_64_bits, attrgetter(name), programs) for name in needed]:
             one.result()
-        chunks = [pool.submit(_in_64_bits, partial(climb, programs), chunk) for chunk in _chunks(parts, CHUNK)]
-        drawing = partial(_in_64_bits, partial(draw, programs, stopped=stop.is_set))
+        chunks = [pool.submit(_in_64_bits, partial(start_chunk, programs), chunk) for chunk in _chunks(parts, CHUNK)]
+        drawing = partial(_in_64_bits, partial(sample_dataset, programs, stopped=stop.is_set))
         every = [pool.submit(drawing, begun) for chunk in chunks for begun in chunk.result()]
         ended = [one.result() for one in every]
     finally:  # an interrupt, or an error of one data set, waits for none of the others
         stop.set()
         pool.shutdown(wait=False, cancel_futures=True)
     again = programs.settings.nuts
-    return [by_nuts(programs, one, one.start) if again and one.start is not None else one.fit for one in ended]
+    return [sample_by_nuts(programs, one, one.start) if again and one.start is not None else one.fit for one in ended]
 
 
 def _in_64_bits(function: Callable[[Given], Found], given: Given) -> Found:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bowdenfit.inference.batch.mixture import Students
+from bowdenfit.inference.batch.mixture import StudentMixture
 
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -113,7 +113,7 @@ def starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
 
 def about_maxima(
     gradients: Gradients, noise: np.ndarray, friction: np.ndarray, seeds: np.ndarray
-) -> list[Students | None]:
+) -> list[StudentMixture | None]:
     """For every cable what its draws are proposed from first; None where its density cannot be computed from any start.
 
     Args:
@@ -144,7 +144,7 @@ def _spread(tops: Tops, cable: int) -> np.ndarray:
     return np.linalg.norm(_root(tops.curvature[cable, best]), axis=1)
 
 
-def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Students:
+def _mixture(tops: Tops, aside: list[Aside], cable: int) -> StudentMixture:
     """The tops of a cable and the places aside of the best, by how much mass is about each."""
     parts = [(tops.z[cable, i], _root(tops.curvature[cable, i]), tops.value[cable, i], _LEAST_SHARE) for i in range(STARTS)]
     for unit, held, width, least in aside:
@@ -157,7 +157,7 @@ def _mixture(tops: Tops, aside: list[Aside], cable: int) -> Students:
     usable = np.isfinite(mass)
     share = np.exp(mass - mass[usable].max())
     share = np.where(usable, np.maximum(share / share.sum(), least_share), 0.0)
-    return Students(center, root, share / share.sum())
+    return StudentMixture(center, root, share / share.sum())
 
 
 def _root(curvature: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ _OF_ALL = 0.5  # of the covariance of all draws, which is what a part has that f
 
 
 @dataclass(frozen=True)
-class Students:
+class StudentMixture:
     """Student-t's.
 
     Args:
@@ -64,7 +64,7 @@ class Students:
         of_part = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
         return of_part - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM)
 
-    def moved(self, rows: np.ndarray) -> "Students":
+    def moved(self, rows: np.ndarray) -> "StudentMixture":
         """The mixture that is likelier to have given draws, some steps of expectation and maximization away.
 
         Args:
@@ -86,10 +86,10 @@ class Students:
             scale = np.stack([(each * pull[:, None]).T @ each for each, pull in zip(apart, pulled.T, strict=True)])
             scale = (1 - few) * scale / share[:, None, None] + few * _OF_ALL * of_all
             share = np.maximum(share, _LEAST_SHARE)
-            found = Students(center, np.linalg.cholesky(scale), share / share.sum())
+            found = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum())
         return found
 
-    def with_wide(self, rows: np.ndarray, times: float, share: float) -> "Students":
+    def with_wide(self, rows: np.ndarray, times: float, share: float) -> "StudentMixture":
         """The same with one more part, about all of many draws.
 
         Args:
@@ -98,14 +98,14 @@ class Students:
             share: Of the draws.
         """
         root = times * np.linalg.cholesky(covariance(rows))
-        return Students(
+        return StudentMixture(
             np.concatenate([self.center, rows.mean(axis=0, keepdims=True)]),
             np.concatenate([self.root, root[None]]),
             np.append((1 - share) * self.share, share),
         )
 
 
-def students_among(rows: np.ndarray, parts: int) -> Students:
+def mixture_among(rows: np.ndarray, parts: int) -> StudentMixture:
     """Student-t's about some of many draws, to be moved.
 
     Args:
@@ -114,7 +114,7 @@ def students_among(rows: np.ndarray, parts: int) -> Students:
     """
     some = ((np.arange(parts) + 0.5) / parts * len(rows)).astype(int)
     root = np.linalg.cholesky(_OF_ALL * covariance(rows))
-    return Students(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts))
+    return StudentMixture(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts))
 
 
 def covariance(rows: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from jax import Array
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
-from bowdenfit.inference.batch.shapes import shaped
+from bowdenfit.inference.batch.shapes import shape_dataset
 from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import derived_units, shown_values
@@ -99,7 +99,7 @@ def fit_piece(piece: Piece) -> list[PieceFit]:
 @lru_cache(maxsize=8)
 def _compiled(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, Callable[..., Any]]:
     """What serves all pieces of one shape."""
-    posterior = shaped(example.dataset).posterior
+    posterior = shape_dataset(example.dataset).posterior
     model = posterior.model
 
     def shown(z: Array, data: Any) -> Array:

@@ -16,11 +16,11 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
 from bowdenfit.inference.batch.ensembles import make_round
 from bowdenfit.inference.batch.laplace import points_of_climb
-from bowdenfit.inference.batch.proposals import Places
+from bowdenfit.inference.batch.proposals import ProposedPoints
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import z_alone
+from bowdenfit.inference.coordinates import identity
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
@@ -79,20 +79,20 @@ class BatchPrograms:
         """Log density and gradient, for climbing."""
         size, gradient = self.posterior.model.space.size, jax.value_and_grad(self.posterior.log_density)
         shape = jax.ShapeDtypeStruct((CHUNK, points_of_climb(size), size), np.dtype(float))
-        return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack([self.posterior.data], CHUNK))
+        return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack_data([self.posterior.data], CHUNK))
 
     @cached_property
     def places(self) -> Callable[..., Any]:
-        """`Places` of a block of points of one data set, of each of which it is said whether it is a z."""
+        """`ProposedPoints` of a block of points of one data set, of each of which it is said whether it is a z."""
         conditional, posterior = Conditional(self.posterior), self.posterior
-        straight = conditional.at if conditional.has_coefficients else z_alone
+        straight = conditional.at if conditional.has_coefficients else identity
 
-        def places(given: Array, is_z: Array, data: Any) -> Places:
+        def places(given: Array, is_z: Array, data: Any) -> ProposedPoints:
             w, z, log_volume = straight(given, is_z, data)
             log_density, has_z = posterior.log_density(z, data), jnp.isfinite(z).all()
             has_w, known = jnp.isfinite(w).all() & jnp.isfinite(log_volume), has_z & jnp.isfinite(log_density)
             z, w = jnp.where(has_z, z, 0.0), jnp.where(has_w, w, 0.0)
-            return Places(w, z, jnp.where(has_w, log_volume, jnp.inf), jnp.where(known, log_density, -jnp.inf))
+            return ProposedPoints(w, z, jnp.where(has_w, log_volume, jnp.inf), jnp.where(known, log_density, -jnp.inf))
 
         rows = jax.ShapeDtypeStruct((BLOCK, posterior.model.space.size), np.dtype(float))
         is_z = jax.ShapeDtypeStruct((BLOCK,), np.dtype(bool))
@@ -139,7 +139,7 @@ class BatchPrograms:
         return tuple(p.name for p in self.posterior.model.space.free)
 
 
-def stack(trees: Sequence[Any], count: int) -> Any:
+def stack_data(trees: Sequence[Any], count: int) -> Any:
     """Data of several data sets, along a new first axis, and the last again up to a count."""
     padded = [*trees, *[trees[-1]] * (count - len(trees))]
     return jax.tree.map(lambda *leaves: np.stack(leaves), *padded)

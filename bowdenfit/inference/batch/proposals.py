@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from bowdenfit.inference.batch.mixture import Students, students_among
+from bowdenfit.inference.batch.mixture import StudentMixture, mixture_among
 
 _PRIOR_SHARE = 0.05  # of the draws about the maxima that the prior has
 _FIRST_SHARE = 0.1  # of learnt ones that these have
@@ -20,7 +20,7 @@ _PARTS, _FRICTION_PARTS = 6, 2
 _WIDE, _WIDE_SHARE = 2.5, 0.2  # of one more part: by how much wider than the draws, and its share
 
 
-class Places(NamedTuple):
+class ProposedPoints(NamedTuple):
     """The same points in two coordinates: z, and w, in which friction coefficients follow everything else.
 
     Args:
@@ -36,14 +36,14 @@ class Places(NamedTuple):
 
 
 @dataclass(frozen=True)
-class AboutMaxima:
+class MaximaProposal:
     """Student-t's in z, and the prior, a standard normal.
 
     Args:
         students: About the maxima.
     """
 
-    students: Students
+    students: StudentMixture
 
     def draw(self, generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
         """So many points, and of each whether it is a z, and a w otherwise."""
@@ -52,14 +52,14 @@ class AboutMaxima:
         z = np.concatenate([prior, self.students.draw(generator, count - of_prior)])
         return z, np.ones(count, dtype=bool)
 
-    def log_density(self, at: Places) -> np.ndarray:
+    def log_density(self, at: ProposedPoints) -> np.ndarray:
         """In z."""
         prior = -0.5 * (np.einsum("ni,ni->n", at.z, at.z) + at.z.shape[1] * np.log(2 * np.pi))
         return np.logaddexp(self.students.log_density(at.z) + np.log1p(-_PRIOR_SHARE), prior + np.log(_PRIOR_SHARE))
 
 
 @dataclass(frozen=True)
-class Learnt:
+class LearntProposal:
     """Student-t's in w, of friction coefficients and of everything else apart, and some draws of the first proposal.
 
     Args:
@@ -67,29 +67,29 @@ class Learnt:
         groups: Which parameters are drawn together, and from what.
     """
 
-    first: AboutMaxima
-    groups: tuple[tuple[np.ndarray, Students], ...]
+    first: MaximaProposal
+    groups: tuple[tuple[np.ndarray, StudentMixture], ...]
 
     def draw(self, generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """See `AboutMaxima`."""
+        """See `MaximaProposal`."""
         z, is_z = self.first.draw(generator, round(_FIRST_SHARE * count))
         w = np.zeros((count - len(z), z.shape[1]))
         for which, students in self.groups:
             w[:, which] = generator.permutation(students.draw(generator, len(w)))  # else the same parts would always meet
         return np.concatenate([z, w]), np.concatenate([is_z, np.zeros(len(w), dtype=bool)])
 
-    def log_density(self, at: Places) -> np.ndarray:
-        """See `AboutMaxima`."""
+    def log_density(self, at: ProposedPoints) -> np.ndarray:
+        """See `MaximaProposal`."""
         learnt = -at.log_volume
         for which, students in self.groups:
             learnt = learnt + students.log_density(at.w[:, which])
         return np.logaddexp(learnt + np.log1p(-_FIRST_SHARE), self.first.log_density(at) + np.log(_FIRST_SHARE))
 
 
-Proposal: TypeAlias = AboutMaxima | Learnt
+Proposal: TypeAlias = MaximaProposal | LearntProposal
 
 
-def learnt(before: Proposal, w: np.ndarray, friction: np.ndarray) -> Learnt:
+def learn_proposal(before: Proposal, w: np.ndarray, friction: np.ndarray) -> LearntProposal:
     """A proposal nearer to a posterior.
 
     Args:
@@ -97,10 +97,10 @@ def learnt(before: Proposal, w: np.ndarray, friction: np.ndarray) -> Learnt:
         w: Draws of the posterior, about, one a row.
         friction: Which parameters are friction coefficients.
     """
-    first = before.first if isinstance(before, Learnt) else before
+    first = before.first if isinstance(before, LearntProposal) else before
     groups = []
     for which, parts in ((np.flatnonzero(friction), _FRICTION_PARTS), (np.flatnonzero(~friction), _PARTS)):
         if len(which):
             rows = w[:, which]
-            groups.append((which, students_among(rows, parts).moved(rows).with_wide(rows, _WIDE, _WIDE_SHARE)))
-    return Learnt(first, tuple(groups))
+            groups.append((which, mixture_among(rows, parts).moved(rows).with_wide(rows, _WIDE, _WIDE_SHARE)))
+    return LearntProposal(first, tuple(groups))

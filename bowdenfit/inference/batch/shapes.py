@@ -36,7 +36,7 @@ class ScaledDensity(LogDensity):
 
 
 @dataclass(frozen=True)
-class Shaped:
+class ShapedDataset:
     """A data set as one of many that a program serves.
 
     Args:
@@ -50,7 +50,7 @@ class Shaped:
     key: str
 
 
-def shaped(dataset: Dataset) -> Shaped:
+def shape_dataset(dataset: Dataset) -> ShapedDataset:
     """A data set with its scales as data.
 
     Args:
@@ -63,7 +63,7 @@ def shaped(dataset: Dataset) -> Shaped:
     data = (*LogDensity(model).padded, scales)
     cable = replace(model.cable, nominal=dict.fromkeys(model.cable.nominal, 1.0)) if _has_angles(model) else model.cable
     posterior = ScaledDensity(_of(cable, space, model.terms), data)
-    return Shaped(posterior, data, _key(posterior))
+    return ShapedDataset(posterior, data, _key(posterior))
 
 
 def _has_angles(model: Model) -> bool:

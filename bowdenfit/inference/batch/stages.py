@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, remembered, sd_errors, uncertain_sds
+from bowdenfit.inference.batch.diagnostics import diagnose_few_draws, sd_errors, starts_not_forgotten, uncertain_sds
 from bowdenfit.inference.batch.ensembles import STEPS, STORED
 from bowdenfit.inference.batch.laplace import about_maxima
-from bowdenfit.inference.batch.mixture import Students
-from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack
-from bowdenfit.inference.batch.proposals import AboutMaxima, Places
-from bowdenfit.inference.batch.weights import Target, Weighted, evened, resample
-from bowdenfit.inference.chain import Sampling, stuck_walkers
-from bowdenfit.inference.diagnostics import Diagnostics, shortfalls
+from bowdenfit.inference.batch.mixture import StudentMixture
+from bowdenfit.inference.batch.programs import CHUNK, BatchPrograms, stack_data
+from bowdenfit.inference.batch.proposals import MaximaProposal, ProposedPoints
+from bowdenfit.inference.batch.weights import Target, WeightedDraws, even_weights, resample
+from bowdenfit.inference.chain import SamplingRequest, stuck_walkers
+from bowdenfit.inference.diagnostics import Diagnostics, convergence_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 
 _FIRST_LOOK = 3  # rounds of walkers before the first look
@@ -49,7 +49,7 @@ class BatchFit:
     steps: int = 0
 
 
-class Begun(NamedTuple):
+class DatasetStart(NamedTuple):
     """A data set.
 
     Args:
@@ -60,10 +60,10 @@ class Begun(NamedTuple):
 
     data: Any
     seed: int
-    first: Students | None
+    first: StudentMixture | None
 
 
-class Ended(NamedTuple):
+class DatasetOutcome(NamedTuple):
     """What weighted draws and walkers made of a data set.
 
     Args:
@@ -72,20 +72,20 @@ class Ended(NamedTuple):
         start: Where NUTS may start; None where draws are good, or nothing can be computed.
     """
 
-    begun: Begun
+    begun: DatasetStart
     fit: BatchFit
     start: MaximumPosterior | None
 
 
-def climb(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[Begun]:
+def start_chunk(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[DatasetStart]:
     """What draws of a chunk of data sets with their seeds are proposed from first."""
-    seeds, data = np.array([seed for _, seed in parts]), stack([data for data, _ in parts], CHUNK)
+    seeds, data = np.array([seed for _, seed in parts]), stack_data([data for data, _ in parts], CHUNK)
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
     found = about_maxima(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
-    return [Begun(*part, first) for part, first in zip(parts, found, strict=False)]
+    return [DatasetStart(*part, first) for part, first in zip(parts, found, strict=False)]
 
 
-def draw(programs: BatchPrograms, begun: Begun, stopped: Callable[[], bool]) -> Ended:
+def sample_dataset(programs: BatchPrograms, begun: DatasetStart, stopped: Callable[[], bool]) -> DatasetOutcome:
     """Weighted draws of a data set or, where these are not enough, those of walkers.
 
     Raises:
@@ -93,29 +93,29 @@ def draw(programs: BatchPrograms, begun: Begun, stopped: Callable[[], bool]) -> 
     """
     data, seed, first = begun
     if first is None:
-        return Ended(begun, _by_weights(programs, None), None)
+        return DatasetOutcome(begun, _by_weights(programs, None), None)
     target = Target(
-        lambda given, is_z: Places(*map(np.asarray, programs.places(given, is_z, data))),
+        lambda given, is_z: ProposedPoints(*map(np.asarray, programs.places(given, is_z, data))),
         programs.friction,
         lambda found: found.is_reliable and not _by_weights(programs, found).reasons,
     )
-    proposal, generator = AboutMaxima(first), np.random.default_rng([seed, 1])
+    proposal, generator = MaximaProposal(first), np.random.default_rng([seed, 1])
     weighted = target.weighted(proposal, generator)
     fit = _by_weights(programs, weighted)
     if not (fit.reasons and len(fit.z)):
-        return Ended(begun, fit, None)
+        return DatasetOutcome(begun, fit, None)
     near = target.nearer(weighted, proposal, generator)
     fit = replace(_walked(programs, begun, near, stopped), pareto_k=fit.pareto_k)
-    return Ended(begun, fit, _start_of(programs, near) if fit.reasons else None)
+    return DatasetOutcome(begun, fit, _start_of(programs, near) if fit.reasons else None)
 
 
-def _start_of(programs: BatchPrograms, near: Weighted) -> MaximumPosterior:
+def _start_of(programs: BatchPrograms, near: WeightedDraws) -> MaximumPosterior:
     """Where NUTS may start."""
     weights = np.exp(_evened(programs, near))
     return MaximumPosterior(weights @ near.z, np.cov(near.z.T, aweights=weights).reshape(near.z.shape[1], -1))
 
 
-def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
+def _by_weights(programs: BatchPrograms, weighted: WeightedDraws | None) -> BatchFit:
     """What weighted draws say, as draws of equal weight."""
     settings = programs.settings
     least = _SPREAD * programs.n_walkers * settings.sampler.n_ensembles
@@ -128,7 +128,7 @@ def _by_weights(programs: BatchPrograms, weighted: Weighted | None) -> BatchFit:
     return BatchFit(weighted.z[kept], "laplace", weighted.pareto_k, diagnostics, reasons)
 
 
-def _walked(programs: BatchPrograms, begun: Begun, near: Weighted, stopped: Callable[[], bool]) -> BatchFit:
+def _walked(programs: BatchPrograms, begun: DatasetStart, near: WeightedDraws, stopped: Callable[[], bool]) -> BatchFit:
     """What the second half of the walkers' paths says, looked at until it is enough or they have gone as far as they may."""
     limit = max(programs.settings.sampler.max_steps // STEPS, _FIRST_LOOK)
     with programs.compiling:  # by the first that needs it
@@ -150,7 +150,7 @@ def _walked(programs: BatchPrograms, begun: Begun, near: Weighted, stopped: Call
         target = min(rounds + max(rounds // 3, 1), limit)
 
 
-def _starts(programs: BatchPrograms, near: Weighted, seed: int) -> np.ndarray:
+def _starts(programs: BatchPrograms, near: WeightedDraws, seed: int) -> np.ndarray:
     """Different ones of weighted draws, (ensemble, walker, parameter)."""
     n_ensembles, generator = programs.settings.sampler.n_ensembles, np.random.default_rng([seed, 2])
     log_weights = _evened(programs, near)
@@ -159,9 +159,9 @@ def _starts(programs: BatchPrograms, near: Weighted, seed: int) -> np.ndarray:
     return near.z[generator.permutation(chosen)].reshape(n_ensembles, programs.n_walkers, -1)
 
 
-def _evened(programs: BatchPrograms, weighted: Weighted) -> np.ndarray:
+def _evened(programs: BatchPrograms, weighted: WeightedDraws) -> np.ndarray:
     """Log weights, more even where draws are worth too few to start walkers from."""
-    return evened(weighted.log_weights, _SPREAD * programs.settings.sampler.n_ensembles * programs.n_walkers)
+    return even_weights(weighted.log_weights, _SPREAD * programs.settings.sampler.n_ensembles * programs.n_walkers)
 
 
 def _by_ensembles(programs: BatchPrograms, late: np.ndarray, asked_before: list[str], last: bool) -> BatchFit:
@@ -184,19 +184,19 @@ def _by_ensembles(programs: BatchPrograms, late: np.ndarray, asked_before: list[
         if reasons and not last:
             break
         found = diagnose_few_draws({name: draws[name]}, sampler.n_ensembles)
-        short = shortfalls(found, sampler.target_r_hat, sampler.target_ess)
-        reasons, diagnostics = (*reasons, *short, *remembered(found, FORGETS * len(z))), diagnostics | found
+        short = convergence_shortfalls(found, sampler.target_r_hat, sampler.target_ess)
+        reasons, diagnostics = (*reasons, *short, *starts_not_forgotten(found, FORGETS * len(z))), diagnostics | found
     if strict and not reasons:
         reasons = uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)
     return BatchFit(z.reshape(-1, z.shape[-1]), "ensembles", float("inf"), diagnostics, reasons)
 
 
-def by_nuts(programs: BatchPrograms, ended: Ended, start: MaximumPosterior) -> BatchFit:
+def sample_by_nuts(programs: BatchPrograms, ended: DatasetOutcome, start: MaximumPosterior) -> BatchFit:
     """What NUTS makes of it."""
     from bowdenfit.inference.nuts import sample
 
     posterior = replace(programs.posterior, given=ended.begun.data)
-    asked = Sampling(posterior, start, programs.settings.sampler, ended.begun.seed, diagnose=diagnose_few_draws)
+    asked = SamplingRequest(posterior, start, programs.settings.sampler, ended.begun.seed, diagnose=diagnose_few_draws)
     chain = sample(asked, programs.nuts)
     draws = {name: chain.z[..., i] for i, name in enumerate(programs.names)}
     reasons = chain.reasons or uncertain_sds(sd_errors(draws), programs.settings.target_sd_error)

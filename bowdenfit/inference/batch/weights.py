@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from bowdenfit.inference.batch.proposals import AboutMaxima, Places, Proposal, learnt
-from bowdenfit.inference.diagnostics import Diagnostics, too_few
+from bowdenfit.inference.batch.proposals import MaximaProposal, Proposal, ProposedPoints, learn_proposal
+from bowdenfit.inference.diagnostics import Diagnostics, describe_low_ess
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
 BLOCK = 2048  # draws at once
@@ -26,11 +26,11 @@ _TAILS = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
-class Weighted:
+class WeightedDraws:
     """Weighted draws.
 
     Args:
-        w, z: One a row, in two coordinates; see `Places`.
+        w, z: One a row, in two coordinates; see `ProposedPoints`.
         log_density: Of the posterior; minus infinity where there is no z, or no density.
         log_proposed: Of what they were drawn from.
     """
@@ -59,10 +59,10 @@ class Weighted:
         """Whether the weights can be trusted."""
         return self.pareto_k <= reliable_k(len(self.z))
 
-    def with_more(self, other: "Weighted") -> "Weighted":
+    def with_more(self, other: "WeightedDraws") -> "WeightedDraws":
         """These and more from the same proposal."""
         both = zip(*map(_fields, (self, other)), strict=True)
-        return Weighted(*(np.concatenate([own, more]) for own, more in both))
+        return WeightedDraws(*(np.concatenate([own, more]) for own, more in both))
 
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
         """Diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
@@ -98,11 +98,11 @@ class Weighted:
         for name, d in diagnostics.items():
             low = min(d.ess_bulk, d.ess_tail)
             if not low >= target_ess:
-                reasons.append(too_few(name, low, target_ess))
+                reasons.append(describe_low_ess(name, low, target_ess))
         return tuple(reasons)
 
 
-def _fields(of: Weighted) -> tuple[np.ndarray, ...]:
+def _fields(of: WeightedDraws) -> tuple[np.ndarray, ...]:
     return of.w, of.z, of.log_density, of.log_proposed
 
 
@@ -116,11 +116,11 @@ class Target:
         enough: Whether draws are enough.
     """
 
-    evaluate: Callable[[np.ndarray, np.ndarray], Places]
+    evaluate: Callable[[np.ndarray, np.ndarray], ProposedPoints]
     friction: np.ndarray
-    enough: Callable[[Weighted], bool]
+    enough: Callable[[WeightedDraws], bool]
 
-    def weighted(self, first: AboutMaxima, generator: np.random.Generator) -> Weighted:
+    def weighted(self, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
         """Draws that are enough, or as many as promise to be.
 
         Args:
@@ -132,26 +132,26 @@ class Target:
             found = found.with_more(self._drawn(first, generator, len(found.z) // BLOCK))
         return found
 
-    def nearer(self, found: Weighted, first: AboutMaxima, generator: np.random.Generator) -> Weighted:
+    def nearer(self, found: WeightedDraws, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
         """Draws nearer to the posterior than those found, for walkers to start at."""
         proposal: Proposal = first
         for _ in range(_LEARNT):
-            chosen = resample(np.exp(evened(found.log_weights, _LEARN_FROM)), BLOCK, 0.5)
-            proposal = learnt(proposal, found.w[chosen], self.friction)
+            chosen = resample(np.exp(even_weights(found.log_weights, _LEARN_FROM)), BLOCK, 0.5)
+            proposal = learn_proposal(proposal, found.w[chosen], self.friction)
             found = self._drawn(proposal, generator, 1)
         return found
 
-    def _drawn(self, proposal: Proposal, generator: np.random.Generator, blocks: int) -> Weighted:
+    def _drawn(self, proposal: Proposal, generator: np.random.Generator, blocks: int) -> WeightedDraws:
         drawn = []
         for _ in range(blocks):
             at = self.evaluate(*proposal.draw(generator, BLOCK))
             log_proposed = proposal.log_density(at)
             known = np.isfinite(at.log_density) & np.isfinite(log_proposed)
             drawn.append((at.w, at.z, np.where(known, at.log_density, -np.inf), np.where(known, log_proposed, 0.0)))
-        return Weighted(*(np.concatenate(each) for each in zip(*drawn, strict=True)))
+        return WeightedDraws(*(np.concatenate(each) for each in zip(*drawn, strict=True)))
 
 
-def _promises(found: Weighted) -> bool:
+def _promises(found: WeightedDraws) -> bool:
     """Whether more draws from the same proposal may be enough."""
     return len(found.z) < _MOST * BLOCK and effective_draws(found.log_weights) >= _WORTH * len(found.z)
 
@@ -162,7 +162,7 @@ def effective_draws(log_weights: np.ndarray) -> float:
     return float(weights.sum() ** 2 / np.sum(weights**2))
 
 
-def evened(log_weights: np.ndarray, wanted: float) -> np.ndarray:
+def even_weights(log_weights: np.ndarray, wanted: float) -> np.ndarray:
     """Log weights of sum 1, to a power at which the draws are worth so many, where they are worth fewer."""
     power = 1.0
     while effective_draws(power * log_weights) < min(wanted, 0.5 * np.isfinite(log_weights).sum()):

@@ -11,7 +11,7 @@ from typing import Any
 
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.engines.engine import Engine, EngineError, InThisProcess, in_threads
-from bowdenfit.inference.engines.processes import cores, start_worker
+from bowdenfit.inference.engines.processes import available_cores, start_worker
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
@@ -44,7 +44,7 @@ def open_engine(
         EngineError: It does not answer.
     """
     if isinstance(engine, Executor):
-        yield Engine(lambda: engine, workers or cores(), "the executor")
+        yield Engine(lambda: engine, workers or available_cores(), "the executor")
         return
     found: Engine[Any, Any]
     if engine == "local":

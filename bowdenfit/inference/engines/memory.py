@@ -4,7 +4,7 @@ import mmap
 from functools import cache
 
 from bowdenfit.errors import MemoryShortageError
-from bowdenfit.inference.engines.processes import cores
+from bowdenfit.inference.engines.processes import available_cores
 
 AT_ONCE = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
 ENSEMBLES_AT_ONCE = 4  # threads at most that move ensembles of walkers
@@ -42,5 +42,5 @@ def refuse_too_little() -> None:
     Raises:
         MemoryShortageError: The system refuses that much.
     """
-    refuse_shortage(_NEEDED + (cores() + ENSEMBLES_AT_ONCE) * _BUFFER)
-    refuse_shortage(_ADDRESSES + cores() * _ADDRESSES_PER_CORE, addresses=True)
+    refuse_shortage(_NEEDED + (available_cores() + ENSEMBLES_AT_ONCE) * _BUFFER)
+    refuse_shortage(_ADDRESSES + available_cores() * _ADDRESSES_PER_CORE, addresses=True)

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 
-def cores() -> int:
+def available_cores() -> int:
     """That this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

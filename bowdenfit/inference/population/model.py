@@ -20,7 +20,7 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Float
 
-from bowdenfit.inference.population.readings import Readings
+from bowdenfit.inference.population.readings import JointReadings
 from bowdenfit.inference.population.summaries import Summaries
 from bowdenfit.parameters.priors import HalfNormal, Normal, Prior
 
@@ -30,7 +30,7 @@ REFERENCE_TEMPERATURE = 20.0  # degC
 
 
 @dataclass(frozen=True)
-class Inspected:
+class Inspections:
     """What is known of all inspections, in rows.
 
     Args:
@@ -77,7 +77,7 @@ class Inspected:
             return found
 
         s, counts = self.summaries, self.known.sum(axis=1)
-        root = roots(s.scale, self.known)
+        root = whitening_roots(s.scale, self.known)
         information = np.einsum("jab,jac->jbc", root, root) * ((s.freedom + counts) / (s.freedom + counts + 2))[:, None, None]
         design = self.design
         moved = np.einsum("jkd,jkl,jle->jde", design, information, design)
@@ -92,7 +92,7 @@ class Inspected:
             "by_effect": spread(by_effect).sum(axis=1), "prior_mean": self.prior_mean, "prior_sd": self.prior_sd,
         }  # fmt: skip
 
-    def data_with(self, readings: Sequence[Readings]) -> dict[str, Any]:
+    def data_with(self, readings: Sequence[JointReadings]) -> dict[str, Any]:
         """The same with readings of some inspections in place of what single fits say of them.
 
         Coordinates stay those that single fits suggest.
@@ -112,7 +112,7 @@ class Inspected:
         return np.concatenate([found, worn], axis=2)
 
 
-def roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
+def whitening_roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Matrices W with |W x|^2 = x' scale^-1 x in what is known, and nothing of what is not, (inspection, row, coefficient).
 
     Args:
@@ -142,7 +142,7 @@ class PopulationDensity:
     wears: bool
     effects: tuple[str, ...]
     cables: int
-    readings: tuple[Readings, ...] = ()
+    readings: tuple[JointReadings, ...] = ()
 
     @property
     def each(self) -> int:

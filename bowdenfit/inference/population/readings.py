@@ -18,7 +18,7 @@ from bowdenfit.inference.log_density import LogDensity
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class JointReadings:
     """Inspections that one program serves; what else their fits drew, such as noise, is drawn with the population.
 
     Args:
@@ -76,11 +76,11 @@ class Readings:
         return jnp.where(jnp.isnan(total), -jnp.inf, total)
 
 
-def without_those(given: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
+def without_cables(given: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
     """Data of inspections without those of some cables.
 
     Args:
-        given: See `Readings.given`.
+        given: See `JointReadings.given`.
         cables: By number.
     """
     return dict(given) | {"counts": given["counts"] * ~np.isin(given["where"][:, 0], cables)}

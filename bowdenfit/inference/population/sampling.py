@@ -12,10 +12,10 @@ from scipy.optimize import minimize
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.diagnostics import diagnose, shortfalls
-from bowdenfit.inference.nuts import BLOCK, WARM_UP, before, block_program
-from bowdenfit.inference.population.model import Inspected, PopulationDensity
-from bowdenfit.inference.population.readings import Readings, without_those
+from bowdenfit.inference.diagnostics import convergence_shortfalls, diagnose
+from bowdenfit.inference.nuts import BLOCK, WARM_UP, block_program, next_block_state
+from bowdenfit.inference.population.model import Inspections, PopulationDensity
+from bowdenfit.inference.population.readings import JointReadings, without_cables
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
@@ -49,11 +49,11 @@ class PopulationDraws:
 
 
 def draw_population(
-    inspected: Inspected,
+    inspected: Inspections,
     seed: int,
     without: Collection[int] = (),
     called: Sequence[str] = (),
-    readings: tuple[Readings, ...] = (),
+    readings: tuple[JointReadings, ...] = (),
 ) -> PopulationDraws:
     """Draw a population and its cables.
 
@@ -76,7 +76,7 @@ def draw_population(
     target = WARM_UP + _FIRST
     while True:
         while len(blocks) < target:
-            z, tuning, mass = before(blocks, start, _first_mass(density))
+            z, tuning, mass = next_block_state(blocks, start, _first_mass(density))
             adapting = np.bool_(len(blocks) < WARM_UP)
             done = program(np.uint32(seed), np.uint32(len(blocks)), z, tuning, adapting, mass, data)
             blocks.append({name: np.asarray(value) for name, value in done.items()})
@@ -109,14 +109,14 @@ def _blind(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
     for name in ("root", "precision", "toward", "by_effect") if cables else ():
         found[name] = data[name].copy()
         found[name][list(cables)] = 0.0
-    found["readings"] = tuple(without_those(each, list(cables)) for each in data["readings"])
+    found["readings"] = tuple(without_cables(each, list(cables)) for each in data["readings"])
     return found
 
 
 def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tuple[tuple[str, ...], float]:
     """What keeps the draws from being trusted, in words, and the effective number of the worst."""
     found = {name: diagnose(np.ascontiguousarray(z[:, :, i]), len(z)) for i, name in enumerate(names)}
-    reasons = shortfalls(found, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
+    reasons = convergence_shortfalls(found, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
     if divergent > _MOST_DIVERGENT:
         reasons = (*reasons, f"{percent(divergent)} of the trajectories diverged")
     return reasons, min(min(d.ess_bulk, d.ess_tail) for d in found.values())

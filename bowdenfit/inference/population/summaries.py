@@ -44,7 +44,7 @@ class Summaries:
         return _log_t(_distances(values, self.center, self.scale), self.scale, self.freedom)
 
 
-def summarized(values: np.ndarray, prior_mean: np.ndarray, prior_sd: np.ndarray) -> Summaries:
+def summarize_likelihoods(values: np.ndarray, prior_mean: np.ndarray, prior_sd: np.ndarray) -> Summaries:
     """The likelihood of log coefficients that draws stand for, by maximum likelihood from draws without their prior.
 
     Args:

@@ -14,13 +14,13 @@ References:
 
 import numpy as np
 
-from bowdenfit.inference.population.model import WEAR, Inspected, roots
+from bowdenfit.inference.population.model import WEAR, Inspections, whitening_roots
 from bowdenfit.inference.population.sampling import PopulationDraws
 
 _SWEEPS = 60
 
 
-def unpooled(inspected: Inspected, population: PopulationDraws, cable: int, seed: int) -> tuple[np.ndarray, bool]:
+def draw_unpooled(inspected: Inspections, population: PopulationDraws, cable: int, seed: int) -> tuple[np.ndarray, bool]:
     """Log coefficients of a cable when new and its wear, (draw, number), and whether its own inspections tell its wear.
 
     Args:
@@ -31,7 +31,7 @@ def unpooled(inspected: Inspected, population: PopulationDraws, cable: int, seed
     """
     generator, rows = np.random.default_rng([seed, 19, cable]), np.flatnonzero(inspected.cable == cable)
     freedom, counts = inspected.summaries.freedom[rows], inspected.known[rows].sum(axis=1)
-    root = roots(inspected.summaries.scale[rows], inspected.known[rows])
+    root = whitening_roots(inspected.summaries.scale[rows], inspected.known[rows])
     design = root @ inspected.design[rows]  # of errors of unit precision, as all that follows
     columns = np.stack([*inspected.effects.values(), np.zeros(len(inspected.cable))], axis=1)[rows, : len(inspected.effects)]
     shift = np.einsum("hf,jf->hj", population.effects, columns)

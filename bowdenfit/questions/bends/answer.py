@@ -18,7 +18,7 @@ from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
-from bowdenfit.physics.stretch import with_springs
+from bowdenfit.physics.stretch import stiffness_with_springs
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
 from bowdenfit.results.record import Record, once, values_of
@@ -194,7 +194,7 @@ class Elastic(Display):
             found = bent.stiffness(values, float(load), preload)
             if spring is None:
                 return found
-            one, both = (with_springs(found, jnp.asarray(spring), sides) for sides in (1, 2))
+            one, both = (stiffness_with_springs(found, jnp.asarray(spring), sides) for sides in (1, 2))
             return jnp.where(bent.slack_load(values, preload) > load, both, one) if is_loop else one
 
         return self.over(answer)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Display, Rows, Several
-from bowdenfit.inference.prior_sensitivity import FarOut, Sensitivity, far_out, other_scales
+from bowdenfit.inference.prior_sensitivity import PriorConflict, Sensitivity, prior_conflicts, rescale_prior
 from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
@@ -32,11 +32,11 @@ class Checks(Display):
 
     tables: tuple[TableChecks, ...]
     sensitivities: tuple[Sensitivity, ...]
-    far_out: tuple[FarOut, ...] = ()
+    far_out: tuple[PriorConflict, ...] = ()
     told_by: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     false_alarm: ClassVar = FALSE_ALARM
-    JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", "far_out")
+    JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", "prior_conflicts")
 
     def _table(self) -> Rows:
         return [vars(reading) for reading in self.readings], {reading.label: reading.unit for reading in self.readings}
@@ -72,7 +72,7 @@ def checks_of(fit: Record) -> Checks | None:
     tables = refit_suspects(fit, [_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True)])
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
-    return Checks(tables, found.sensitivities, far_out(z, parameters), _told_by_few(fit))
+    return Checks(tables, found.sensitivities, prior_conflicts(z, parameters), _told_by_few(fit))
 
 
 @once
@@ -95,7 +95,7 @@ def evidence_of(fit: Record) -> Evidence:
         {name: draws[:, ::every] for name, draws in asked.items()},
         {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)},
         log_likelihood[:, ::every],
-        {p.name: other_scales(p.prior, posterior.values[p.name][:, ::every] / p.shown_scale) for p in space.free},
+        {p.name: rescale_prior(p.prior, posterior.values[p.name][:, ::every] / p.shown_scale) for p in space.free},
     )
 
 

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.predictive_checks import LeftOut, Uniformity, place_at_random, predict_without_each, uniformity
-from bowdenfit.inference.prior_sensitivity import OtherScales, Sensitivity, sensitivities
+from bowdenfit.inference.predictive_checks import (
+    LooPredictive,
+    Uniformity,
+    check_uniformity,
+    loo_predictive,
+    randomized_pit,
+)
+from bowdenfit.inference.prior_sensitivity import RescaledPrior, Sensitivity, sensitivities
 
 _LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
 _STREAM = 5  # of the fit's random numbers
@@ -50,7 +56,7 @@ class Evidence:
     quantities: Mapping[str, np.ndarray]
     z: Mapping[str, np.ndarray]
     total: np.ndarray
-    priors: Mapping[str, OtherScales]
+    priors: Mapping[str, RescaledPrior]
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,7 @@ class TableWithoutEach:
         uniform: Whether these are uniform; None of few readings.
     """
 
-    predicted: LeftOut
+    predicted: LooPredictive
     placed: np.ndarray
     uniform: Uniformity | None
 
@@ -94,7 +100,7 @@ def work_out(evidence: Evidence) -> Findings:
 
 def _without_each(table: TableDraws, evidence: Evidence, generator: np.random.Generator) -> TableWithoutEach:
     drawn, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
-    predicted = predict_without_each(*drawn, *readings, evidence.n_effective)
-    placed = place_at_random(predicted, generator)
+    predicted = loo_predictive(*drawn, *readings, evidence.n_effective)
+    placed = randomized_pit(predicted, generator)
     judged = len(table.reading) >= _LEAST_READINGS
-    return TableWithoutEach(predicted, placed, uniformity(placed, evidence.probability) if judged else None)
+    return TableWithoutEach(predicted, placed, check_uniformity(placed, evidence.probability) if judged else None)

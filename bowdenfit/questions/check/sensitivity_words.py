@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite
 
-from bowdenfit.inference.prior_sensitivity import Sensitivity, Width
+from bowdenfit.inference.prior_sensitivity import Sensitivity, WidthSensitivity
 from bowdenfit.questions.check.answer import Checks
 from bowdenfit.words import counted, decimals, listed
 
@@ -52,7 +52,7 @@ def _contradictions(found: Checks) -> str:
 
 def _widths(found: Checks) -> list[str]:
     """Priors that widths follow, first where too few readings are the reason, and those of which the draws cannot tell."""
-    held: dict[str, list[tuple[str, Width]]] = {}
+    held: dict[str, list[tuple[str, WidthSensitivity]]] = {}
     for s in found.sensitivities:
         for width in s.followed:
             held.setdefault(width.parameter, []).append((_answer(s.quantity), width))
@@ -66,7 +66,7 @@ def _widths(found: Checks) -> list[str]:
     return said
 
 
-def _follows(parameter: str, held: list[tuple[str, Width]], found: Checks) -> str:
+def _follows(parameter: str, held: list[tuple[str, WidthSensitivity]], found: Checks) -> str:
     """'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with twice its scale and ...'"""
     name, width = max(held, key=lambda each: each[1].size)
     others = [other for other, _ in held if other != name]

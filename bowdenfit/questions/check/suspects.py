@@ -10,10 +10,10 @@ from dataclasses import replace
 import jax
 import numpy as np
 
-from bowdenfit.inference.draws import OfDraws, replicator
-from bowdenfit.inference.leave_one_out import LeavingOut, ReadingsToLeaveOut
+from bowdenfit.inference.draws import DrawFunction, replicator
+from bowdenfit.inference.leave_one_out import LooDensity, LooRefits
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.predictive_checks import predict_by_refit
+from bowdenfit.inference.predictive_checks import replace_by_refit
 from bowdenfit.questions.check.table_checks import TableChecks
 from bowdenfit.results.record import Record, once
 
@@ -38,14 +38,14 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
         density, drawn, z = LogDensity(fit.model), fit.posterior, fit.posterior.flat_z
         each = np.concatenate([drawn.log_likelihood[term.name] for term in fit.model.terms], axis=-1).reshape(len(z), -1)
         share = min(drawn.n_effective / len(z), 1.0)
-        leaving_out = LeavingOut(ReadingsToLeaveOut(density), z, each, share, fit.provenance.seed)
+        leaving_out = LooRefits(LooDensity(density), z, each, share, fit.provenance.seed)
         for at, place in suspects:
             found[at] = _refitted(leaving_out, implied_program(fit), found[at], place)
     return tuple(found)
 
 
 @once
-def implied_program(fit: Record) -> OfDraws:
+def implied_program(fit: Record) -> DrawFunction:
     """What many z imply for every reading; a fit that samples has it already."""
     return fit.programs.implied if fit.programs else replicator(LogDensity(fit.model), fit.provenance.seed)
 
@@ -62,14 +62,14 @@ def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:
     return sorted(chances, key=lambda suspect: chances[suspect])[:_MOST]
 
 
-def _refitted(leaving_out: LeavingOut, implied: OfDraws, table: TableChecks, place: int) -> TableChecks:
+def _refitted(leaving_out: LooRefits, implied: DrawFunction, table: TableChecks, place: int) -> TableChecks:
     """The table with one of its readings predicted by a fit without it."""
     chain = leaving_out.chain_without(leaving_out.readings.names.index((table.table, table.labels[0])) + place)
     if chain.reasons:
         return table
     replicated = implied(chain.z.reshape(-1, chain.z.shape[-1]))["replicated"][table.table][:, place]
     reading, at_most = float(table.reading[place]), bool(table.at_most[place])
-    predicted = predict_by_refit(table.predicted, place, replicated, reading, at_most)
+    predicted = replace_by_refit(table.predicted, place, replicated, reading, at_most)
     probability, refitted = table.probability.copy(), table.refitted.copy()
     probability[place] = np.clip(probability[place], predicted.below[place], predicted.up_to[place])
     refitted[place] = True

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Part
-from bowdenfit.inference.predictive_checks import LeftOut, Uniformity
+from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.places import Places
 
@@ -87,7 +87,7 @@ class TableChecks(Part):
     labels: tuple[str, ...]
     reading: np.ndarray
     at_most: np.ndarray
-    predicted: LeftOut
+    predicted: LooPredictive
     places: Places
     probability: np.ndarray
     uniformity: Uniformity | None

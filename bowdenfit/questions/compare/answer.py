@@ -10,9 +10,9 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.description import Description
 from bowdenfit.display import Display, Named, Rows, Several
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.comparison import Difference, Prediction, differences, stacking_weights
+from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compare_predictions, stacking_weights
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.leave_one_out import ReadingsToLeaveOut, leave_one_out
+from bowdenfit.inference.leave_one_out import LooDensity, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
@@ -63,9 +63,9 @@ class Comparison(Display):
         troubles: Why fits are not to be trusted, by fit; those that are to be have none.
     """
 
-    differences: dict[str, Difference]
+    differences: dict[str, ElpdDifference]
     weights: dict[str, float]
-    predictions: dict[str, Prediction]
+    predictions: dict[str, LooPrediction]
     omitted: tuple[Omitted, ...]
     described: dict[str, str]
     parameters: dict[str, ComparedParameter]
@@ -178,7 +178,7 @@ def compare(
     predictions = {
         name: _leave_out_each(name, fit, drawn[name], common, parts[name], report) for name, fit in fits.items()
     }
-    order = differences(predictions)
+    order = compare_predictions(predictions)
     ordered = {name: fits[name] for name in order}
     weights = stacking_weights(predictions)
     return Comparison(
@@ -255,10 +255,10 @@ def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[s
 
 def _leave_out_each(
     name: str, fit: Record, drawn: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
-) -> Prediction:
+) -> LooPrediction:
     """Expected log density of every reading, had it been left out."""
     return leave_one_out(
-        ReadingsToLeaveOut(Density(fit.model), parts=parts),
+        LooDensity(Density(fit.model), parts=parts),
         drawn.z,
         drawn.log_likelihood,
         drawn.n_effective,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bowdenfit.display import text_of
-from bowdenfit.inference.comparison import SMALL
+from bowdenfit.inference.comparison import FEW_READINGS
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED
@@ -136,7 +136,7 @@ def basis_sentences(found: Comparison) -> list[str]:
             "A run of forces counts as one reading, because its samples share one mounting: it is left out as a whole."
         )
     lines += [part.sentence() for part in found.omitted]
-    if n < SMALL and verdicts - {"open"} and "leaning" not in verdicts:  # of which it is said already
+    if n < FEW_READINGS and verdicts - {"open"} and "leaning" not in verdicts:  # of which it is said already
         lines.append(f"With {n} readings the standard errors tend to be too small.")
     return lines
 

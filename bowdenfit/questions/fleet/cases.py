@@ -12,7 +12,7 @@ from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError, DescriptionError, StoreError
 from bowdenfit.files.naming import parse_sources
-from bowdenfit.inference.batch.shapes import Shaped, input_hash, shaped
+from bowdenfit.inference.batch.shapes import ShapedDataset, input_hash, shape_dataset
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.settings import load_description
 from bowdenfit.questions.fleet.answer import Broken
@@ -34,7 +34,7 @@ class Case:
 
     inspection: Inspection
     dataset: Dataset
-    shaped: Shaped
+    shaped: ShapedDataset
     hash: str
 
     def seed(self, of_fleet: int) -> int:
@@ -73,7 +73,7 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
                 dataset = read(each.place, **reading)
             else:
                 dataset = _of_table(each.place, descriptions[folder], folder)
-            found = Case(each, dataset, shaped(dataset), input_hash(dataset))
+            found = Case(each, dataset, shape_dataset(dataset), input_hash(dataset))
         except (DatasetError, DescriptionError, StoreError) as error:
             yield Broken(each.label, str(error))
             continue

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from bowdenfit.display import Display, Named, Rows
-from bowdenfit.inference.identifiability import Combination, Knowledge, Known
+from bowdenfit.inference.identifiability import Combination, CovarianceAnalysis, ParameterContraction
 from bowdenfit.words import decimals, listed, significant
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Identifiability(Display):
     name: str
     basis: str
     measured: bool
-    groups: dict[str, Knowledge]
+    groups: dict[str, CovarianceAnalysis]
     profiles: "tuple[Profile, ...]" = ()
     units: Mapping[str, str] = field(default_factory=dict)
     meanings: Mapping[str, str] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Identifiability(Display):
         return Named({p.name: Named({"value": p.values, "rise": p.rise}) for p in self.profiles})
 
 
-def say_what_is_determined(found: Knowledge, measured: bool, opening: str = "") -> str:
+def say_what_is_determined(found: CovarianceAnalysis, measured: bool, opening: str = "") -> str:
     """What some parameters are known to, in one sentence.
 
     Args:
@@ -93,7 +93,7 @@ def say_what_is_determined(found: Knowledge, measured: bool, opening: str = "") 
     return said + "."
 
 
-def how_well(known: Known | Combination) -> str:
+def how_well(known: ParameterContraction | Combination) -> str:
     """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
         return f"to {significant(100 * known.sd / abs(known.value), 2)} %"

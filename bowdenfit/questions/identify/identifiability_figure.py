@@ -12,7 +12,7 @@ from bowdenfit.plots.ticks import ticks
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
-    from bowdenfit.inference.identifiability import Knowledge
+    from bowdenfit.inference.identifiability import CovarianceAnalysis
     from bowdenfit.inference.profiles import Profile
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.identify.answer import Identifiability
@@ -82,7 +82,7 @@ def _profile(axes: Axes, one: Profile, first: bool) -> None:
         axes.set_ylabel("Rise")
 
 
-def _shares(axes: Axes, name: str, group: Knowledge) -> None:
+def _shares(axes: Axes, name: str, group: CovarianceAnalysis) -> None:
     names = [p.name for p in group.parameters]
     told = np.array([100 * max(p.contraction, 0.0) for p in group.parameters])
     places = np.arange(len(names))
@@ -96,7 +96,7 @@ def _shares(axes: Axes, name: str, group: Knowledge) -> None:
     axes.set_xlabel("Told by the measurements, not the prior (%)")
 
 
-def _combinations(axes: Axes, group: Knowledge) -> None:
+def _combinations(axes: Axes, group: CovarianceAnalysis) -> None:
     """Map of the weights, in units of the priors' standard deviations; columns are combinations."""
     names, prior_sd = [p.name for p in group.parameters], {p.name: p.prior_sd for p in group.parameters}
     weights = np.array([[d.weights.get(n, 0.0) * prior_sd[n] for n in names] for d in group.directions]).T

@@ -3,8 +3,8 @@
 import jax
 import numpy as np
 
-from bowdenfit.inference.draws import OfDraws, for_each_draw, named_values
-from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, Knowledge, knowledge
+from bowdenfit.inference.draws import DrawFunction, for_each_draw, value_function
+from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, CovarianceAnalysis, analyze_covariance
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
@@ -71,16 +71,16 @@ def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
 
 
 @once
-def values_program(fit: Record) -> OfDraws:
+def values_program(fit: Record) -> DrawFunction:
     """Named values of many z, in shown units; a fit that samples has one already."""
     return fit.programs.values if fit.programs else _compile_values(fit.model)
 
 
-def _compile_values(model: Model) -> OfDraws:
-    return for_each_draw(named_values(model), model.space.size, run_once=True)
+def _compile_values(model: Model) -> DrawFunction:
+    return for_each_draw(value_function(model), model.space.size, run_once=True)
 
 
-def _linear(model: Model, values_of: OfDraws, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _linear(model: Model, values_of: DrawFunction, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
     found = values_of(z + _STEP * np.array([[0.0], [-1.0], [1.0]]))
     value, below, above = np.column_stack([found[p.name] for p in model.space.free])
@@ -88,14 +88,14 @@ def _linear(model: Model, values_of: OfDraws, z: np.ndarray) -> tuple[np.ndarray
     return value, np.maximum(np.abs(slope), 1e-12 * np.maximum(np.abs(value), 1.0))
 
 
-def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> dict[str, Knowledge]:
+def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> dict[str, CovarianceAnalysis]:
     """Knowledge of every group, in shown units."""
     found = {}
     for group, roles in GROUPS.items():
         which = np.array([i for i, p in enumerate(model.space.free) if p.role in roles], dtype=int)
         if len(which):
             names = [model.space.free[i].name for i in which]
-            found[group] = knowledge(names, value[which], covariance[np.ix_(which, which)], prior_sd[which])
+            found[group] = analyze_covariance(names, value[which], covariance[np.ix_(which, which)], prior_sd[which])
     return found
 
 

@@ -130,7 +130,7 @@ def _of_plan(path: Path) -> "Identifiability":
 
     from bowdenfit.dataset import Dataset
     from bowdenfit.inference.compilation import compile_program
-    from bowdenfit.inference.information import information_at
+    from bowdenfit.inference.information import noise_free_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.scalar_priors import value_at
     from bowdenfit.model import build_model
@@ -148,7 +148,7 @@ def _of_plan(path: Path) -> "Identifiability":
     assumed = "[truth]" if plan.truth else "the medians of the priors"
     basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"
     z = compile_program(posterior.model.space.unconstrain, values, run_once=True)(values)
-    at = information_at(posterior, np.asarray(z))
+    at = noise_free_posterior(posterior, np.asarray(z))
     return of_maximum(posterior.model, at, basis, False)
 
 
@@ -163,13 +163,13 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     """For people, who are not shown the profiles, which need the model."""
     if "identify" not in answers or any(value for name, value in asked.items() if name != "source"):
         return None
-    from bowdenfit.inference.identifiability import Knowledge
+    from bowdenfit.inference.identifiability import CovarianceAnalysis
     from bowdenfit.questions.identify.answer import Identifiability
     from bowdenfit.questions.identify.words import identifiability_text
     from bowdenfit.results.plain import rebuilt
 
     page = answers["identify"]
-    groups = rebuilt(dict[str, Knowledge], page["groups"])
+    groups = rebuilt(dict[str, CovarianceAnalysis], page["groups"])
     words = {"units": page["units"], "meanings": page["meanings"]}
     return Reply(identifiability_text(Identifiability(page["name"], page["basis"], page["measured"], groups, **words)))
 

@@ -3,7 +3,13 @@
 from collections.abc import Mapping
 
 from bowdenfit.display import text_of
-from bowdenfit.inference.identifiability import OWN, RESTS_ON_PRIOR, Combination, Knowledge, Known
+from bowdenfit.inference.identifiability import (
+    IDENTIFIABLE,
+    RESTS_ON_PRIOR,
+    Combination,
+    CovarianceAnalysis,
+    ParameterContraction,
+)
 from bowdenfit.questions.identify.answer import CURVES, Identifiability
 from bowdenfit.words import decimals, filled, legend, narrow_table, percent
 
@@ -32,7 +38,7 @@ def identifiability_text(found: Identifiability) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def _parameters(name: str, group: Knowledge, units: Mapping[str, str]) -> str:
+def _parameters(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> str:
     heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
     unit = {p.name: units.get(p.name, "1") for p in group.parameters}
     rows: list[tuple[str, ...]] = [
@@ -48,19 +54,19 @@ def _parameters(name: str, group: Knowledge, units: Mapping[str, str]) -> str:
     return "\n".join([said, filled(f"Hard to tell apart: {'; '.join(pairs)}.")]) if pairs else said
 
 
-def _numbers(p: Known) -> tuple[str, str, str]:
+def _numbers(p: ParameterContraction) -> tuple[str, str, str]:
     digits = decimals(p.sd)
     return f"{p.value:z.{digits}f}", f"± {p.sd:z.{digits}f}", f"± {p.prior_sd:z.{digits}f}"
 
 
 def _informed(share: float) -> str:
     """What settles it: measurements, or what was assumed before."""
-    if share < OWN:
+    if share < IDENTIFIABLE:
         return f"measurements ({percent(1 - share, 0)})"
     return f"assumption ({percent(share, 0)})" if share > RESTS_ON_PRIOR else f"both (assumption {percent(share, 0)})"
 
 
-def _directions(group: Knowledge) -> str:
+def _directions(group: CovarianceAnalysis) -> str:
     """Independent combinations, the best determined first; of a single parameter there is nothing more to say."""
     if len(group.directions) < 2:
         return ""

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.draws import curves_of
+from bowdenfit.inference.draws import curve_function
 from bowdenfit.plots.bands import BAND_QUANTILES, Band
 from bowdenfit.results.optimum import route_grid
 from bowdenfit.results.record import Record, once
@@ -24,5 +24,5 @@ def along_route(fit: Record) -> dict[str, Band]:
     grid = route_grid(fit.model)
     with jax.enable_x64(True):
         z = np.asarray(fit.least_squares.z)
-        lines = compile_program(curves_of(fit.model, grid), z, run_once=True)(z)
+        lines = compile_program(curve_function(fit.model, grid), z, run_once=True)(z)
     return {name: Band(grid, np.asarray(line)[None]) for name, line in lines.items()}

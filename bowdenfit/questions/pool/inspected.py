@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspected
-from bowdenfit.inference.population.summaries import Summaries, summarized
+from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
+from bowdenfit.inference.population.summaries import Summaries, summarize_likelihoods
 from bowdenfit.questions.pool.answer import LeftOut
 from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import counted, few, listed
@@ -41,7 +41,7 @@ class Given:
     cables: tuple[str, ...]
     coefficients: tuple[str, ...]
     symbols: dict[str, str]
-    inspected: Inspected
+    inspected: Inspections
     logs: np.ndarray
     labels: tuple[str, ...]
     cycles: np.ndarray
@@ -81,7 +81,7 @@ def given(drawn: FleetDraws) -> Given:
     reference = float(np.nanmax(cycles)) if np.isfinite(cycles).any() else 0.0
     worn = cycles / reference if _tells_wear(cycles, notes) else None
     effects = _effects(drawn, kept, notes)
-    inspected = Inspected(number, worn, effects, known, _summaries(logs, known, mean, sd), mean, sd)
+    inspected = Inspections(number, worn, effects, known, _summaries(logs, known, mean, sd), mean, sd)
     symbols = {name: about[name].get("symbol", name) for name in values}
     labels = tuple(name for name, keep in zip(drawn.label, kept, strict=True) if keep)
     own_names = tuple(about[name][_OWN_NAME] for name in values)
@@ -98,7 +98,7 @@ def _summaries(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.nda
     center, scale, freedom = np.zeros((count, coefficients)), np.zeros((count, coefficients, coefficients)), np.ones(count)
     for pattern in np.unique(known, axis=0):
         rows, columns = np.flatnonzero((known == pattern).all(axis=1)), np.flatnonzero(pattern)
-        found = summarized(logs[rows][:, :, columns], mean[columns], sd[columns])
+        found = summarize_likelihoods(logs[rows][:, :, columns], mean[columns], sd[columns])
         center[np.ix_(rows, columns)], freedom[rows] = found.center, found.freedom
         scale[np.ix_(rows, columns, columns)] = found.scale
     return Summaries(center, scale, freedom)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspected
+from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
-from bowdenfit.inference.population.unpooled import unpooled
+from bowdenfit.inference.population.unpooled import draw_unpooled
 from bowdenfit.questions.pool.answer import Asked, Effect, Life, Pool, PooledCable
 from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given
@@ -112,12 +112,12 @@ def _looked(known: Given, seed: int, measurements: Path | None) -> _Looked:
 
 
 def _with_unpooled(
-    inspected: Inspected, core: PopulationDraws, named: list[int], seed: int
+    inspected: Inspections, core: PopulationDraws, named: list[int], seed: int
 ) -> tuple[PopulationDraws, tuple[int, ...]]:
     """Draws with some cables by their own inspections alone, and which of these tell their wear."""
     cables, told = core.cables.copy(), []
     for i in named:
-        cables[:, i], tells = unpooled(inspected, core, i, seed)
+        cables[:, i], tells = draw_unpooled(inspected, core, i, seed)
         told += [i] * tells
     return replace(core, cables=cables), tuple(told)
 

@@ -23,7 +23,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
 
-from bowdenfit.inference.population.model import Inspected
+from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 from bowdenfit.multiple_testing import adjust_p_values
@@ -40,7 +40,7 @@ _NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in stand
 _FEWEST = 8  # cables of which can be said whether they are of one kind
 
 
-def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
+def far_off(inspected: Inspections, drawn: PopulationDraws) -> tuple[int, ...]:
     """Cables that may be unlike the rest, by number: at most a third of them.
 
     Args:
@@ -58,7 +58,7 @@ def far_off(inspected: Inspected, drawn: PopulationDraws) -> tuple[int, ...]:
 
 
 def judged(
-    inspected: Inspected, drawn: PopulationDraws, draw: Callable[[tuple[int, ...]], PopulationDraws], seed: int
+    inspected: Inspections, drawn: PopulationDraws, draw: Callable[[tuple[int, ...]], PopulationDraws], seed: int
 ) -> tuple[PopulationDraws, np.ndarray]:
     """The population without cables that are unlike it, and the chance of each cable among so many, (cable,).
 
@@ -100,7 +100,7 @@ def _suspects(adjusted: np.ndarray, far: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(sorted(int(i) for i in worst))
 
 
-def chances(inspected: Inspected, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:
+def chances(inspected: Inspections, drawn: PopulationDraws, seed: int, without: tuple[int, ...] = ()) -> np.ndarray:
     """Probability that a cable of this population is as far from the others as each is, (cable,).
 
     Among ten thousand cables only a probability of a few millionths names one, which no counting of simulated cables would
@@ -123,7 +123,7 @@ def _some(drawn: PopulationDraws) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return drawn.mean[which], drawn.spread[which], drawn.effects[which]
 
 
-def departure(inspected: Inspected, core: PopulationDraws, cable: int, seed: int) -> tuple[int, float] | None:
+def departure(inspected: Inspections, core: PopulationDraws, cable: int, seed: int) -> tuple[int, float] | None:
     """The number in which a cable is unlike the rest by its own inspections, and by how many spreads.
 
     None where it is rather its inspections that are unlike each other.
@@ -140,14 +140,14 @@ def departure(inspected: Inspected, core: PopulationDraws, cable: int, seed: int
     return None if least == _TOGETHER else (least, off[least])
 
 
-def _chance(inspected: Inspected, cable: int, *population: np.ndarray, generator: np.random.Generator, is_in: bool) -> float:
+def _chance(inspected: Inspections, cable: int, *population: np.ndarray, generator: np.random.Generator, is_in: bool) -> float:
     """Of one cable, which may be in the population or not."""
     found, _ = _compared(inspected, cable, *population, generator=generator, is_in=is_in)
     return min(1.0, len(found) * min(found.values()))
 
 
 def _compared(
-    inspected: Inspected,
+    inspected: Inspections,
     cable: int,
     mean: np.ndarray,
     spread: np.ndarray,
@@ -219,7 +219,7 @@ def _within(
 
 
 def mixed(
-    inspected: Inspected, drawn: PopulationDraws, names: tuple[str, ...], without: Collection[int] = ()
+    inspected: Inspections, drawn: PopulationDraws, names: tuple[str, ...], without: Collection[int] = ()
 ) -> dict[str, float]:
     """Numbers in which cables do not look like one population, with the probability of that by chance in such a fleet.
 

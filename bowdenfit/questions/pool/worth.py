@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.population.readings import Readings
+from bowdenfit.inference.population.readings import JointReadings
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.questions.pool.inspected import Given
 from bowdenfit.reading import Reading
@@ -46,7 +46,7 @@ def _squares(values: np.ndarray, center: np.ndarray, covariance: np.ndarray) -> 
     return np.sum(np.linalg.solve(np.linalg.cholesky(covariance), (values - center).T) ** 2, axis=0)
 
 
-def readings_of(known: Given, rows: Sequence[int], folder: Path) -> tuple[Readings, ...]:
+def readings_of(known: Given, rows: Sequence[int], folder: Path) -> tuple[JointReadings, ...]:
     """Readings of some inspections, by the model that they were fitted with.
 
     Args:
@@ -78,5 +78,5 @@ def readings_of(known: Given, rows: Sequence[int], folder: Path) -> tuple[Readin
     for members in shapes.values():
         numbers = tuple(wanted[case.hash] for case in members)
         pooled = {known.own_names[k]: int(k) for k in np.flatnonzero(known.inspected.known[numbers[0]])}
-        found.append(Readings(members[0].shaped.posterior, pooled, numbers, tuple(case.shaped.data for case in members)))
+        found.append(JointReadings(members[0].shaped.posterior, pooled, numbers, tuple(case.shaped.data for case in members)))
     return tuple(found)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.diagnostics import shortfalls
+from bowdenfit.inference.diagnostics import convergence_shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommendation
 from bowdenfit.kinds import readings_called
@@ -109,7 +109,7 @@ def summarize(fit: Record) -> dict[str, Any]:
 def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
     """How the draws came about, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
-    short = shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
+    short = convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
     page = {
         "method": posterior.sampler,
         "ensembles": posterior.n_ensembles,

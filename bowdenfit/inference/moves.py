@@ -1,8 +1,8 @@
 """How walkers are moved: emcee's stretch and differential evolution, and draws from a distribution fitted to other walkers.
 
-A move takes random numbers and the two halves of one ensemble, (walker, parameter): the half that moves and the half that rests.
-It returns proposed positions for the moving half, and the log of the factor by which the ratio of densities there is multiplied.
-Random numbers come from outside because XLA is slow to compile generators.
+A move takes random numbers and the two halves of one ensemble, (walker, parameter): the half that moves and the half that
+rests. It returns proposed positions for the moving half, and the log of the factor by which the ratio of densities there is
+multiplied. Random numbers come from outside because XLA is slow to compile generators.
 
 References:
     Goodman and Weare 2010, "Ensemble samplers with affine invariance" (Communications in Applied Mathematics and

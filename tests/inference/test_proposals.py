@@ -126,7 +126,7 @@ PROPOSALS = {
     "stretch": stretch,
     "differential evolution": differential_evolution,
     "gamma 1": partial(differential_evolution, gamma=1.0),
-    "independent": fitted_t,
+    "fitted t": fitted_t,
 }
 ALONE = {name: (proposal, IN_Z) for name, proposal in PROPOSALS.items()}
 ALONE |= {f"{name} in values": (proposal, IN_VALUES) for name, proposal in PROPOSALS.items()}
@@ -145,7 +145,7 @@ def without_its_factor(proposal):
 
 
 @pytest.mark.filterwarnings("ignore:Precision loss")  # all ensembles without any tails
-@pytest.mark.parametrize("name", ["stretch", "fitted_t"])
+@pytest.mark.parametrize("name", ["stretch", "fitted t"])
 def test_the_same_test_sees_that_a_factor_is_missing(name):
     """The negative control of the test above."""
     assert p_value(below_quantiles(sampled_t([(without_its_factor(PROPOSALS[name]), 1.0)], seed=3)[30:])) < 1e-4

@@ -26,17 +26,17 @@ class Checks(Display):
     Args:
         tables: By table; held forces, which only bound the friction, are not among them.
         sensitivities: Of friction coefficients and design answers to priors and readings.
-        far_out: Parameters that the readings put where their priors hardly allow them.
+        prior_conflicts: Parameters that the readings put where their priors hardly allow them.
         told_by: Noise scales that few readings tell: how many readings, and how many coefficients they have to tell too.
     """
 
     tables: tuple[TableChecks, ...]
     sensitivities: tuple[Sensitivity, ...]
-    far_out: tuple[PriorConflict, ...] = ()
+    prior_conflicts: tuple[PriorConflict, ...] = ()
     told_by: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     false_alarm: ClassVar = FALSE_ALARM
-    JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", "prior_conflicts")
+    JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", ("far_out", "prior_conflicts"))
 
     def _table(self) -> Rows:
         return [vars(reading) for reading in self.readings], {reading.label: reading.unit for reading in self.readings}

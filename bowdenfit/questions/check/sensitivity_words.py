@@ -40,7 +40,7 @@ def _told_by(found: Checks, noise: str) -> tuple[str, str]:
 def _contradictions(found: Checks) -> str:
     """Parameters that lie far out by their priors, or where a prior that counts is at odds with the readings."""
     conflicts = found.conflicts
-    sds = {s.parameter: s.prior_sds for s in conflicts} | {f.parameter: f.prior_sds for f in found.far_out}
+    sds = {s.parameter: s.prior_sds for s in conflicts} | {f.parameter: f.prior_sds for f in found.prior_conflicts}
     if not sds:
         return ""
     far = max(abs(value) for value in sds.values())

@@ -19,6 +19,7 @@ from bowdenfit.html_text import as_html
 from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
+from bowdenfit.results.record import Record
 from bowdenfit.verbs import VERBS
 
 pytestmark = pytest.mark.extended
@@ -138,9 +139,10 @@ def is_plain(value: Any) -> bool:
 def reachable(value: Any, name: str, seen: dict[int, Any]) -> Iterator[tuple[str, Any]]:
     """Something, and all that attributes and indices lead to from there.
 
-    Arrays, which NumPy shows in its own way, and classes that compute, which are plain dataclasses, are where it ends.
+    Arrays, which NumPy shows in its own way, and classes that compute, which are plain dataclasses, are where it ends; so is
+    the fit that an answer holds, which is a copy without answers of its own.
     """
-    if id(value) in seen or isinstance(value, np.ndarray) or is_plain(value):
+    if id(value) in seen or isinstance(value, np.ndarray) or is_plain(value) or (seen and isinstance(value, Record)):
         return
     seen[id(value)] = value
     yield name, value

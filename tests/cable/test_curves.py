@@ -218,9 +218,13 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
 @pytest.mark.parametrize(
     ("name", "heading", "rows"),
     [
-        ("gaussian", "Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):", 3),
         ("line", "Straight lines: angle in the middle of the range, and slope, median (90 % interval):", 2),
-        ("logistic", "Logistic curves A / (1 + exp(-(l - B)/C)), median (90 % interval):", 3),
+        pytest.param(
+            "gaussian", "Gaussian curves A exp(-((l - B)/C)^2), median (90 % interval):", 3, marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "logistic", "Logistic curves A / (1 + exp(-(l - B)/C)), median (90 % interval):", 3, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_the_summary_heads_a_family_s_table_with_its_own_name(fits, name, heading, rows):

@@ -46,6 +46,7 @@ def _table(folder, laboratory, seed):
     return difference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("laboratory", LABORATORIES)
 def test_contrasts_hold_the_truth_as_often_as_they_say(tmp_path, laboratory, count):

@@ -129,6 +129,7 @@ def test_least_squares_recovers_known_parameters_from_noise_free_tables(laborato
 # Honest intervals --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_over_twenty_loops_nine_in_ten_intervals_hold_the_truth(laboratory):
     """Every parameter; no binomial test of the ten rejects at 0.001.
 

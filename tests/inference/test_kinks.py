@@ -70,6 +70,7 @@ def rises(tables: tuple[str, ...], seed: int) -> list[tuple[float, float]]:
     return asked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 8, 10), marks=pytest.mark.slow)], ids=["a loop", "three"])
 def test_other_starts_find_no_lower_sum_of_squares_at_the_limits_that_are_given(seeds):
     """There a limit lies too near the estimate: 4 of 16 did of these loops while nobody asked whether the solver was stuck."""

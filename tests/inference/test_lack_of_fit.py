@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from made_again import measured_again
+from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
@@ -109,7 +110,7 @@ def alarms(judge, make, tmp_path, count, friction=None):
     return int(np.sum(said))
 
 
-@pytest.mark.parametrize("bench", HEALTHY)
+@pytest.mark.parametrize("bench", some_slow(HEALTHY, ["three mountings"]))
 def test_healthy_benches_raise_no_alarm(tmp_path, judge, bench):
     """Three in a thousand may: of 20 benches, more than one does in 2 of 1000 runs of this test with other seeds."""
     assert alarms(judge, lambda path, seed: forces(path, seed, **HEALTHY[bench]), tmp_path, 20) <= 1
@@ -138,6 +139,7 @@ def alarms_again(judge, what, count):
     return int(np.sum([any(d.worth_saying for d in judge.of(data)) for data in made]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["recordings", pytest.param("loop and stretch", marks=pytest.mark.slow)])
 def test_healthy_recordings_loops_and_stretch_raise_no_alarm(judge, what):
     """More than one of eight does in 3 of 10 000 runs of this test with other seeds."""
@@ -151,6 +153,7 @@ def test_at_most_one_healthy_recording_or_loop_in_a_hundred_raises_an_alarm(judg
     assert alarms_again(judge, what, 500) <= 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "least", "most"), [(30, 1, 12), pytest.param(60, 3, 20, marks=pytest.mark.slow)])
 def test_chances_of_healthy_benches_are_uniform(tmp_path, judge, count, least, most):
     """The smallest corrected chance is below 0.2 in at most a fifth of healthy benches, and not never.

@@ -132,6 +132,7 @@ def _check_standard_errors(tables: tuple[str, ...], n: int, low: float, high: fl
         assert abs(np.mean(values[name][identified]) - TRUTH[name]) < (4.5 / np.sqrt(n) + 0.1) * scatter, name
 
 
+@pytest.mark.slow
 @pytest.mark.extended
 @pytest.mark.parametrize(
     "tables",

@@ -42,6 +42,7 @@ def test_a_fit_without_preload_finds_the_friction(tmp_path):
     assert estimate.standard_error < 0.07 * MU  # one mounting: what its prior says of tau, over half a turn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("follows", [False, True])
 def test_recordings_are_fitted_together_with_a_loop_table(tmp_path, follows):
     """Also of a cable whose preload follows its stretch: then what the bent rope is preloaded to is lost with it."""

@@ -102,6 +102,7 @@ def replace_settings(**changes) -> SamplerSettings:
     return SETTINGS.model_copy(update=changes)
 
 
+@pytest.mark.slow
 def test_nuts_reproduces_a_funnel_down_to_its_narrow_end(funnel):
     """Shares of the standard normal coordinate below four levels; all 16-chain t-scores within p = 1e-4 / 4.
 

@@ -173,6 +173,7 @@ def test_the_joint_posterior_agrees_with_nuts_on_the_same_density(by_bowdenfit, 
     assert disagreements(by_bowdenfit, by_nuts) == []
 
 
+@pytest.mark.slow
 @pytest.mark.extended
 def test_the_shortest_path_that_is_trusted_agrees_with_nuts(bench, by_nuts):
     """Four fits that stop at the first look, together: what is left of their common, over-dispersed start would show.

@@ -228,6 +228,7 @@ def naive_ranks(cable: Cable) -> dict[str, float]:
     return dict(zip(("mu_edge", "mu_bend"), stats.norm.cdf(z).tolist(), strict=True))
 
 
+@pytest.mark.slow
 @SEVEN_OR_TEN
 def test_over_recorded_cables_nine_in_ten_intervals_hold_the_truth(
     laboratory: Laboratory, several: list[tuple[Cable, Dataset]]

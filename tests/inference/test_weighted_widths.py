@@ -59,6 +59,7 @@ def exact_sds(loss: np.ndarray, n: int = 4096) -> np.ndarray:
     return np.sqrt(weight @ (every - weight @ every) ** 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [32, pytest.param(512, marks=pytest.mark.slow)])
 def test_weighted_draws_are_as_wide_as_the_posterior(count):
     """Standard deviations of three coefficients; on the average of 32 cables within 3 %, of 512 within 1.5 %.

@@ -63,6 +63,7 @@ def most_likely_noise(named: dict[str, jax.Array], term: RunsTerm) -> float:
     return float(np.exp(-slope / (2 * square)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "delay"), [(0.02, 0.003), (2.0, 0.0), (4.0, 0.0)])
 def test_the_most_likely_noise_of_blocks_is_on_average_the_true_one(bench, noise, delay):
     """Within 3.6 %, four standard errors: a right likelihood fails with one in 10 000 seeds.

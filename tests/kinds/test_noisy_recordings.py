@@ -36,6 +36,7 @@ def rope_of(path, count, drag):
     return path
 
 
+@pytest.mark.slow
 def test_noise_adds_neither_friction_nor_preload_to_a_loop(tmp_path):
     """An operator led through the readings has friction 7.7 % too large; 3 % are three times what other seeds scatter by."""
     each = [recorded("triangle", noise=NOISE, seed=i, seconds=8.0) for i in range(3)]

@@ -414,6 +414,7 @@ def test_a_small_calibration_of_the_right_likelihood_passes():
     assert {q.name for q in found.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
 
 
+@pytest.mark.slow
 def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
     """Without the run effect intervals are several times too narrow: twelve replications reject a coefficient at 0.01.
 

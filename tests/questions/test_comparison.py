@@ -327,6 +327,7 @@ def by_run_effect(mountings):
     return {"with": fitted(mountings), "without": fitted(mountings, prior=NO_RUN_EFFECT)}
 
 
+@pytest.mark.slow
 def test_run_effects_that_are_there_are_preferred_to_none(by_run_effect):
     """Runs scatter by 0.03 where their own readings leave 0.004 open, so that none of 1500 simulated sets of twelve favors
     the model without; its weight passes a half for one set in 1000, and the difference is within chance for one in six.
@@ -363,6 +364,7 @@ def geometries(on_body, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_published_and_continuous_geometry_are_compared_on_what_both_have(geometries, run):
     where = geometries / "comparison"
     code, text, progress = run("compare", geometries / "continuous", geometries / "published", "--output", where)

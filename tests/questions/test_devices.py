@@ -161,6 +161,7 @@ def test_springs_make_the_cable_softer(fit, tmp_path):
     np.testing.assert_allclose(1 / soft, 1 / stiff + 1 / (2 * 5e3 * 0.02**2), rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("schedule", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_of_four_times_as_many_devices_some_go_on_but_no_more_than_may(fit, schedule, monkeypatch):
     """Of 4000 it is 0.034 to 0.038 for ten fits; of 1600 the error is 0.005, and each bound three of it off."""
@@ -169,6 +170,7 @@ def test_of_four_times_as_many_devices_some_go_on_but_no_more_than_may(fit, sche
     assert 0.02 < simulation.simulated(fit, read_device(DEVICE), loop, answer, schedule, 1600).went_on <= 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("schedule", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
     seen = bf.compensate(fit, DEVICE, wrap_angle=RANGE, schedule=schedule, simulate=True, output=tmp_path / "answer")

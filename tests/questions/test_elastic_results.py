@@ -257,6 +257,7 @@ def solved(simulated):
     return solve
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [12, pytest.param(30, marks=pytest.mark.slow)])
 def test_tables_of_one_cable_seldom_disagree(simulated, solved, count):
     """Over 12 or 30 cables without a contradiction no table is 3 sds off, and p-values of the loop's are uniform.

@@ -78,6 +78,7 @@ def one_run(tmp_path_factory):
     return {name: bf.fit(folder, friction=name, seed=1, settings=QUICK) for name in ("capstan", "drag")}
 
 
+@pytest.mark.slow
 def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(one_run):
     found = bf.compare(one_run)
     assert found.best == "drag" and found.verdict("capstan") == "clear"

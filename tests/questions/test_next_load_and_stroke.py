@@ -29,6 +29,7 @@ def advice(fit):
     return next_measurement(fit, "drag")
 
 
+@pytest.mark.slow
 def test_a_hidden_tension_is_told_by_the_lowest_load(advice):
     within = advice.within
     assert within.usual.startswith("6 readings at") and within.usual.endswith("64 N, pulling and returning")

@@ -64,6 +64,7 @@ def population(fleet):
     return known, draw_population(known.inspected, 1)
 
 
+@pytest.mark.slow
 def test_the_population_and_every_cable_are_found(fleet, found):
     """Within 4 standard deviations: of 40 numbers one is outside by chance in 400 runs; the seed is fixed."""
     truth = fleet[1]

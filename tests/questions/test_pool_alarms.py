@@ -61,6 +61,7 @@ def least_chances(fleets, seed, sweeps=600):
     return np.array([chances.min() for chances in found]), found
 
 
+@pytest.mark.slow
 def test_who_is_named_is_unlike_a_population_that_was_drawn_without_it(monkeypatch):
     """In 40 fleets of eight like cables; draws of a population that holds the cable, weighted, named four at this seed.
 

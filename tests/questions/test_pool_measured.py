@@ -54,6 +54,7 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
     np.testing.assert_allclose(differences, differences[0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_cables_of_which_single_fits_tell_too_little_are_named_with_a_remedy(run, fleet, monkeypatch):
     _, fits = fleet
     monkeypatch.setattr(pooling, "LEAST", 1e9)

@@ -33,6 +33,7 @@ def sampled(tmp_path_factory):
     return bf.fit(folder_of(tmp_path_factory.mktemp("sampled"), each), seed=2, settings=settings)
 
 
+@pytest.mark.slow
 def test_a_short_posterior_holds_the_truth(sampled):
     posterior = sampled.posterior
     for name, truth in (("mu", MU), ("preload", PRELOAD)):

@@ -157,6 +157,7 @@ def with_truth(laboratory: Laboratory, **friction: object) -> dict[str, str]:
     return findings(list(made), {}, truths=("mu_edge 0.2",)).faults
 
 
+@pytest.mark.slow
 def test_stated_truths_show_a_prior_that_is_wrong():
     """Of a prior that is sure of 0.12; a weak one would be rejected by chance for one seed in a hundred."""
     laboratory = Laboratory()

@@ -32,11 +32,11 @@ def keep_what_is_compiled() -> str | None:
     if version("jaxlib") in FLAGS:
         os.environ.setdefault("XLA_FLAGS", FLAGS[version("jaxlib")])
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it; workers have no cores to spare
-    if PROGRAMS in os.environ:
-        return None
-    os.environ[PROGRAMS] = tempfile.mkdtemp(prefix="bowdenfit-programs-")
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
     os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
+    if PROGRAMS in os.environ:  # of the process that started this one, or of several runs one after the other
+        return None
+    os.environ[PROGRAMS] = tempfile.mkdtemp(prefix="bowdenfit-programs-")
     return os.environ[PROGRAMS]
 
 

@@ -131,5 +131,6 @@ def _alike(fit: Record) -> str:
 def _prior_against(fit: Record) -> str:
     """Parameters about which readings and prior contradict each other."""
     found = checks_of(fit)
-    names = dict.fromkeys([s.parameter for s in found.conflicts] + [f.parameter for f in found.prior_conflicts]) if found else {}
+    pulled = [s.parameter for s in found.conflicts] if found else []
+    names = dict.fromkeys(pulled + [f.parameter for f in found.prior_conflicts] if found else [])
     return f"The readings contradict what was assumed of {listed(list(names))} beforehand; check its unit." if names else ""

@@ -30,7 +30,7 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
-from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.parameters.symbols import make_symbol
 from bowdenfit.words import listed
 
 
@@ -69,24 +69,24 @@ def build_model(dataset: Dataset) -> Model:
     cable = measured_cable(description, measurements)
     kinds = list(measured_kinds(measurements))
     terms = [term for kind, table in kinds for term in kind.terms(cable, table, measurements.table(AngleTable))]
-    space = _space(cable, measurements)
+    space = _build_space(cable, measurements)
     for kind, table in kinds:
         kind.check(table, space)
     places = {term.name: places_of(description, measurements, term) for term in terms}
     return Model(cable, space, tuple(terms), places)
 
 
-def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
+def _build_space(cable: Cable, measurements: Measurements) -> ParameterSpace:
     """All parameters, as the user wants them; their order is that of z."""
     description, defaults = cable.description, PriorDefaults()
-    asked = parameters_asked_for(cable, measurements)
+    requested = parameters_asked_for(cable, measurements)
     parameters = [
-        *(_friction(description, name, defaults.friction) for name in cable.coefficients),
-        *(p for p in asked if p.role == "curve"),
-        *_uncertain_constants(description),
+        *(_make_friction_parameter(description, name, defaults.friction) for name in cable.coefficients),
+        *(p for p in requested if p.role == "curve"),
+        *_make_angle_parameters(description),
         *cable.law_parameters(defaults),
         *cable.friction.parameters(defaults),
-        *(p for p in asked if p.role != "curve"),
+        *(p for p in requested if p.role != "curve"),
     ]
     known = [p.name for p in parameters]
     for name in description.friction:
@@ -101,7 +101,7 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
         name: description.friction[stem] for name, stem in of_groups.items() if stem in description.friction
     }
     settings |= {**description.friction, **description.prior}
-    space = ParameterSpace(tuple(_set(p, settings[p.name]) if p.name in settings else p for p in parameters))
+    space = ParameterSpace(tuple(_apply_setting(p, settings[p.name]) if p.name in settings else p for p in parameters))
     for fixed in (p.fixed for p in space.fixed if p.name == RUN_SCATTER):
         if fixed is not None and fixed < 0:
             raise DescriptionError(
@@ -111,19 +111,19 @@ def _space(cable: Cable, measurements: Measurements) -> ParameterSpace:
     return space
 
 
-def _friction(description: Description, name: str, prior: LogNormalPrior) -> Parameter:
+def _make_friction_parameter(description: Description, name: str, prior: LogNormalPrior) -> Parameter:
     whole, group = split_coefficient(name, description.coefficients)
     contacts = " and ".join(c.name for c in description.contact if c.friction == whole)
     subscript = whole.removeprefix("mu").strip("_ ") if whole.startswith("mu") else whole
     subscript = ", ".join(part for part in (subscript, group) if part)
-    symbol = symbol_of(r"\mu", subscript) if subscript else r"$\mu$"
+    symbol = make_symbol(r"\mu", subscript) if subscript else r"$\mu$"
     return Parameter(
         name, symbol, f"friction coefficient, {contacts}{f', {group}' if group else ''}", "friction",
         LogNormal(prior.median, prior.log_sd),
     )  # fmt: skip
 
 
-def _uncertain_constants(description: Description) -> list[Parameter]:
+def _make_angle_parameters(description: Description) -> list[Parameter]:
     """Constant wrap angles with a standard deviation: one value for all rows, so one parameter each."""
     parameters = []
     for contact in description.contact:
@@ -134,7 +134,7 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
         parameters.append(
             Parameter(
                 constant_angle_name(contact),
-                symbol_of(r"\theta", contact.name),
+                make_symbol(r"\theta", contact.name),
                 f"wrap angle, {contact.name}",
                 "angle",
                 prior,
@@ -146,7 +146,7 @@ def _uncertain_constants(description: Description) -> list[Parameter]:
     return parameters
 
 
-def _set(default: Parameter, setting: ParameterSetting) -> Parameter:
+def _apply_setting(default: Parameter, setting: ParameterSetting) -> Parameter:
     """The parameter as the user wants it; numbers are in its shown unit."""
     parameter, scale = replace(default, scaled_by=""), default.shown_scale
     if setting.fixed is not None:
@@ -157,10 +157,10 @@ def _set(default: Parameter, setting: ParameterSetting) -> Parameter:
         return replace(parameter, prior=TruncatedNormal(value / scale, sd / scale), fixed=None, prior_words=words)
     assert setting.prior is not None  # a setting has exactly one of the three
     _check_support(parameter, setting.prior)
-    return replace(parameter, prior=_prior(setting.prior, scale), fixed=None, prior_words="")
+    return replace(parameter, prior=_make_prior(setting.prior, scale), fixed=None, prior_words="")
 
 
-def _prior(choice: PriorChoice, scale: float) -> Prior:
+def _make_prior(choice: PriorChoice, scale: float) -> Prior:
     match choice.lognormal or choice.normal or choice.half_normal or choice.half_cauchy or choice.uniform:
         case LogNormalPrior(median=median, log_sd=log_sd):
             return LogNormal(median / scale, log_sd)

@@ -31,10 +31,10 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
@@ -160,10 +160,10 @@ def seconds_alone(posterior: LogDensity) -> float:
     """What emcee's ensembles take for one cable to the targets of a batch, once compiled."""
     settings = SamplerSettings(n_walkers=64, target_ess=TARGETS.target_ess, target_r_hat=TARGETS.target_r_hat)
     objective = make_objective(posterior)
-    programs = walker_programs(posterior, settings)
+    programs = compile_walkers(posterior, settings)
     for _ in range(2):
         begin = time.perf_counter()
-        sample(SamplingRequest(posterior, maximum_posterior(posterior, objective), settings, 1), programs)
+        sample(SamplingRequest(posterior, find_maximum_posterior(posterior, objective), settings, 1), programs)
     return time.perf_counter() - begin
 
 
@@ -175,7 +175,7 @@ def time_programs(numbers: list[int]) -> None:
         for number in numbers:
             programs = BatchPrograms(posteriors[0], SETTINGS)
             begin = time.perf_counter()
-            _ = programs.gradients, programs.places, programs.ensembles
+            _ = programs.gradients, programs.evaluate_points, programs.ensembles
             compiled = time.perf_counter()
             cpu, data = time.process_time(), [posteriors[i % len(posteriors)].data for i in range(number)]
             fits = fit_batch(posteriors[0], data, range(number), programs=programs)

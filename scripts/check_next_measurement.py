@@ -34,10 +34,10 @@ from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.designs import design_of
@@ -194,8 +194,8 @@ class Bench:
     def _draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of the posterior by bowdenfit's own sampler."""
         objective = self._program(posterior, "objective", make_objective)
-        programs = self._program(posterior, "walkers", lambda p: walker_programs(p, SAMPLER))
-        start = maximum_posterior(posterior, objective)
+        programs = self._program(posterior, "walkers", lambda p: compile_walkers(p, SAMPLER))
+        start = find_maximum_posterior(posterior, objective)
         z = sample(SamplingRequest(posterior, start, SAMPLER, seed), programs).z
         return z.reshape(-1, posterior.model.space.size)
 

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from bowdenfit.description import PriorDefaults, Route
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.parameters.symbols import make_symbol
 from bowdenfit.physics.geometry import (
     gaussian_coefficients,
     line_wrap_angle,
@@ -78,7 +78,7 @@ class Curve(ABC):
 
     def _symbol(self, letter: str) -> str:
         """The letter with the first word of the column."""
-        return symbol_of(letter, self.column.split("_")[0] or self.column)
+        return make_symbol(letter, self.column.split("_")[0] or self.column)
 
     def _level(self, detected: Vector, defaults: PriorDefaults) -> Parameter:
         """Logarithm of the angle in the middle of the range, about that of the median angle."""

@@ -81,7 +81,7 @@ class Drag(FrictionOption):
         conditions.needs_loads("drag")
         meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
         prior = HalfCauchy(defaults.drag_share * conditions.load.value)
-        by = conditions.load.share(defaults.drag_share)
+        by = conditions.load.describe_share(defaults.drag_share)
         return [Parameter(DRAG, "$D$ hidden", meaning, "friction_model", prior, "N", scaled_by=by)]
 
     def drag(self, values: Mapping[str, Array]) -> Array:

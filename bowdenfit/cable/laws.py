@@ -17,7 +17,7 @@ from jaxtyping import Float
 from bowdenfit.description import PriorDefaults
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.parameters.symbols import make_symbol
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Wobble(ContactLaw):
         degree = float(np.deg2rad(1.0))
         return (
             Parameter(
-                parameter_of("wobble", self.contact), symbol_of("w", self.contact),
+                parameter_of("wobble", self.contact), make_symbol("w", self.contact),
                 f"unintended wrap angle, {self.contact}", "friction_model",
                 HalfNormal(defaults.wobble_degrees * degree), "deg", 1 / degree,
             ),

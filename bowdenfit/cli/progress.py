@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from bowdenfit.cli.interrupts import keeping, refuse_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
-from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.inference.engines.memory import refuse_low_memory
 from bowdenfit.verb import Watch
 
 Report: TypeAlias = Callable[..., None]
@@ -26,7 +26,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         MemoryShortageError: There is too little memory to begin.
         KeyboardInterrupt: The user stopped it; with how to go on, where something is kept.
     """
-    refuse_too_little()
+    refuse_low_memory()
     kept = folder / watch.kept if folder is not None and watch.kept else None
 
     def how_to_go_on() -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, convergence_shortfalls, diagnose_all
+from bowdenfit.inference.diagnostics import Diagnostics, Trajectories, describe_convergence_shortfalls, diagnose_all
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 
@@ -77,17 +77,17 @@ class SamplingRequest:
     report: Callable[[Progress], None] = lambda _: None
     diagnose: Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]] = diagnose_all
 
-    def chain_of(self, z: np.ndarray, n_ensembles: int, **of_sampler: Any) -> Chain:
+    def make_chain(self, z: np.ndarray, n_ensembles: int, **sampler_details: Any) -> Chain:
         """Draws (walker, draw, parameter), ordered by ensemble, with derived quantities, diagnostics, and their shortfalls."""
         flat = self.quantities(z.reshape(-1, z.shape[-1]))
         derived = {name: np.asarray(values).reshape(z.shape[:2]) for name, values in flat.items()}
         draws = {p.name: z[..., i] for i, p in enumerate(self.posterior.model.space.free)} | derived
         diagnostics = self.diagnose(draws, n_ensembles)
-        reasons = convergence_shortfalls(diagnostics, self.settings.target_r_hat, self.settings.target_ess)
-        return Chain(z, derived, diagnostics, n_ensembles, reasons=reasons, **of_sampler)
+        reasons = describe_convergence_shortfalls(diagnostics, self.settings.target_r_hat, self.settings.target_ess)
+        return Chain(z, derived, diagnostics, n_ensembles, reasons=reasons, **sampler_details)
 
 
-def stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
+def describe_stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
     """Walkers that never moved in half their path; a few of them far out pass every other check."""
     count = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
     if not count:

@@ -20,12 +20,12 @@ from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import or_damaged, refuse_packed, refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
-_HEAD = struct.Struct("<QI")  # length and checksum of a record
-_LONGEST = 1 << 24  # bytes of what it was started for
+_RECORD_HEADER = struct.Struct("<QI")  # length and checksum of a record
+_LONGEST_FINGERPRINT = 1 << 24  # bytes of what it was started for
 Record = dict[str, np.ndarray]
 
 
-def heading(fingerprint: Mapping[str, Any]) -> bytes:
+def checkpoint_header(fingerprint: Mapping[str, Any]) -> bytes:
     """How a checkpoint begins.
 
     Args:
@@ -34,7 +34,7 @@ def heading(fingerprint: Mapping[str, Any]) -> bytes:
     return _MARK + json.dumps(fingerprint).encode() + b"\n"
 
 
-def fingerprint_of(path: Path) -> dict[str, Any]:
+def read_fingerprint(path: Path) -> dict[str, Any]:
     """What a checkpoint was started for.
 
     Raises:
@@ -43,10 +43,10 @@ def fingerprint_of(path: Path) -> dict[str, Any]:
     """
     refuse_special(path, StoreError)
     with path.open("rb") as file:
-        return _fingerprint(file)
+        return _parse_fingerprint(file)
 
 
-def records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Record]:
+def read_records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Record]:
     """Records in their order; what stands behind the last whole one is cut off.
 
     Args:
@@ -57,23 +57,23 @@ def records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Record]:
         StoreError: It cannot be read, or holds other records.
     """
     refuse_special(path, StoreError)
-    damaged = damaged_checkpoint(path)
+    damaged = damaged_checkpoint_error(path)
     try:
         with or_damaged(damaged), path.open("r+b") as file:
-            _fingerprint(file)
-            found, end = list[Record](), file.tell()
-            for record in _whole(file):
-                found.append(record)
+            _parse_fingerprint(file)
+            complete, end = list[Record](), file.tell()
+            for record in _complete_records(file):
+                complete.append(record)
                 end = file.tell()
-            if any({n: a.shape for n, a in record.items() if a.dtype.kind in "biuf"} != shapes for record in found):
+            if any({n: a.shape for n, a in record.items() if a.dtype.kind in "biuf"} != shapes for record in complete):
                 raise damaged
             file.truncate(end)
     except OSError as error:
         raise disk_error(path, error) from None
-    return found
+    return complete
 
 
-def damaged_checkpoint(path: Path) -> StoreError:
+def damaged_checkpoint_error(path: Path) -> StoreError:
     """That a checkpoint is not as it was written.
 
     Args:
@@ -82,7 +82,7 @@ def damaged_checkpoint(path: Path) -> StoreError:
     return StoreError(f"{path} is damaged and cannot be resumed; start over with --force.")
 
 
-def append(path: Path, record: Mapping[str, np.ndarray]) -> None:
+def append_record(path: Path, record: Mapping[str, np.ndarray]) -> None:
     """Add a record.
 
     Args:
@@ -92,26 +92,26 @@ def append(path: Path, record: Mapping[str, np.ndarray]) -> None:
     Raises:
         StoreError: There is no room for it.
     """
-    written = io.BytesIO()
+    buffer = io.BytesIO()
     save: Any = np.savez  # its stub takes arrays for its own keywords
-    save(written, **record)
-    content = written.getvalue()
+    save(buffer, **record)
+    content = buffer.getvalue()
     try:
         with path.open("ab") as file:
-            file.write(_HEAD.pack(len(content), crc32(content)) + content)
+            file.write(_RECORD_HEADER.pack(len(content), crc32(content)) + content)
     except OSError as error:
         raise disk_error(path, error) from None
 
 
-def _fingerprint(file: BinaryIO) -> dict[str, Any]:
+def _parse_fingerprint(file: BinaryIO) -> dict[str, Any]:
     if file.readline(len(_MARK)) != _MARK:
         raise ValueError("no checkpoint")
-    return dict(json.loads(file.readline(_LONGEST)))
+    return dict(json.loads(file.readline(_LONGEST_FINGERPRINT)))
 
 
-def _whole(file: BinaryIO) -> Iterator[Record]:
-    while len(head := file.read(_HEAD.size)) == _HEAD.size:
-        length, checksum = _HEAD.unpack(head)
+def _complete_records(file: BinaryIO) -> Iterator[Record]:
+    while len(head := file.read(_RECORD_HEADER.size)) == _RECORD_HEADER.size:
+        length, checksum = _RECORD_HEADER.unpack(head)
         content = file.read(min(length, os.fstat(file.fileno()).st_size))
         if len(content) < length or crc32(content) != checksum:
             return

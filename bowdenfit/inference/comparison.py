@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
 FEW_READINGS = 100  # readings below which the standard error of a difference is too small more often than not
-_DECISIVE = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
+_CLEAR_ERRORS = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
 _NOTICEABLE = 4.0
 
 LooMethod = Literal["importance sampling", "moment matching", "refit", "rough"]
@@ -34,7 +34,7 @@ class LooPrediction:
     readings: tuple[tuple[str, str], ...] = ()
     how: tuple[LooMethod, ...] = ()
 
-    def of_reading(self, i: int) -> dict[str, Any]:
+    def describe_reading(self, i: int) -> dict[str, Any]:
         """What is known of one reading, as plain data."""
         return {
             "elpd": self.elpd[i],
@@ -66,9 +66,9 @@ class ElpdDifference:
     unreliable: int
 
     @property
-    def is_seen(self) -> bool:
+    def is_distinguishable(self) -> bool:
         """Whether the data can tell the two apart."""
-        return self.elpd > max(_DECISIVE * self.standard_error, _NOTICEABLE)
+        return self.elpd > max(_CLEAR_ERRORS * self.standard_error, _NOTICEABLE)
 
     def verdict(self, n_readings: int) -> Verdict:
         """Whether the data can tell the two apart, with so few or so many readings.
@@ -80,9 +80,9 @@ class ElpdDifference:
             Sivula, Magnusson, Matamoros and Vehtari 2020, "Uncertainty in Bayesian leave-one-out cross-validation based
             model comparison" (arXiv:2008.10296).
         """
-        if not self.is_seen:
+        if not self.is_distinguishable:
             return "open"
-        return "leaning" if n_readings < FEW_READINGS and self.elpd < 2 * _DECISIVE * self.standard_error else "clear"
+        return "leaning" if n_readings < FEW_READINGS and self.elpd < 2 * _CLEAR_ERRORS * self.standard_error else "clear"
 
 
 def psis_loo(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> LooPrediction:
@@ -112,12 +112,12 @@ def compare_predictions(predictions: Mapping[str, LooPrediction]) -> dict[str, E
     """
     order = sorted(predictions, key=lambda name: -float(predictions[name].elpd.sum()))
     best = predictions[order[0]]
-    found = {}
+    differences = {}
     for name in order:
-        each = best.elpd - predictions[name].elpd
-        error = float(np.sqrt(len(each) * np.var(each, ddof=1))) if len(each) > 1 else float("nan")
-        found[name] = ElpdDifference(float(each.sum()), error, max(best.unreliable, predictions[name].unreliable))
-    return found
+        difference = best.elpd - predictions[name].elpd
+        error = float(np.sqrt(len(difference) * np.var(difference, ddof=1))) if len(difference) > 1 else float("nan")
+        differences[name] = ElpdDifference(float(difference.sum()), error, max(best.unreliable, predictions[name].unreliable))
+    return differences
 
 
 def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, float]:

@@ -21,7 +21,7 @@ from jax.scipy.linalg import cho_solve, solve_triangular
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.parameters.space import ParameterSpace
 
-_TELL_A_SCATTER = 4  # readings more than coefficients
+_SPARE_READINGS = 4  # readings more than coefficients
 
 
 @dataclass(frozen=True)
@@ -35,18 +35,18 @@ class Conditional:
     posterior: LogDensity
 
     @cached_property
-    def which(self) -> np.ndarray:
+    def indices(self) -> np.ndarray:
         """Positions of the coefficients."""
         return np.flatnonzero([p.role == "friction" for p in self.posterior.model.space.free])
 
     @cached_property
     def _coefficients(self) -> ParameterSpace:
-        return ParameterSpace(tuple(self.posterior.model.space.free[i] for i in self.which))
+        return ParameterSpace(tuple(self.posterior.model.space.free[i] for i in self.indices))
 
     @property
     def has_coefficients(self) -> bool:
         """Whether any coefficient is free."""
-        return len(self.which) > 0
+        return len(self.indices) > 0
 
     @property
     def is_narrow(self) -> bool:
@@ -58,12 +58,12 @@ class Conditional:
         which is chance. Readings that are alike to the last digit count once: of a scatter that may be none they tell nothing.
         """
         model = self.posterior.model
-        each = [varying for term in model.terms for _, varying in term.residual_blocks if varying]
-        unlike = [len(np.unique(term.observed())) for term in model.terms]
-        tell = min(each + unlike, default=0)
-        return any(p.role == "angle" for p in model.space.free) or tell < len(self.which) + _TELL_A_SCATTER
+        varying = [varying for term in model.terms for _, varying in term.residual_blocks if varying]
+        distinct = [len(np.unique(term.observed())) for term in model.terms]
+        informative = min(varying + distinct, default=0)
+        return any(p.role == "angle" for p in model.space.free) or informative < len(self.indices) + _SPARE_READINGS
 
-    def at(self, given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+    def map_point(self, point: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
         """W and z, and log of the volume in z of a unit of w there, of one of the two; NaN where w has no z.
 
         Args:
@@ -71,15 +71,15 @@ class Conditional:
             is_z: Whether it is z.
             data: Of the posterior.
         """
-        ridge, own = self._ridge(given, data), given[self.which]
-        z = jnp.where(is_z, own, self._back(own, ridge))
-        w = jnp.where(is_z, self._along(own, ridge), own)
-        return given.at[self.which].set(w), given.at[self.which].set(z), -self._log_volume(z, ridge)
+        ridge, own = self._ridge(point, data), point[self.indices]
+        z = jnp.where(is_z, own, self._to_z(own, ridge))
+        w = jnp.where(is_z, self._to_w(own, ridge), own)
+        return point.at[self.indices].set(w), point.at[self.indices].set(z), -self._log_volume(z, ridge)
 
-    def _along(self, z: Array, ridge: "_Ridge") -> Array:
+    def _to_w(self, z: Array, ridge: "_Ridge") -> Array:
         return ridge.root.T @ (self._coefficients.vector(z) - ridge.center)
 
-    def _back(self, w: Array, ridge: "_Ridge") -> Array:
+    def _to_z(self, w: Array, ridge: "_Ridge") -> Array:
         return self._coefficients.z_of(ridge.center + solve_triangular(ridge.root, w, trans="T", lower=True))
 
     def _log_volume(self, z: Array, ridge: "_Ridge") -> Array:
@@ -92,7 +92,7 @@ class Conditional:
         own = self._coefficients
         low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
         width = 2 / (high - low)
-        others = self.posterior.values(z.at[self.which].set(0.0), data)
+        others = self.posterior.values(z.at[self.indices].set(0.0), data)
 
         def residuals(coefficients: Array) -> Array:
             values = others | {p.name: coefficients[i] for i, p in enumerate(own.free)}

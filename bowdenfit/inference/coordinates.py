@@ -21,23 +21,23 @@ CoordinateMap = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
 CoordinateMaps = Sequence[tuple[CoordinateMap, float]]  # each with its share of all steps
 
 
-def identity(given: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
+def identity(point: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
     """Of one point: z itself."""
     del is_z, data
-    return given, given, jnp.zeros(())
+    return point, point, jnp.zeros(())
 
 
 z_map: CoordinateMap = jax.vmap(identity, (0, None, None))
 
 
-def value_map(chart: PriorGrid) -> CoordinateMap:
+def value_map(grid: PriorGrid) -> CoordinateMap:
     """Values of the parameters, as `PriorGrid` has them."""
-    return lambda given, is_z, _: chart.at(given, is_z)
+    return lambda points, is_z, _: grid.map_points(points, is_z)
 
 
 def ridge_map(conditional: Conditional) -> CoordinateMap:
     """Coefficients given everything else, in units of their ridge."""
-    return jax.vmap(conditional.at, (0, None, None))
+    return jax.vmap(conditional.map_point, (0, None, None))
 
 
 def coordinate_maps(posterior: LogDensity) -> CoordinateMaps:
@@ -51,13 +51,13 @@ def coordinate_maps(posterior: LogDensity) -> CoordinateMaps:
     Args:
         posterior: The posterior.
     """
-    conditional, without = Conditional(posterior), maps_without_ridge(posterior.model.space)
+    conditional, plain = Conditional(posterior), maps_without_ridge(posterior.model.space)
     if not conditional.has_coefficients:
-        return without
-    return *((frame, share / 2) for frame, share in without), (ridge_map(conditional), 0.5)
+        return plain
+    return *((frame, share / 2) for frame, share in plain), (ridge_map(conditional), 0.5)
 
 
 def maps_without_ridge(space: ParameterSpace) -> CoordinateMaps:
     """Z and values alone; also for densities that are no model's."""
-    chart = make_prior_grid(space)
-    return (z_map, 0.5), (value_map(chart) if len(chart.which) else z_map, 0.5)
+    grid = make_prior_grid(space)
+    return (z_map, 0.5), (value_map(grid) if len(grid.indices) else z_map, 0.5)

@@ -1,10 +1,10 @@
 """A way in which readings depart from the model, and when that is worth saying."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 FALSE_ALARM = 0.003  # chance that a healthy fit is said not to describe its readings
-WORTH_SAYING = 0.02  # of what is read, below which a departure is not worth a verdict
-MOVED = 0.5  # of the way from a coefficient to an end of its 90 % interval, by less than which a drift may move it
+NOTICEABLE_SIZE = 0.02  # of what is read, below which a departure is not worth a verdict
+NOTICEABLE_SHIFT = 0.5  # of the way from a coefficient to an end of its 90 % interval, by less than which a drift may move it
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Departure:
     group: str
     against: str
     inside: bool
-    chance: float
+    p_value: float = field(metadata={"key": "chance"})
     size: float
     low: float
     high: float
@@ -38,10 +38,10 @@ class Departure:
     moved: float | None = None
 
     @property
-    def worth_saying(self) -> bool:
+    def is_noticeable(self) -> bool:
         """Whether chance does not make it, and it matters."""
-        matters = self.size > WORTH_SAYING if self.moved is None else self.moved > MOVED
-        return self.chance < FALSE_ALARM and matters
+        matters = self.size > NOTICEABLE_SIZE if self.moved is None else self.moved > NOTICEABLE_SHIFT
+        return self.p_value < FALSE_ALARM and matters
 
 
 @dataclass(frozen=True)
@@ -57,5 +57,5 @@ class FarReading:
 
     table: str
     label: str
-    chance: float
+    p_value: float = field(metadata={"key": "chance"})
     sds: float

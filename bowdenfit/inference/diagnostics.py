@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
             float(array_stats.ess(as_chains(scores[0], n_ensembles), method="mean", **axes)),
             float(array_stats.ess(chains, method="tail", prob=(0.05, 0.95), **axes)),
             float(array_stats.mcse(chains, method="mean", **axes)),
-            _drift(scores[0]),
+            _measure_drift(scores[0]),
         )
 
 
@@ -100,7 +100,7 @@ def as_chains(draws: np.ndarray, n_ensembles: int) -> np.ndarray:
     return draws.reshape(n_ensembles, -1, *draws.shape[2:])
 
 
-def _drift(scores: np.ndarray) -> float:
+def _measure_drift(scores: np.ndarray) -> float:
     """Change from the first to the second half of the draws, by their normal scores.
 
     Many walkers that still creep in from an over-dispersed start agree with each other, so that no comparison between
@@ -115,7 +115,9 @@ def _drift(scores: np.ndarray) -> float:
     return float(max(abs(second.mean() - first.mean()), abs(second.std() - first.std())))
 
 
-def convergence_shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat: float, target_ess: int) -> tuple[str, ...]:
+def describe_convergence_shortfalls(
+    diagnostics: Mapping[str, Diagnostics], target_r_hat: float, target_ess: int
+) -> tuple[str, ...]:
     """What keeps the draws from being trusted, in words; empty if nothing does."""
     reasons = []
     for name, d in diagnostics.items():
@@ -131,7 +133,7 @@ def convergence_shortfalls(diagnostics: Mapping[str, Diagnostics], target_r_hat:
     return tuple(reasons)
 
 
-def describe_low_ess(what: str, worth: float, least: int) -> str:
+def describe_low_ess(quantity: str, ess: float, target: int) -> str:
     """That too few effective draws were made, in words.
 
     Args:
@@ -139,7 +141,7 @@ def describe_low_ess(what: str, worth: float, least: int) -> str:
         worth: Effective sample size.
         least: What it should be.
     """
-    return f"for {what} the samples are worth {worth:.0f} independent ones, and should be worth at least {least}"
+    return f"for {quantity} the samples are worth {ess:.0f} independent ones, and should be worth at least {target}"
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ class Trajectories:
     """
 
     warm_up: int
-    drawn: int
+    total: int = field(metadata={"key": "drawn"})
     diverged: int
     fine: int
     fine_diverged: int
@@ -171,7 +173,7 @@ class Trajectories:
     statistics: dict[str, np.ndarray]
 
 
-def energy_mixing(energy: np.ndarray) -> float:
+def compute_energy_mixing(energy: np.ndarray) -> float:
     """E-BFMI of the chain where it is lowest: how far one step may change the energy, against how far it spreads.
 
     Args:
@@ -187,16 +189,16 @@ def energy_mixing(energy: np.ndarray) -> float:
     return float(np.min(array_stats.bfmi(energy, chain_axis=0, draw_axis=1)))
 
 
-def trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...]:
+def describe_trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...]:
     """What keeps draws of Hamiltonian Monte Carlo from being trusted, in words; empty if nothing does."""
     reasons = []
-    for diverged, drawn, most, which in (
+    for diverged, total, most, kind in (
         (trajectories.fine_diverged, trajectories.fine, MOST_FINE_DIVERGED, " of fine steps"),
-        (trajectories.diverged, trajectories.drawn, MOST_DIVERGED, ""),
+        (trajectories.diverged, trajectories.total, MOST_DIVERGED, ""),
     ):
-        if diverged > most * drawn:
+        if diverged > most * total:
             reasons.append(
-                f"{diverged} of {drawn} trajectories{which} diverged, and 1 in {1 / most:.0f} is the most: a narrow corner of "
+                f"{diverged} of {total} trajectories{kind} diverged, and 1 in {1 / most:.0f} is the most: a narrow corner of "
                 "what is likely may be missing; raise sampler.target_acceptance, or state what is known as priors"
             )
     if not trajectories.energy_mixing >= LEAST_ENERGY_MIXING:

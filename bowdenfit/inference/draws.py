@@ -50,7 +50,7 @@ def run_in_batches(program: Function, batch: int, rows: Any) -> Any:
     parts, count = [], len(jax.tree.leaves(rows)[0])
     for start in range(0, count, batch):
         padded = np.minimum(np.arange(start, start + batch), count - 1)
-        part = jax.tree.map(lambda each, padded=padded: each[padded], rows)
+        part = jax.tree.map(lambda array, padded=padded: array[padded], rows)
         parts.append(jax.tree.map(np.asarray, program(part)))
     whole = jax.tree.map(lambda *x: np.concatenate(x), *parts)
     return jax.tree.map(lambda x: x[:count], whole)

@@ -21,8 +21,8 @@ import numpy as np
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, stuck_walkers, worst_diagnostics
-from bowdenfit.inference.checkpoint import append, damaged_checkpoint, records
+from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, describe_stuck_walkers, worst_diagnostics
+from bowdenfit.inference.checkpoint import append_record, damaged_checkpoint_error, read_records
 from bowdenfit.inference.engines.memory import ENSEMBLES_AT_ONCE
 from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.engines.processes import available_cores
@@ -31,9 +31,9 @@ from bowdenfit.inference.sweep import SweepChoices
 from bowdenfit.inference.walkers import WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
-_FIRST_LOOK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
-_PATIENCE = 2 * _FIRST_LOOK  # stored states after which walkers that have not settled run `WalkerPrograms.later`
-_OF_RANDOM = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
+_FIRST_CHECK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
+_PATIENCE = 2 * _FIRST_CHECK  # stored states after which walkers that have not settled run `WalkerPrograms.later`
+_GENERATOR_SHAPES = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
 _KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
 
 
@@ -60,21 +60,21 @@ class EnsembleMove(emcee.moves.Move):
         walkers, accepted = np.arange(len(state.coords)).reshape(self.n_ensembles, -1), np.zeros(len(state.coords))
         if self.programs.later is not None and self.stored >= _PATIENCE:
             self.programs = self.programs.later()
-        self.stored, begun = self.stored + 1, []
+        self.stored, pending = self.stored + 1, []
         for ensemble in walkers:
             order = model.random.permutation(ensemble)
-            chosen = self.programs.shares.choose(model.random, state.coords[order].shape)
-            begun.append((order, self.threads.submit(self._moved, chosen, state.coords[order])))
-        for order, moved in begun:  # into the state's own arrays: those of JAX are for reading
-            state.coords[order], state.log_prob[order], accepted[order] = moved.result()
+            choices = self.programs.shares.choose(model.random, state.coords[order].shape)
+            pending.append((order, self.threads.submit(self._run_sweep, choices, state.coords[order])))
+        for order, future in pending:  # into the state's own arrays: those of JAX are for reading
+            state.coords[order], state.log_prob[order], accepted[order] = future.result()
         return state, accepted / THIN
 
-    def _moved(self, chosen: SweepChoices, z: np.ndarray) -> Any:
+    def _run_sweep(self, choices: SweepChoices, z: np.ndarray) -> Any:
         with jax.enable_x64(True):  # the setting is each thread's own
-            return jax.block_until_ready(self.programs.sweep(chosen, z, self.data))
+            return jax.block_until_ready(self.programs.sweep(choices, z, self.data))
 
 
-def starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
+def draw_starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
     """Over-dispersed starts, (ensemble, walker, parameter).
 
     Each ensemble is drawn from the Gauss-Newton covariance about a center of its own, which is drawn from the same: twice the
@@ -87,13 +87,13 @@ def starting_points(start: MaximumPosterior, settings: SamplerSettings, generato
     return start.z + (centers + walkers) @ root.T
 
 
-def initial_state(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
+def make_initial_state(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
     """A state of emcee that walkers begin with; a sweep finds the log densities itself."""
     return emcee.State(points, log_prob=np.zeros(len(points)), random_state=generator.get_state())
 
 
 @linear_algebra_in_one_thread()
-def sample(asked: SamplingRequest, programs: WalkerPrograms, data: Any = None) -> Chain:
+def sample(request: SamplingRequest, programs: WalkerPrograms, data: Any = None) -> Chain:
     """Sample by ensembles of walkers.
 
     Args:
@@ -101,35 +101,35 @@ def sample(asked: SamplingRequest, programs: WalkerPrograms, data: Any = None) -
         programs: What is compiled for it.
         data: Of the density; those of the posterior if omitted.
     """
-    settings, start, seed = asked.settings, asked.start, asked.seed
-    data = asked.posterior.data if data is None else data
-    points = starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
-    backend = CheckpointedBackend(points.shape, asked.checkpoint, asked.resume)
+    settings, start, seed = request.settings, request.start, request.seed
+    data = request.posterior.data if data is None else data
+    points = draw_starting_points(start, settings, np.random.default_rng([seed, 0])).reshape(-1, len(start.z))
+    backend = CheckpointedBackend(points.shape, request.checkpoint, request.resume)
     moves = EnsembleMove(programs, data, settings.n_ensembles, int(backend.iteration))
 
-    sampler = emcee.EnsembleSampler(*points.shape, asked.posterior.log_density, backend=backend, moves=moves)
+    sampler = emcee.EnsembleSampler(*points.shape, request.posterior.log_density, backend=backend, moves=moves)
     generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence([seed, 1])))
-    state = None if backend.iteration else initial_state(points, generator)
+    state = None if backend.iteration else make_initial_state(points, generator)
     limit = max(settings.max_steps // THIN, 2)
-    target = _FIRST_LOOK
+    target = _FIRST_CHECK
     while target < int(backend.iteration):  # the looks of a sampling that nothing interrupted
-        target = _next_look(target)
+        target = _next_check(target)
     target = min(target, limit)
-    seen: tuple[float | None, float | None] = (None, None)
+    worst: tuple[float | None, float | None] = (None, None)
     while True:
         while (missing := target - int(backend.iteration)) > 0:
             sampler.run_mcmc(state, min(missing, _BLOCK), skip_initial_state_check=True)
             state = None
-            asked.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *seen))
-        chain = _summarized(asked, backend)
-        seen = worst_diagnostics(chain)
-        asked.report(Progress(chain.steps, settings.max_steps, *seen))
+            request.report(Progress(int(backend.iteration) * THIN, settings.max_steps, *worst))
+        chain = _summarize(request, backend)
+        worst = worst_diagnostics(chain)
+        request.report(Progress(chain.steps, settings.max_steps, *worst))
         if not chain.reasons or target >= limit:
             return chain
-        target = min(_next_look(target), limit)
+        target = min(_next_check(target), limit)
 
 
-def _next_look(stored: int) -> int:
+def _next_check(stored: int) -> int:
     """Stored states at the look after one at so many."""
     return stored + stored // 3
 
@@ -147,13 +147,13 @@ class CheckpointedBackend(emcee.backends.Backend):
         super().__init__()
         self.reset(*shape)
         self.checkpoint: Path | None = None
-        like = {"z": shape, "log_density": shape[:1], "accepted": shape[:1]} | _OF_RANDOM
-        before = records(checkpoint, like) if checkpoint is not None and resume else []
-        self.grow(len(before), None)
-        for record in before:
+        shapes = {"z": shape, "log_density": shape[:1], "accepted": shape[:1]} | _GENERATOR_SHAPES
+        records_before = read_records(checkpoint, shapes) if checkpoint is not None and resume else []
+        self.grow(len(records_before), None)
+        for record in records_before:
             keys, (place, has_normal) = record["random_key"], (int(i) for i in record["random_place"])
             if checkpoint is not None and not 0 <= place <= len(keys):  # else the generator would read beyond its keys
-                raise damaged_checkpoint(checkpoint)
+                raise damaged_checkpoint_error(checkpoint)
             generator = "MT19937", keys, place, has_normal, float(record["random_normal"])
             state = emcee.State(record["z"], log_prob=record["log_density"], random_state=generator)
             self.save_step(state, record["accepted"])
@@ -169,22 +169,22 @@ class CheckpointedBackend(emcee.backends.Backend):
         super().save_step(state, accepted)
         if self.checkpoint is not None:
             _, key, place, has_normal, normal = state.random_state
-            append(
+            append_record(
                 self.checkpoint,
                 {"z": state.coords, "log_density": state.log_prob, "accepted": np.asarray(accepted), "random_key": key,
                  "random_place": np.asarray([place, has_normal]), "random_normal": np.asarray(normal)},
             )  # fmt: skip
 
 
-def _summarized(asked: SamplingRequest, backend: emcee.backends.Backend) -> Chain:
+def _summarize(request: SamplingRequest, backend: emcee.backends.Backend) -> Chain:
     """Draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
-    wanted = max(_KEPT_PER_WALKER, 2 * asked.settings.target_ess // backend.shape[0])
-    kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, wanted)).round().astype(int))
+    n_kept = max(_KEPT_PER_WALKER, 2 * request.settings.target_ess // backend.shape[0])
+    kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, n_kept)).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored
-    chain = asked.chain_of(z, asked.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
-    too_short = f"the sampling took {stored * THIN} steps, and {_FIRST_LOOK * THIN} are the least that can be judged"
-    first = (too_short,) if stored < _FIRST_LOOK else ()
-    return replace(chain, reasons=(*first, *chain.reasons, *stuck_walkers(z)))
+    chain = request.make_chain(z, request.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
+    too_short = f"the sampling took {stored * THIN} steps, and {_FIRST_CHECK * THIN} are the least that can be judged"
+    first = (too_short,) if stored < _FIRST_CHECK else ()
+    return replace(chain, reasons=(*first, *chain.reasons, *describe_stuck_walkers(z)))

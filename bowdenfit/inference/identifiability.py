@@ -11,7 +11,7 @@ References:
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -19,10 +19,10 @@ import numpy as np
 from bowdenfit.words import significant
 
 IDENTIFIABLE = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
-RESTS_ON_PRIOR = 0.8  # share above which the prior alone speaks
+PRIOR_DOMINATED = 0.8  # share above which the prior alone speaks
 UNINFORMED = 0.9  # share above which the measurements say nothing of a combination
 _DETERMINED = 0.25  # share below which a combination counts as determined
-_TANGLED = 0.3  # weight in a combination that rests on the prior, beyond which a parameter is not known by itself
+_LEAST_WEIGHT = 0.3  # weight in a combination that rests on the prior, beyond which a parameter is not known by itself
 _INFLATED, _BOUNDED = 100.0, 0.1  # variance inflation and share beyond which a parameter is only bounded by a sum
 _PART = 0.1  # weight, in units of the prior's sd, below which a parameter does not belong to a combination
 _SHARPER = 0.5  # a combination is worth naming if it is known to less than this share of its best single parameter
@@ -46,7 +46,7 @@ class ParameterContraction:
     value: float
     sd: float
     prior_sd: float
-    most_alike: str
+    most_correlated: str = field(metadata={"key": "most_alike"})
     correlation: float
     inflation: float
 
@@ -109,7 +109,7 @@ class CovarianceAnalysis:
     """
 
     parameters: tuple[ParameterContraction, ...]
-    tangled: tuple[str, ...]
+    unidentified: tuple[str, ...]
     directions: tuple[Combination, ...]
     determined: tuple[Combination, ...]
     sharpest: Combination | None
@@ -124,14 +124,14 @@ class CovarianceAnalysis:
     )
 
     @property
-    def by_themselves(self) -> tuple[ParameterContraction, ...]:
+    def identified(self) -> tuple[ParameterContraction, ...]:
         """Parameters that are known each by itself."""
-        return tuple(p for p in self.parameters if p.name not in self.tangled)
+        return tuple(p for p in self.parameters if p.name not in self.unidentified)
 
     @property
     def on_prior(self) -> tuple[ParameterContraction, ...]:
         """Parameters that rest on their priors and belong to no combination that is determined."""
-        return tuple(p for p in self._left if p.share > RESTS_ON_PRIOR)
+        return tuple(p for p in self._unexplained if p.share > PRIOR_DOMINATED)
 
     @property
     def sums(self) -> list[str]:
@@ -144,15 +144,15 @@ class CovarianceAnalysis:
         return [p.name for p in self.on_prior]
 
     @property
-    def partly(self) -> tuple[ParameterContraction, ...]:
+    def partly_identified(self) -> tuple[ParameterContraction, ...]:
         """Parameters that measurements and prior determine about equally."""
-        return tuple(p for p in self._left if p.share <= RESTS_ON_PRIOR)
+        return tuple(p for p in self._unexplained if p.share <= PRIOR_DOMINATED)
 
     @property
-    def _left(self) -> tuple[ParameterContraction, ...]:
+    def _unexplained(self) -> tuple[ParameterContraction, ...]:
         """Parameters known neither by themselves nor in a combination."""
         combined = {name for combination in self.determined for name in combination.weights}
-        return tuple(p for p in self.parameters if p.name in self.tangled and p.name not in combined)
+        return tuple(p for p in self.parameters if p.name in self.unidentified and p.name not in combined)
 
     @property
     def undetermined(self) -> Combination | None:
@@ -173,35 +173,35 @@ def analyze_covariance(
             shares, vectors = np.linalg.eigh(scaled[np.ix_(which, which)])
             for share, vector in zip(shares, vectors.T, strict=True):
                 weights = np.zeros(len(names))
-                weights[which], kept = _as_printed(vector, prior_sd[which])
+                weights[which], kept = _round_weights(vector, prior_sd[which])
                 sd = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
                 by_name = {names[i]: float(weights[i]) for i in which[kept]}
                 yield Combination(by_name, float(weights @ value), sd, float(np.clip(share, 0.0, 1.0)))
 
-    directions, tangled = tuple(combinations(np.arange(len(names)))), _tangled(scaled)
+    directions, tangled = tuple(combinations(np.arange(len(names)))), _find_unidentified(scaled)
     return CovarianceAnalysis(
-        _one_by_one(names, value, covariance, prior_sd),
+        _contract_parameters(names, value, covariance, prior_sd),
         tuple(names[i] for i in tangled),
         directions,
         tuple(c for c in combinations(tangled) if c.share < _DETERMINED and len(c.weights) > 1),
-        _sharpest(directions, value, covariance),
+        _find_sharpest(directions, value, covariance),
         _collinearity(scaled),
     )
 
 
-def _tangled(scaled: np.ndarray) -> np.ndarray:
+def _find_unidentified(scaled: np.ndarray) -> np.ndarray:
     """Which parameters are not known by themselves: little, or as part of a sum that is known far better than its parts.
 
     The larger part of a sum is bounded by the sum, since the others cannot be negative; that does not make it known.
     """
     shares, vectors = np.linalg.eigh(scaled)
     share, inflation = np.diag(scaled), np.diag(scaled) * np.diag(np.linalg.inv(scaled))
-    open_ends = np.any((np.abs(vectors) > _TANGLED) & (shares > RESTS_ON_PRIOR), axis=1)
+    open_ends = np.any((np.abs(vectors) > _LEAST_WEIGHT) & (shares > PRIOR_DOMINATED), axis=1)
     bounded = (inflation > _INFLATED) & (share > _BOUNDED)
     return np.flatnonzero((share >= IDENTIFIABLE) | open_ends | bounded)
 
 
-def _as_printed(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _round_weights(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weights of an eigenvector's parameters, small parts dropped, of two digits; and which were kept, the largest first."""
     lead = int(np.argmax(np.abs(vector)))
     weights = (vector / prior_sd) / (vector[lead] / prior_sd[lead])
@@ -211,7 +211,7 @@ def _as_printed(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, n
     return rounded, kept
 
 
-def _sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: np.ndarray) -> Combination | None:
+def _find_sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: np.ndarray) -> Combination | None:
     """The best determined combination, if it is of several parameters and known much better than each."""
     best = directions[0] if directions else None
     if best is None or len(best.weights) < 2 or best.value <= 0:
@@ -220,20 +220,22 @@ def _sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: 
     return best if best.sd / best.value < _SHARPER * singly else None
 
 
-def _one_by_one(
+def _contract_parameters(
     names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
 ) -> tuple[ParameterContraction, ...]:
-    sd, found = np.sqrt(np.diag(covariance)), []
+    sd, contractions = np.sqrt(np.diag(covariance)), []
     for i, name in enumerate(names):
         correlation = covariance[i] / np.maximum(sd[i] * sd, 1e-300)
         correlation[i] = 0.0
         other = int(np.argmax(np.abs(correlation)))
-        alike = (names[other], float(correlation[other])) if len(names) > 1 else ("", 0.0)
+        correlated = (names[other], float(correlation[other])) if len(names) > 1 else ("", 0.0)
         # Information on one parameter with all others known: that of the measurements and that of the prior.
-        alone = float(np.linalg.inv(covariance)[i, i])
-        inflation = float(covariance[i, i] * alone)
-        found.append(ParameterContraction(name, float(value[i]), float(sd[i]), float(prior_sd[i]), *alike, inflation))
-    return tuple(found)
+        information = float(np.linalg.inv(covariance)[i, i])
+        inflation = float(covariance[i, i] * information)
+        contractions.append(
+            ParameterContraction(name, float(value[i]), float(sd[i]), float(prior_sd[i]), *correlated, inflation)
+        )
+    return tuple(contractions)
 
 
 def _collinearity(scaled: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
 
-def noise_free_posterior(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
+def predict_posterior(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
     """True values z, and the covariance that readings without noise would leave there, at the noise scales of that point."""
 
     def residuals(at: Array, data: Any) -> Array:

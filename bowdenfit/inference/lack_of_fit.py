@@ -30,14 +30,14 @@ from bowdenfit.model import Model
 _FRICTION = ("friction", "friction_model")
 _MANY = 30  # readings from which their own scatter weighs them
 _MOST_LEVELS = 24  # loads that are each asked about
-_OF_CURVE, _OF_PLACE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
+_CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
 _LEAST_FREEDOM = 2.0
-_LEAST_TO_STAND_OUT = 5.0  # degrees of freedom from which one reading can be told from the scatter of the others
-_BELIEVED = (1e-3, 1e3)  # scatter in units of what a prior expects
+_LEAST_OUTLIER_FREEDOM = 5.0  # degrees of freedom from which one reading can be told from the scatter of the others
+_PLAUSIBLE_SCATTER = (1e-3, 1e3)  # scatter in units of what a prior expects
 _FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
 
 
-def departures(
+def find_departures(
     basin: Basin, scale: np.ndarray, reach: Mapping[str, float]
 ) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
     """Every departure that was asked about, the least likely by chance first; and single readings that are far out.
@@ -48,35 +48,40 @@ def departures(
         reach: Half of the 90 % interval of each parameter that is identified, in its shown unit.
     """
     model = basin.problem.posterior.model
-    system = group_residuals(model, _weighed_by_scatter(basin, model, scale))
-    asked = [each for readings in system.readings for each in _departures_of(system, readings)]
-    corrected = (replace(each, chance=min(each.chance * len(asked), 1.0)) for each in asked)
-    judged = (_drifting(basin, reach, system, each) if each.against == ZERO else each for each in corrected)
-    found = tuple(sorted(judged, key=lambda each: (each.chance, -each.size)))
-    return found, _far_readings(system)
+    system = group_residuals(model, _reweigh_by_scatter(basin, model, scale))
+    candidates = [departure for readings in system.readings for departure in _test_departures(system, readings)]
+    corrected = (replace(departure, p_value=min(departure.p_value * len(candidates), 1.0)) for departure in candidates)
+    assessed = (
+        _assess_drift(basin, reach, system, departure) if departure.against == ZERO else departure
+        for departure in corrected
+    )
+    ordered = tuple(sorted(assessed, key=lambda departure: (departure.p_value, -departure.size)))
+    return ordered, _find_far_readings(system)
 
 
-def _drifting(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, found: Departure) -> Departure:
+def _assess_drift(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, departure: Departure) -> Departure:
     """By how much a zero drifts, and how much that moves the coefficients: by a fit with the drift taken off the readings."""
-    readings = next(r for r in system.readings if r.table == found.table and r.inside)
+    readings = next(r for r in system.readings if r.table == departure.table and r.inside)
     x, whole = readings.at[ZERO], np.zeros(len(system.residuals))
     whole[readings.rows] = x / (readings.unit * readings.scatter)
-    rest = whole - system.followed @ (system.followed.T @ whole)
-    drift = float(rest @ system.residuals / (rest @ rest))
-    ends = _ends(readings, readings.at[ORDER], np.ones(len(x), dtype=bool))[2:]
-    said = replace(found, low=-drift, high=drift, at_low=ends[0], at_high=ends[1], moved=0.0)
-    if found.chance >= FALSE_ALARM:
-        return said
-    problem, z = basin.problem, basin.found["z"]
+    remaining = whole - system.followed @ (system.followed.T @ whole)
+    drift = float(remaining @ system.residuals / (remaining @ remaining))
+    ends = _compare_thirds(readings, readings.at[ORDER], np.ones(len(x), dtype=bool))[2:]
+    drifting = replace(departure, low=-drift, high=drift, at_low=ends[0], at_high=ends[1], moved=0.0)
+    if departure.p_value >= FALSE_ALARM:
+        return drifting
+    problem, z = basin.problem, basin.solution["z"]
     terms = zip(problem.posterior.model.terms, problem.posterior.data, strict=True)
-    data = tuple(_without(term, of, x * drift) if term.name == found.table else of for term, of in terms)
-    steady = replace(problem, posterior=replace(problem.posterior, given=data)).solve(z, basin.at_end, z)
-    shift = np.abs(steady["values"] - basin.found["values"])
+    data = tuple(_subtract_drift(term, of, x * drift) if term.name == departure.table else of for term, of in terms)
+    steady = replace(problem, posterior=replace(problem.posterior, data_override=data)).solve(z, basin.at_end, z)
+    shift = np.abs(steady["values"] - basin.solution["values"])
     friction = [(i, p) for i, p in enumerate(basin.parameters) if p.role in _FRICTION and reach.get(p.name, 0) > 0]
-    return replace(said, moved=max((float(shift[i]) * p.shown_scale / reach[p.name] for i, p in friction), default=0.0))
+    return replace(
+        drifting, moved=max((float(shift[i]) * p.shown_scale / reach[p.name] for i, p in friction), default=0.0)
+    )
 
 
-def _without(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any]:
+def _subtract_drift(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any]:
     """Data of runs of which something is taken off each log ratio inside them."""
     cell, weight = term.inside.cell, term.inside.weight
     n = len(data["mean"])
@@ -84,83 +89,90 @@ def _without(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any
     return data | {"mean": data["mean"] - mean}
 
 
-def _far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
+def _find_far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
     """By externally studentized residuals, which a reading itself does not enlarge (Draper and Smith, chapter 8).
 
     Not of readings inside runs, whose noise may well grow with the load.
     """
     from scipy.special import stdtr
 
-    whole = [r for r in system.readings if not r.inside and r.freedom >= _LEAST_TO_STAND_OUT]
-    found, among = [], sum(int(np.sum(readings.used)) for readings in whole)
+    whole = [r for r in system.readings if not r.inside and r.freedom >= _LEAST_OUTLIER_FREEDOM]
+    far_readings, among = [], sum(int(np.sum(readings.used)) for readings in whole)
     for readings in whole:
         residuals, freedom = system.residuals[readings.rows], readings.freedom
         left = np.maximum(1 - np.sum(system.followed[readings.rows] ** 2, axis=1), 0.0)
         share = residuals**2 / (np.maximum(left, _FOLLOWED) * np.sum(residuals**2))  # of all scatter, the reading's own
         t = np.sqrt((freedom - 1) * share / np.maximum(1 - share, 1e-12))
-        chance = np.where(readings.used & (left > _FOLLOWED), 2 * stdtr(freedom - 1, -t) * among, 1.0)
-        far = np.flatnonzero(chance < FALSE_ALARM)
-        found += [FarReading(readings.table, readings.labels[i], float(chance[i]), float(t[i])) for i in far]
-    return tuple(sorted(found, key=lambda each: each.chance))
+        p_value = np.where(readings.used & (left > _FOLLOWED), 2 * stdtr(freedom - 1, -t) * among, 1.0)
+        far = np.flatnonzero(p_value < FALSE_ALARM)
+        far_readings += [FarReading(readings.table, readings.labels[i], float(p_value[i]), float(t[i])) for i in far]
+    return tuple(sorted(far_readings, key=lambda reading: reading.p_value))
 
 
-def _weighed_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Solution:
+def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Solution:
     """The minimum where each table counts by the scatter that it was found to have, not by what its prior expects.
 
     A table that scatters far less than expected is else pulled off its own best by the others, and seems not to fit.
     """
-    problem, found, index = basin.problem, basin.found, model.space.index
-    pin, start = np.where(problem.noise, 0.0, found["z"]), 0
+    problem, solution, index = basin.problem, basin.solution, model.space.index
+    pin, start = np.where(problem.noise, 0.0, solution["z"]), 0
     for term in model.terms:
         names = (term.noise, getattr(term, "reading_noise", ""))
         for name, (count, _) in zip(names, term.residual_blocks, strict=False):
             if name in index and count:
                 at = index[name]
-                value = np.clip(scale[start], *_BELIEVED) * found["values"][at]
+                value = np.clip(scale[start], *_PLAUSIBLE_SCATTER) * solution["values"][at]
                 prior = model.space.free[at].prior
                 pin[at] = clipped_z(prior, value)
             start += count
-    again = problem.solve(found["z"], basin.at_end, pin)
-    return again if again["succeeded"] and np.all(np.isfinite(again["jacobian"])) else found
+    reweighed = problem.solve(solution["z"], basin.at_end, pin)
+    return reweighed if reweighed["succeeded"] and np.all(np.isfinite(reweighed["jacobian"])) else solution
 
 
-def _departures_of(system: ResidualGroups, readings: ResidualGroup) -> Iterator[Departure]:
+def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterator[Departure]:
     """Of the readings of one table."""
     for group in dict.fromkeys(readings.group):
-        mine = readings.used & (np.array(readings.group) == group)
+        selected = readings.used & (np.array(readings.group) == group)
         for against, x in readings.at.items():
-            if not (mine.any() and np.all(np.isfinite(x[mine])) and np.ptp(x[mine]) > 0):
+            if not (selected.any() and np.all(np.isfinite(x[selected])) and np.ptp(x[selected]) > 0):
                 continue
-            for columns in _columns(against, x, mine, bool(group)):
+            for columns in _departure_columns(against, x, selected, bool(group)):
                 lever = np.ones(len(x)) if against == ZERO else readings.lever
-                tested = _tested(system, readings, np.where(mine[:, None], columns, 0.0) * lever[:, None])
+                tested = _test_columns(system, readings, np.where(selected[:, None], columns, 0.0) * lever[:, None])
                 if tested is not None:
-                    yield Departure(readings.table, group, against, readings.inside, *tested, *_ends(readings, x, mine))
+                    yield Departure(
+                        readings.table,
+                        group,
+                        against,
+                        readings.inside,
+                        *tested,
+                        *_compare_thirds(readings, x, selected),
+                    )
 
 
-def _columns(against: str, x: np.ndarray, mine: np.ndarray, of_curve: bool) -> Iterator[np.ndarray]:
+def _departure_columns(against: str, x: np.ndarray, selected: np.ndarray, of_curve: bool) -> Iterator[np.ndarray]:
     """Columns of the ways in which readings could depend on where they were taken, (reading, column)."""
-    if against == LOAD and np.all(x[mine] > 0):
-        load = np.where(mine, x, 1.0)
-        yield np.column_stack([np.log(load), np.min(x[mine]) / load])
-        levels = np.unique(x[mine])
-        if 3 <= len(levels) <= min(_MOST_LEVELS, mine.sum() // 2):
+    if against == LOAD and np.all(x[selected] > 0):
+        load = np.where(selected, x, 1.0)
+        yield np.column_stack([np.log(load), np.min(x[selected]) / load])
+        levels = np.unique(x[selected])
+        if 3 <= len(levels) <= min(_MOST_LEVELS, selected.sum() // 2):
             yield (x[:, None] == levels[None, :]).astype(float)
     elif against == SPEED:
-        yield np.log(np.maximum(np.where(mine, x, 1.0), np.max(x[mine]) / 1e3))[:, None]
+        yield np.log(np.maximum(np.where(selected, x, 1.0), np.max(x[selected]) / 1e3))[:, None]
     elif against in (STROKE, ZERO):
         yield x[:, None].astype(float)
     elif against == GROUP:
-        yield (x[:, None] == np.unique(x[mine])[None, :]).astype(float)
+        yield (x[:, None] == np.unique(x[selected])[None, :]).astype(float)
     else:
         if against == WRAP_ANGLE:
             yield np.ones((len(x), 1))  # what is there without any bend: of all departures with the bend the likeliest
-        low, high = np.min(x[mine]), np.max(x[mine])
-        degree = min(_OF_CURVE if of_curve else _OF_PLACE, len(np.unique(x[mine])) - 1)
-        yield np.polynomial.legendre.legvander(np.where(mine, 2 * (x - low) / (high - low) - 1, 0.0), degree)
+        low, high = np.min(x[selected]), np.max(x[selected])
+        degree = min(_CURVE_DEGREE if of_curve else _POSITION_DEGREE, len(np.unique(x[selected])) - 1)
+        yield np.polynomial.legendre.legvander(np.where(selected, 2 * (x - low) / (high - low) - 1, 0.0), degree)
 
 
-def _tested(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
+def _test_columns(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
     """Probability of a departure as large by chance, and its size; None where it cannot be asked about."""
     from scipy.special import fdtrc
 
@@ -173,20 +185,20 @@ def _tested(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray
     freedom = readings.freedom - float(np.sum(part**2))  # the parameters carry some of a departure to other tables
     if k == 0 or freedom < _LEAST_FREEDOM:
         return None
-    rest = system.residuals[readings.rows] - part @ along
-    variance = (float(np.sum(rest**2)) + readings.extra) / freedom
-    chance = float(fdtrc(k, freedom, float(along @ along) / k / max(variance, 1e-300)))
-    if len(rest) >= _MANY:
-        covariance = (part * rest[:, None] ** 2).T @ part * (len(rest) / max(len(rest) - k, 1))
+    remaining = system.residuals[readings.rows] - part @ along
+    variance = (float(np.sum(remaining**2)) + readings.extra) / freedom
+    p_value = float(fdtrc(k, freedom, float(along @ along) / k / max(variance, 1e-300)))
+    if len(remaining) >= _MANY:
+        covariance = (part * remaining[:, None] ** 2).T @ part * (len(remaining) / max(len(remaining) - k, 1))
         robust = float(along @ np.linalg.lstsq(covariance, along, rcond=None)[0])
-        chance = max(chance, float(fdtrc(k, freedom, robust / k)))
+        p_value = max(p_value, float(fdtrc(k, freedom, robust / k)))
     moved = part @ along * readings.unit * readings.scatter
     of = readings.reading if readings.effect is None else readings.effect
-    return chance, float(np.sqrt(np.mean(moved**2) / max(np.mean(of**2), 1e-300)))
+    return p_value, float(np.sqrt(np.mean(moved**2) / max(np.mean(of**2), 1e-300)))
 
 
-def _ends(readings: ResidualGroup, x: np.ndarray, mine: np.ndarray) -> Sequence[float]:
+def _compare_thirds(readings: ResidualGroup, x: np.ndarray, selected: np.ndarray) -> Sequence[float]:
     """Where the lowest and the highest third were taken, and how much more is read there than the model says."""
-    low, high = np.quantile(x[mine], (1 / 3, 2 / 3))
-    thirds = [mine & (x <= low), mine & (x >= high)]
+    low, high = np.quantile(x[selected], (1 / 3, 2 / 3))
+    thirds = [selected & (x <= low), selected & (x >= high)]
     return [float(np.mean(x[third])) for third in thirds] + [readings.excess(third) for third in thirds]

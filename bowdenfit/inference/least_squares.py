@@ -15,14 +15,14 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.departure import Departure, FarReading
-from bowdenfit.inference.disagreement import Disagreement, table_disagreements
+from bowdenfit.inference.disagreement import Disagreement, find_disagreements
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.inference.lack_of_fit import departures
+from bowdenfit.inference.lack_of_fit import find_departures
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.minimum import LocalMinimum, lowest_minimum
+from bowdenfit.inference.minimum import LocalMinimum, find_lowest_minimum
 from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total_squares
-from bowdenfit.inference.other_minima import PINS, fitting_as_well, range_of_minima
-from bowdenfit.inference.profiles import UNKNOWN, ProfileIntervals
+from bowdenfit.inference.other_minima import PINS, find_rivals, range_of_minima
+from bowdenfit.inference.profiles import UNKNOWN_LIMITS, ProfileIntervals
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.inference.solver import ROUGH
 from bowdenfit.parameters.priors import LogNormal
@@ -105,13 +105,15 @@ class LeastSquares(Display):
 
     def sentences(self) -> list[str]:
         """How many estimates there are."""
-        told = [name for name, estimate in self.estimates.items() if estimate.identified]
-        said = f"Least squares tell {len(told)} of {len(self.estimates)} parameters"
-        return [f"{said}." if self.converged else f"{said}, but did not converge: {self.message}."]
+        identified = [name for name, estimate in self.estimates.items() if estimate.identified]
+        sentence = f"Least squares tell {len(identified)} of {len(self.estimates)} parameters"
+        return [f"{sentence}." if self.converged else f"{sentence}, but did not converge: {self.message}."]
 
     def _table(self) -> Rows:
         shown = ("value", "standard_error", "lower", "upper", "remark")
-        return [{"parameter": n} | {key: vars(e)[key] for key in shown} for n, e in self.estimates.items()], self.units or {}
+        return [
+            {"parameter": n} | {key: vars(e)[key] for key in shown} for n, e in self.estimates.items()
+        ], self.units or {}
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ class MaximumPosterior:
     covariance: np.ndarray
 
 
-def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
+def find_maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
     """Maximum of the posterior with the noise scales at their prior medians, from every start that a parameter names.
 
     Raises:
@@ -130,30 +132,30 @@ def maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPos
     """
     n = posterior.model.space.size
     problem = Problem(posterior, objective, with_priors=True)
-    starts = product(*map(_starts, posterior.model.space.free))
-    found = min((problem.solve(np.array(start)) for start in starts), key=_squares_with_priors)
-    if not all(np.all(np.isfinite(r)) for r in found["residuals"].values()):
+    starts = product(*map(_starting_z, posterior.model.space.free))
+    solution = min((problem.solve(np.array(start)) for start in starts), key=_squares_with_priors)
+    if not all(np.all(np.isfinite(r)) for r in solution["residuals"].values()):
         raise ConvergenceError(
             "the model cannot be computed at the prior medians; the usual cause is a prior or a fixed value that is "
             "orders of magnitude off: check the units under [friction] and [prior]."
         )
     # The prior of each z has unit information; a noise scale gets that alone, its residuals say nothing here.
-    information = found["jacobian"].T @ found["jacobian"] + np.eye(n)
-    return MaximumPosterior(found["z"], np.linalg.inv(information))
+    information = solution["jacobian"].T @ solution["jacobian"] + np.eye(n)
+    return MaximumPosterior(solution["z"], np.linalg.inv(information))
 
 
-def _starts(parameter: Parameter) -> tuple[float, ...]:
+def _starting_z(parameter: Parameter) -> tuple[float, ...]:
     if np.isnan(parameter.first_look):
         return parameter.starts
     return (*parameter.starts, clipped_z(parameter.prior, parameter.first_look))
 
 
-def _squares_with_priors(found: Solution) -> float:
-    squares = total_squares(found)
+def _squares_with_priors(solution: Solution) -> float:
+    squares = total_squares(solution)
     return squares if np.isfinite(squares) else float("inf")
 
 
-def least_squares(
+def fit_least_squares(
     posterior: LogDensity, objective: Objective, start: np.ndarray, intervals: bool = True
 ) -> LeastSquares:
     """Least squares without priors, from the maximum of the posterior.
@@ -168,62 +170,62 @@ def least_squares(
         start: z to start from.
         intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
-    at, profiled = lowest_minimum(Problem(posterior, objective), start, intervals)
-    basin, found, space, terms = at.basin, at.basin.found, posterior.model.space, posterior.model.terms
-    others = _pinned_elsewhere(basin.problem, start)
-    rivals = fitting_as_well(found, others, at.scale, at.about.readings.shape[1])
-    estimates = _estimates(at, rivals, profiled.of)
-    message = _stopped(found, profiled)
-    shown = {p.name: v * p.shown_scale for p, v in zip(space.free, found["values"], strict=True)}
+    minimum, profiled = find_lowest_minimum(Problem(posterior, objective), start, intervals)
+    basin, solution, space, terms = minimum.basin, minimum.basin.solution, posterior.model.space, posterior.model.terms
+    others = _solve_pinned_elsewhere(basin.problem, start)
+    rivals = find_rivals(solution, others, minimum.scale, minimum.linearized.readings.shape[1])
+    estimates = _make_estimates(minimum, rivals, profiled.limits)
+    message = _describe_failure(solution, profiled)
+    shown = {p.name: v * p.shown_scale for p, v in zip(space.free, solution["values"], strict=True)}
     shown |= {p.name: (p.fixed or 0.0) * p.shown_scale for p in space.fixed}
     return LeastSquares(
         estimates | {p.name: Estimate(shown[p.name], np.nan, True, "fixed") for p in space.fixed},
-        {t.name: at.residual_sd[t.name] * float(shown[t.noise]) for t in terms},
-        found["readings"],
-        at.about.condition_number,
-        sum_of_squares(found),
-        found["z"],
+        {t.name: minimum.residual_sd[t.name] * float(shown[t.noise]) for t in terms},
+        solution["readings"],
+        minimum.linearized.condition_number,
+        sum_of_squares(solution),
+        solution["z"],
         not message,
         message,
-        table_disagreements(terms, space.free, found),
-        *departures(basin, at.scale, {name: each.reach for name, each in estimates.items() if each.identified}),
+        find_disagreements(terms, space.free, solution),
+        *find_departures(
+            basin, minimum.scale, {name: estimate.reach for name, estimate in estimates.items() if estimate.identified}
+        ),
         units={p.name: p.unit for p in space.parameters},
     )
 
 
-def _stopped(found: Solution, profiled: ProfileIntervals) -> str:
+def _describe_failure(solution: Solution, profiled: ProfileIntervals) -> str:
     """Why the solver has found no minimum; empty where it has."""
-    if not found["succeeded"]:
+    if not solution["succeeded"]:
         return "the solver stopped before it met its tolerance"
     if profiled.stuck:
-        return (
-            "the solver is stuck at a kink of the sum of squares, which may be far lower elsewhere; sampling gets past kinks"
-        )
+        return "the solver is stuck at a kink of the sum of squares, which may be far lower elsewhere; sampling gets past kinks"
     return "" if profiled.lower is None else "every minimum that was found led to a lower one; sampling needs none"
 
 
-def _pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
+def _solve_pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
     """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
     parameters = problem.posterior.model.space.free
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
-    each = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
-    return [problem.solve(start, this, np.where(this, z, 0.0), ROUGH) for this, z in product(each, PINS)]
+    masks = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
+    return [problem.solve(start, mask, np.where(mask, z, 0.0), ROUGH) for mask, z in product(masks, PINS)]
 
 
-def _estimates(
-    at: LocalMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
+def _make_estimates(
+    minimum: LocalMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
 ) -> dict[str, Estimate]:
     """Estimates of the free parameters but for noise scales, from their standard errors in z and their limits."""
-    basin, error, determined = at.basin, at.error, at.determined
-    found, estimates = basin.found, {}
+    basin, error, determined = minimum.basin, minimum.error, minimum.determined
+    solution, estimates = basin.solution, {}
     for i, p in enumerate(basin.parameters):
         if basin.problem.noise[i]:
             continue
-        value, limit = float(found["values"][i] * p.shown_scale), profiled.get(p.name, UNKNOWN)
-        sd = float(abs(found["slope"][i] * error[i]) * p.shown_scale)
+        value, limit = float(solution["values"][i] * p.shown_scale), profiled.get(p.name, UNKNOWN_LIMITS)
+        sd = float(abs(solution["slope"][i] * error[i]) * p.shown_scale)
         others = [float(r["values"][i]) * p.shown_scale for r in rivals]
         if basin.at_end[i]:
-            remark = _at_bound(value, limit, found["z"][i] > 0)
+            remark = _describe_bound(value, limit, solution["z"][i] > 0)
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit, at_bound=True)
         elif not determined[i] or (p.role == "elastic" and isinstance(p.prior, LogNormal) and sd > value):
             # A positive quantity that may as well be 0 or twice as large is none that was measured.
@@ -237,11 +239,13 @@ def _estimates(
     return estimates
 
 
-def _at_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> str:
+def _describe_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> str:
     """What is known of a parameter whose sum of squares falls all the way to an end of its range."""
     lower, upper = limit
     if at_upper_end:
         least = "" if np.isnan(lower) else f"; at least {significant(lower)}"
         return f"no minimum inside its range: runs to its upper end, {significant(value)}{least}"
-    most = "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {significant(upper)}"
+    most = (
+        "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {significant(upper)}"
+    )
     return f"no finite minimum: runs to its lower end, {significant(value)}{most}"

@@ -23,7 +23,7 @@ from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moment_matching import match_moments
 from bowdenfit.inference.psis import reliable_k, smooth_weights
-from bowdenfit.inference.walkers import WalkerPrograms, compiled_walkers
+from bowdenfit.inference.walkers import WalkerPrograms, compile_density_walkers
 from bowdenfit.kinds.run_parts import RunParts
 
 # A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
@@ -53,21 +53,23 @@ class LooDensity:
         terms = self.posterior.model.terms
         return tuple((t.name, label) for t in terms for label in self.parts.get(t.name, t).labels)
 
-    def _each(
+    def _reading_likelihoods(
         self, z: Float[Array, " free"], data: Any, without: Any
     ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
         """Log likelihood of everything, and of each reading given all others of its mounting."""
-        values, found = self.posterior.model.space.constrain(z), self.posterior.log_likelihoods(z, data)
-        each = []
+        values, by_term = self.posterior.model.space.constrain(z), self.posterior.log_likelihoods(z, data)
+        readings = []
         for term in self.posterior.model.terms:
-            whole = found[term.name]
+            whole = by_term[term.name]
             if term.name in self.parts:
                 log_likelihood = partial(term.log_likelihood, values)
-                rest = jax.vmap(log_likelihood)(without[term.name])  # in all runs, of which only that of the part differs
+                without_part = jax.vmap(log_likelihood)(
+                    without[term.name]
+                )  # in all runs, of which only that of the part differs
                 run = self.parts[term.name].run
-                whole = whole[run] - rest[jnp.arange(len(run)), run]
-            each.append(whole)
-        return sum((jnp.sum(part) for part in found.values()), jnp.zeros(())), jnp.concatenate(each)
+                whole = whole[run] - without_part[jnp.arange(len(run)), run]
+            readings.append(whole)
+        return sum((jnp.sum(part) for part in by_term.values()), jnp.zeros(())), jnp.concatenate(readings)
 
     @property
     def refits(self) -> SamplerSettings:
@@ -77,27 +79,29 @@ class LooDensity:
         return self.settings.model_copy(update={"n_walkers": walkers})
 
     def _density(
-        self, z: Float[Array, " free"], given: tuple[Any, Any, Float[Array, " readings"]]
+        self, z: Float[Array, " free"], arguments: tuple[Any, Any, Float[Array, " readings"]]
     ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
         """Log density of what is counted, and log likelihood of every reading."""
-        data, without, counts = given
-        everything, each = self._each(z, data, without)
-        total = everything - jnp.sum(jnp.where(counts > 0, 0.0, each)) - 0.5 * jnp.sum(z**2)
-        return jnp.where(jnp.isnan(total), -jnp.inf, total), each
+        data, without, counts = arguments
+        everything, readings = self._reading_likelihoods(z, data, without)
+        total = everything - jnp.sum(jnp.where(counts > 0, 0.0, readings)) - 0.5 * jnp.sum(z**2)
+        return jnp.where(jnp.isnan(total), -jnp.inf, total), readings
 
     @cached_property
     def _program(self) -> Callable[..., Any]:
         shape = jax.ShapeDtypeStruct((_ROWS, self.posterior.model.space.size), jnp.float64)
-        return compile_program(jax.vmap(self._density, (0, None)), shape, self.without(None))
+        return compile_program(jax.vmap(self._density, (0, None)), shape, self.data_without(None))
 
     @cached_property
     def programs(self) -> WalkerPrograms:
         """Of fits without any of the readings."""
         space = self.posterior.model.space
-        given, frames = self.without(None), maps_without_ridge(space)
-        return compiled_walkers(lambda z, given: self._density(z, given)[0], given, space.size, self.refits, frames)
+        arguments, frames = self.data_without(None), maps_without_ridge(space)
+        return compile_density_walkers(
+            lambda z, arguments: self._density(z, arguments)[0], arguments, space.size, self.refits, frames
+        )
 
-    def without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
+    def data_without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
         """Data of the density without a reading, or with all."""
         counts = np.array([float(i != reading) for i in range(len(self.names))])
         return self.posterior.data, {name: parts.data for name, parts in self.parts.items()}, counts
@@ -109,9 +113,9 @@ class LooDensity:
             z: Where.
             without: Position of a reading that the density leaves out; none if omitted.
         """
-        given = self.without(without)
-        density, each = run_in_batches(lambda part: self._program(part, given), _ROWS, z)
-        return density, each
+        arguments = self.data_without(without)
+        density, readings = run_in_batches(lambda part: self._program(part, arguments), _ROWS, z)
+        return density, readings
 
 
 @dataclass(frozen=True)
@@ -126,13 +130,13 @@ class LooRefits:
         seed: Seed of the refits.
     """
 
-    readings: LooDensity
+    density: LooDensity
     z: np.ndarray
-    each: np.ndarray
+    log_likelihood: np.ndarray
     share: float
     seed: int
 
-    def without(self, reading: int, limit: float) -> tuple[float, float, LooMethod]:
+    def predict_without(self, reading: int, limit: float) -> tuple[float, float, LooMethod]:
         """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
 
         Args:
@@ -141,21 +145,21 @@ class LooRefits:
         """
 
         def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            density, each = self.readings.evaluate(at)
-            return density, each[:, reading]
+            density, log_likelihood = self.density.evaluate(at)
+            return density, log_likelihood[:, reading]
 
         elpd, k, error = match_moments(self.z, evaluate, self.share)
         if k <= limit:
             return elpd, error, "moment matching"
-        elpd, error, settled = self.refit_without(reading)
-        return elpd, error, "refit" if settled else "rough"
+        elpd, error, converged = self.refit_without(reading)
+        return elpd, error, "refit" if converged else "rough"
 
     def refit_without(self, reading: int) -> tuple[float, float, bool]:
         """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
-        top = float(np.max(self.each[:, reading]))
+        top = float(np.max(self.log_likelihood[:, reading]))
 
         def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
-            return {_RATIO: np.exp(self.readings.evaluate(z)[1][:, reading] - top)}
+            return {_RATIO: np.exp(self.density.evaluate(z)[1][:, reading] - top)}
 
         chain = self.chain_without(reading, likelihood)
         mean = float(chain.quantities[_RATIO].mean())
@@ -173,16 +177,18 @@ class LooRefits:
         """
         from bowdenfit.inference.ensemble import sample
 
-        readings = self.readings
-        weights = np.exp(smooth_weights(-self.each[:, reading], self.share)[0])
+        density = self.density
+        weights = np.exp(smooth_weights(-self.log_likelihood[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
         own_seed = int(np.random.SeedSequence([self.seed, reading]).generate_state(1)[0])
-        asked = SamplingRequest(readings.posterior, start, readings.refits, own_seed, quantities, diagnose=_without_drift)
-        return sample(asked, readings.programs, readings.without(reading))
+        request = SamplingRequest(
+            density.posterior, start, density.refits, own_seed, quantities, diagnose=_diagnose_without_drift
+        )
+        return sample(request, density.programs, density.data_without(reading))
 
 
 def leave_one_out(
-    readings: LooDensity,
+    density: LooDensity,
     z: np.ndarray,
     log_likelihood: Mapping[str, np.ndarray],
     n_effective: float,
@@ -204,22 +210,22 @@ def leave_one_out(
         wanted: Positions of the readings in question among `readings.names`; all if omitted.
         report: Called with a sentence before each reading that takes longer.
     """
-    if readings.parts:
-        each = readings.evaluate(z.reshape(-1, z.shape[-1]))[1].reshape(*z.shape[:2], -1)
+    if density.parts:
+        by_reading = density.evaluate(z.reshape(-1, z.shape[-1]))[1].reshape(*z.shape[:2], -1)
     else:
-        each = np.concatenate([log_likelihood[term.name] for term in readings.posterior.model.terms], axis=-1)
-    chosen = list(range(each.shape[-1])) if wanted is None else list(wanted)
+        by_reading = np.concatenate([log_likelihood[term.name] for term in density.posterior.model.terms], axis=-1)
+    chosen = list(range(by_reading.shape[-1])) if wanted is None else list(wanted)
     flat, limit = z.reshape(-1, z.shape[-1]), reliable_k(z.shape[0] * z.shape[1])
-    leaving_out = LooRefits(readings, flat, each.reshape(len(flat), -1), min(n_effective / len(flat), 1.0), seed)
-    quick = psis_loo({"": each[..., chosen]}, n_effective)
+    refits = LooRefits(density, flat, by_reading.reshape(len(flat), -1), min(n_effective / len(flat), 1.0), seed)
+    quick = psis_loo({"": by_reading[..., chosen]}, n_effective)
     elpd, error = quick.elpd.copy(), quick.error.copy()
     how: list[LooMethod] = ["importance sampling"] * len(chosen)
-    for place in np.flatnonzero(~(quick.pareto_k <= limit)):
-        report(f"leaving out {' '.join(readings.names[chosen[place]])}")
-        elpd[place], error[place], how[place] = leaving_out.without(chosen[place], limit)
-    return LooPrediction(elpd, quick.pareto_k, error, tuple(readings.names[i] for i in chosen), tuple(how))
+    for position in np.flatnonzero(~(quick.pareto_k <= limit)):
+        report(f"leaving out {' '.join(density.names[chosen[position]])}")
+        elpd[position], error[position], how[position] = refits.predict_without(chosen[position], limit)
+    return LooPrediction(elpd, quick.pareto_k, error, tuple(density.names[i] for i in chosen), tuple(how))
 
 
-def _without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
+def _diagnose_without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
     """Diagnostics without drift, which cannot be told from chance with as few effective draws as a refit needs."""
-    return {name: replace(found, drift=0.0) for name, found in diagnose_all(draws, n_ensembles).items()}
+    return {name: replace(diagnostics, drift=0.0) for name, diagnostics in diagnose_all(draws, n_ensembles).items()}

@@ -28,11 +28,11 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.padding import rounded_up
 
 _SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
-_LOST = 1e100  # stands for a residual that cannot be computed, so that no step goes there
+_UNCOMPUTABLE = 1e100  # stands for a residual that cannot be computed, so that no step goes there
 _BISECTIONS = 40
 _LONGER = 1.1  # an undamped step may be longer than the radius by this factor
 _ACCEPTED = 1e-4  # part of the predicted fall of the sum of squares that a step must reach
-_PLAIN: Any = optx.RESULTS.successful
+_SUCCESS: Any = optx.RESULTS.successful
 
 
 class _Tangent(eqx.Module):
@@ -55,7 +55,7 @@ class ScaledDescent(optx.AbstractDescent):
     def query(self, y: Array, f_info: Any, state: _Tangent) -> _Tangent:  # noqa: ARG002
         """Singular values at an accepted point, after which a step of any radius is a division."""
         jacobian = f_info.jac.as_matrix()
-        size = _largest(jacobian, state.size)
+        size = _largest_norms(jacobian, state.size)
         left, singular, directions = jnp.linalg.svd(_scaled(jacobian, size), full_matrices=False)
         kept = singular > _SINGULAR * singular[0]
         return _Tangent(
@@ -77,7 +77,7 @@ class ScaledDescent(optx.AbstractDescent):
         most = _norm(slope) / step_size
         _, damping = jax.lax.fori_loop(0, _BISECTIONS, halved, (1e-12 * most, most))
         step = damped(jnp.where(_norm(damped(0.0)) <= _LONGER * step_size, 0.0, damping))
-        return -_scaled(state.directions.T @ step, state.size), _PLAIN
+        return -_scaled(state.directions.T @ step, state.size), _SUCCESS
 
 
 class _Radius(eqx.Module):
@@ -118,11 +118,11 @@ class RadiusSearch(optx.AbstractSearch):
         grows = (ratio >= 0.75) | (length < 0.9 * state.radius)
         radius = jnp.where(grows, 2 * length, state.radius)
         radius = jnp.where(ratio > 0.25, radius, shrinks * jnp.minimum(state.radius, 10 * length))
-        size = jnp.where(accepted, _largest(f_eval_info.jac.as_matrix(), state.size), state.size)
+        size = jnp.where(accepted, _largest_norms(f_eval_info.jac.as_matrix(), state.size), state.size)
         extent = _norm(size * y_eval)
         radius = jnp.where(first_step, self.first * jnp.where(extent > 0, extent, 1.0), radius)
         predicted, actual = (jnp.where(first_step, 1.0, change) for change in (predicted, actual))
-        return radius, accepted, _PLAIN, _Radius(radius, size, predicted, actual)
+        return radius, accepted, _SUCCESS, _Radius(radius, size, predicted, actual)
 
 
 class LevenbergMarquardt(optx.AbstractGaussNewton):
@@ -155,14 +155,14 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
 
 
 @cache
-def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
+def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
     """The compiled step of a solve, and its state before the first.
 
     A step takes what the solver does, whether it is the first, the accepted parameters, the state, and residuals
     and Jacobian where the step before has asked for them; it gives the accepted parameters, the state, where to evaluate
     next, and whether this is the end. Rows of zeros, which change nothing, let one program serve many tables.
     """
-    (program, state), more = _compiled(rounded_up(rows), columns), rounded_up(rows) - rows
+    (program, state), more = _compile_step(rounded_up(rows), columns), rounded_up(rows) - rows
     none, flat = np.zeros(more), np.zeros((more, columns))
 
     def step(settings: Any, first: Any, y: Any, state: Any, residuals: np.ndarray, jacobian: np.ndarray) -> Any:
@@ -172,11 +172,11 @@ def stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarra
 
 
 @cache
-def _compiled(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
+def _compile_step(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
     """The same of so many rows."""
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
     flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)
-    state = jax.eval_shape(lambda *given: _leaves(_ready(*given)[2]), settings, *arrays)
+    state = jax.eval_shape(lambda *arguments: _array_leaves(_initialize(*arguments)[2]), settings, *arrays)
     program = compile_program(_step, settings, flag, arrays[0], state, *arrays[1:], run_once=True)
     return program, [np.zeros(leaf.shape, leaf.dtype) for leaf in state]
 
@@ -185,18 +185,18 @@ def _step(
     settings: tuple[Array, ...], first: Array, y: Array, leaves: list[Array], residuals: Array, jacobian: Array
 ) -> tuple[Array, list[Array], Array, Array]:
     """One step of the solver."""
-    solver, linear, state = _ready(settings, y, residuals, jacobian)
+    solver, linear, state = _initialize(settings, y, residuals, jacobian)
     tree, static = jax.tree.structure(eqx.filter(state, eqx.is_array)), eqx.filter(state, eqx.is_array, inverse=True)
-    held = [jnp.where(first, *pair) for pair in zip(_leaves(state), leaves, strict=True)]
+    held = [jnp.where(first, *pair) for pair in zip(_array_leaves(state), leaves, strict=True)]
     state = eqx.combine(jax.tree.unflatten(tree, held), static)
     y, state, _ = solver.step(linear, y, state.y_eval, {}, state, frozenset())
     done, _ = solver.terminate(linear, y, y, {}, state, frozenset())
-    return y, _leaves(state), state.y_eval, done
+    return y, _array_leaves(state), state.y_eval, done
 
 
-def _ready(settings: tuple[Array, ...], y: Array, residuals: Array, jacobian: Array) -> tuple[Any, Any, Any]:
+def _initialize(settings: tuple[Array, ...], y: Array, residuals: Array, jacobian: Array) -> tuple[Any, Any, Any]:
     """The solver, the linear function in the model's place, and the state before the first step."""
-    values = jnp.where(jnp.isfinite(residuals), residuals, _LOST)
+    values = jnp.where(jnp.isfinite(residuals), residuals, _UNCOMPUTABLE)
     slopes = jnp.where(jnp.isfinite(jacobian), jacobian, 0.0)
 
     def linear(x: Array, at: Array) -> tuple[Array, None]:
@@ -206,12 +206,12 @@ def _ready(settings: tuple[Array, ...], y: Array, residuals: Array, jacobian: Ar
     return solver, linear, solver.init(linear, y, y, {}, shape, None, frozenset())
 
 
-def _leaves(state: Any) -> list[Array]:
+def _array_leaves(state: Any) -> list[Array]:
     """What of a state changes from step to step."""
     return jax.tree.leaves(eqx.filter(state, eqx.is_array))
 
 
-def _largest(jacobian: Array, before: Array) -> Array:
+def _largest_norms(jacobian: Array, before: Array) -> Array:
     """The largest length that each column has had."""
     return jnp.maximum(before, jnp.sqrt(jnp.sum(jacobian**2, axis=0)))
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.inference.solver import orthogonal
+from bowdenfit.inference.solver import orthogonalize
 from bowdenfit.kinds.term import Term
 
 _SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
-_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
-_DECIDES = 1e-6  # leverage from which a residual is that of a reading
+_LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
+_LEAST_LEVERAGE = 1e-6  # leverage from which a residual is that of a reading
 
 
 @dataclass(frozen=True)
@@ -53,25 +53,25 @@ def linearize(jacobian: np.ndarray) -> Linearized:
     u, s, vt = np.linalg.svd(padded, full_matrices=False)
     informed = s > _SINGULAR * max(s[0], 1e-30)
     if informed.all():
-        return Linearized(*orthogonal(jacobian), np.ones(n, dtype=bool), float(s[0] / s[-1]))
+        return Linearized(*orthogonalize(jacobian), np.ones(n, dtype=bool), float(s[0] / s[-1]))
     determined = np.sum(vt[~informed] ** 2, axis=0) <= 1e-6
     return Linearized(u[:rows, informed], vt[informed].T / s[informed], determined, float("inf"))
 
 
-def scatter_about(
+def estimate_scatter(
     terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
 ) -> tuple[np.ndarray, dict[str, float]]:
     """Scatter of the standardized residuals about the fit: for each residual, and by table (of its first block)."""
     scale = np.ones(len(leverage))
     by_table: dict[str, float] = {}
-    for name, rows, values, freedom in blocks(terms, residuals, leverage):
+    for name, rows, values, freedom in iterate_blocks(terms, residuals, leverage):
         spread = float(np.sqrt(np.sum(values**2) / freedom)) if np.isfinite(freedom) else float("nan")
         scale[rows] = spread if np.isfinite(spread) else 1.0
         by_table.setdefault(name, spread)
     return scale, by_table
 
 
-def blocks(
+def iterate_blocks(
     terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
 ) -> Iterator[tuple[str, slice, np.ndarray, float]]:
     """Table, rows, residuals and degrees of freedom of every block of residuals that scatter alike.
@@ -85,7 +85,7 @@ def blocks(
         for count, independent in term.residual_blocks:
             rows, values = slice(start, start + count), residuals[term.name][start - first : start - first + count]
             # A reading that parameters of its own fit exactly is one whatever rounding leaves; a bound that is met is none.
-            read = int(np.count_nonzero((values != 0) | (leverage[rows] > _DECIDES)))
+            read = int(np.count_nonzero((values != 0) | (leverage[rows] > _LEAST_LEVERAGE)))
             freedom = min(read, independent) - float(leverage[rows].sum())
-            yield term.name, rows, values, freedom if freedom > _FREEDOM else float("inf")
+            yield term.name, rows, values, freedom if freedom > _LEAST_FREEDOM else float("inf")
             start = rows.stop

@@ -26,7 +26,7 @@ class LogDensity:
     """
 
     model: Model
-    given: Any = None
+    data_override: Any = None
 
     def __post_init__(self) -> None:
         if jax.dtypes.canonicalize_dtype(float) != jnp.float64:
@@ -38,7 +38,7 @@ class LogDensity:
     @cached_property
     def data(self) -> tuple[dict[str, Any], ...]:
         """Data of all terms, in their order."""
-        return tuple(term.data for term in self.model.terms) if self.given is None else self.given
+        return tuple(term.data for term in self.model.terms) if self.data_override is None else self.data_override
 
     @cached_property
     def padded(self) -> tuple[dict[str, Any], ...]:

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.inference.linearized import Linearized, linearize, scatter_about
+from bowdenfit.inference.linearized import Linearized, estimate_scatter, linearize
 from bowdenfit.inference.objective import LOWER_END, Problem, has_lower_end, sum_of_squares, total_squares
-from bowdenfit.inference.profiles import Basin, ProfileIntervals, is_stuck, profile_intervals
+from bowdenfit.inference.profiles import Basin, ProfileIntervals, compute_profile_intervals, is_stuck
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
 from bowdenfit.parameters.space import Parameter
 
-_SUSPECT = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
+_NEAR_END = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
 _FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
-_FOLLOWED = 3  # times that a profile is followed to a lower minimum
-_PLACES = 12  # from which the solver starts again where it is stuck
-_FARTHEST_PLACE = 1.0  # of each from there [z]
+_MOST_FOLLOWED = 3  # times that a profile is followed to a lower minimum
+_RESTARTS = 12  # from which the solver starts again where it is stuck
+_FARTHEST_RESTART = 1.0  # of each from there [z]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class LocalMinimum:
     """
 
     basin: Basin
-    about: Linearized
+    linearized: Linearized
     active: np.ndarray
     scale: np.ndarray
     residual_sd: dict[str, float]
@@ -48,90 +48,103 @@ class LocalMinimum:
     @property
     def is_stuck(self) -> bool:
         """Whether another start is worth its time: the table that scatters least would limit a parameter by not much more."""
-        return is_stuck(self.basin.found["fall"], (NORMAL_90 * float(np.min(self.scale, initial=1.0))) ** 2)
+        return is_stuck(self.basin.solution["fall"], (NORMAL_90 * float(np.min(self.scale, initial=1.0))) ** 2)
 
 
-def lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) -> tuple[LocalMinimum, ProfileIntervals]:
+def find_lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) -> tuple[LocalMinimum, ProfileIntervals]:
     """The minimum and its limits, if `intervals`; where a profile leads to a lower one it is followed there."""
-    at = _found(problem, start)
+    minimum = _find_minimum(problem, start)
     if not intervals:
-        return at, ProfileIntervals()
-    profiled = profile_intervals(at.basin, at.scale, at.determined)
-    for _ in range(_FOLLOWED):
+        return minimum, ProfileIntervals()
+    profiled = compute_profile_intervals(minimum.basin, minimum.scale, minimum.determined)
+    for _ in range(_MOST_FOLLOWED):
         if profiled.lower is None:
             break
-        at = _found(at.basin.problem, profiled.lower["z"])
-        profiled = profile_intervals(at.basin, at.scale, at.determined)
-    return at, profiled
+        minimum = _find_minimum(minimum.basin.problem, profiled.lower["z"])
+        profiled = compute_profile_intervals(minimum.basin, minimum.scale, minimum.determined)
+    return minimum, profiled
 
 
-def _found(problem: Problem, start: np.ndarray) -> LocalMinimum:
+def _find_minimum(problem: Problem, start: np.ndarray) -> LocalMinimum:
     """The minimum; where the solver is stuck, the lowest that it finds from where other scatter would have led it."""
-    at = _described(_weighed(_minimum(problem, start)))
-    if not at.is_stuck:
-        return at
-    draw, first, active, moves = np.random.default_rng(0), at.basin.found["z"], at.active, at.about.moves(at.scale)
-    lowest = at.basin.found
-    for _ in range(_PLACES):
-        place = first.copy()
-        place[active] += np.clip(moves @ draw.standard_normal(moves.shape[1]), -_FARTHEST_PLACE, _FARTHEST_PLACE)
-        lowest = min(lowest, at.basin.problem.solve(place, at.basin.at_end, first), key=total_squares)
-    return _described(replace(at.basin, found=lowest))
+    minimum = _describe_minimum(_reweigh(_solve_to_minimum(problem, start)))
+    if not minimum.is_stuck:
+        return minimum
+    draw, first, active, moves = (
+        np.random.default_rng(0),
+        minimum.basin.solution["z"],
+        minimum.active,
+        minimum.linearized.moves(minimum.scale),
+    )
+    lowest = minimum.basin.solution
+    for _ in range(_RESTARTS):
+        trial_start = first.copy()
+        trial_start[active] += np.clip(
+            moves @ draw.standard_normal(moves.shape[1]), -_FARTHEST_RESTART, _FARTHEST_RESTART
+        )
+        lowest = min(lowest, minimum.basin.problem.solve(trial_start, minimum.basin.at_end, first), key=total_squares)
+    return _describe_minimum(replace(minimum.basin, solution=lowest))
 
 
-def _described(basin: Basin) -> LocalMinimum:
-    found = basin.found
+def _describe_minimum(basin: Basin) -> LocalMinimum:
+    solution = basin.solution
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
-    about = linearize(found["jacobian"][:, active])
-    scale, residual_sd = scatter_about(basin.problem.posterior.model.terms, found["residuals"], about.leverage)
-    error, determined = np.full(len(found["z"]), np.nan), basin.at_end.copy()
-    error[active] = np.linalg.norm(about.moves(scale), axis=1)
-    determined[active] = about.determined & (np.abs(found["z"][active]) <= _FAR) & (about.unit_error <= _FAR)
-    return LocalMinimum(basin, about, active, scale, residual_sd, error, determined)
+    linearized = linearize(solution["jacobian"][:, active])
+    scale, residual_sd = estimate_scatter(
+        basin.problem.posterior.model.terms, solution["residuals"], linearized.leverage
+    )
+    error, determined = np.full(len(solution["z"]), np.nan), basin.at_end.copy()
+    error[active] = np.linalg.norm(linearized.moves(scale), axis=1)
+    determined[active] = (
+        linearized.determined & (np.abs(solution["z"][active]) <= _FAR) & (linearized.unit_error <= _FAR)
+    )
+    return LocalMinimum(basin, linearized, active, scale, residual_sd, error, determined)
 
 
-def _minimum(problem: Problem, start: np.ndarray) -> Basin:
+def _solve_to_minimum(problem: Problem, start: np.ndarray) -> Basin:
     """The minimum without priors, and which parameters have run to an end of their range there."""
     parameters, n = problem.posterior.model.space.free, len(start)
-    pin, at_end, found = np.zeros(n), np.zeros(n, dtype=bool), problem.solve(start)
-    for i in np.flatnonzero(_suspect(parameters, found["z"]) & ~problem.noise):
-        this, end = np.arange(n) == i, np.copysign(LOWER_END, found["z"][i])
+    pin, at_end, solution = np.zeros(n), np.zeros(n, dtype=bool), problem.solve(start)
+    for i in np.flatnonzero(_may_be_at_end(parameters, solution["z"]) & ~problem.noise):
+        mask, end = np.arange(n) == i, np.copysign(LOWER_END, solution["z"][i])
         # A step can leap over the minimum into the flat tail of the map from z; only what ends there from the middle too
         # has its minimum there.
-        again = problem.solve(np.where(this, 0.0, found["z"]), at_end, pin)
-        found = min(found, again, key=sum_of_squares)
-        if not _suspect(parameters, found["z"])[i]:
+        again = problem.solve(np.where(mask, 0.0, solution["z"]), at_end, pin)
+        solution = min(solution, again, key=sum_of_squares)
+        if not _may_be_at_end(parameters, solution["z"])[i]:
             continue
-        trial_pin = np.where(this, end, pin)
-        trial = problem.solve(found["z"], at_end | this, trial_pin)
-        if sum_of_squares(trial) <= sum_of_squares(found) * (1 + 1e-7) + 1e-14:
-            at_end, pin, found = at_end | this, trial_pin, trial
-    return Basin(problem, found, at_end)
+        trial_pin = np.where(mask, end, pin)
+        trial = problem.solve(solution["z"], at_end | mask, trial_pin)
+        if sum_of_squares(trial) <= sum_of_squares(solution) * (1 + 1e-7) + 1e-14:
+            at_end, pin, solution = at_end | mask, trial_pin, trial
+    return Basin(problem, solution, at_end)
 
 
-def _weighed(basin: Basin) -> Basin:
+def _reweigh(basin: Basin) -> Basin:
     """The minimum with the noise scales that single readings of a run each tell; the same where there are no such runs.
 
     Their prior medians say how much more readings scatter at low loads than at high ones, which nothing else corrects.
     """
     problem, space = basin.problem, basin.problem.posterior.model.space
-    values = dict(zip((p.name for p in space.free), basin.found["values"], strict=True))
+    values = dict(zip((p.name for p in space.free), basin.solution["values"], strict=True))
     values |= {p.name: np.asarray(p.fixed) for p in space.fixed}
-    told: dict[str, float] = {}
+    scatter: dict[str, float] = {}
     for term in problem.posterior.model.terms:
         if hasattr(term, "scatter_of_single_readings"):
-            told |= term.scatter_of_single_readings(values)
-    weighed = [name for name in told if name in space.index and isinstance(space.free[space.index[name]].prior, HalfCauchy)]
-    if not weighed or len(weighed) < len(told):
+            scatter |= term.scatter_of_single_readings(values)
+    names = [
+        name for name in scatter if name in space.index and isinstance(space.free[space.index[name]].prior, HalfCauchy)
+    ]
+    if not names or len(names) < len(scatter):
         return basin
     noise_z = np.zeros(space.size)
-    for name in weighed:
+    for name in names:
         at = space.index[name]
-        noise_z[at] = clipped_z(space.free[at].prior, float(told[name]))
-    return _minimum(replace(problem, noise_z=noise_z), basin.found["z"])
+        noise_z[at] = clipped_z(space.free[at].prior, float(scatter[name]))
+    return _solve_to_minimum(replace(problem, noise_z=noise_z), basin.solution["z"])
 
 
-def _suspect(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
+def _may_be_at_end(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
     """Which parameters may be on their way to an end of their range."""
     limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
-    return (has_lower_end(parameters) & (z < _SUSPECT)) | (limited & (z > -_SUSPECT))
+    return (has_lower_end(parameters) & (z < _NEAR_END)) | (limited & (z > -_NEAR_END))

@@ -53,49 +53,49 @@ def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[
         31). arviz_stats.loo_moment_match is the same in intention; its version 0.8, the last for Python 3.11, subtracts the
         shift twice where it maps draws back, and its weights are then not those of the mixture.
     """
-    found = best_map(draws, evaluate(draws)[0], evaluate, share)
+    best = find_best_map(draws, evaluate(draws)[0], evaluate, share)
     # Every other draw is moved, and all are weighted against the mixture of where both kinds come from.
-    mixed = np.where(np.arange(len(draws))[:, None] % 2 == 0, found(draws), draws)
+    mixed = np.where(np.arange(len(draws))[:, None] % 2 == 0, best(draws), draws)
     density, likelihood = evaluate(mixed)
-    from_moved = evaluate(found.back(mixed))[0] - found.log_volume
+    from_moved = evaluate(best.back(mixed))[0] - best.log_volume
     return weighted_elpd(density - likelihood - np.logaddexp(density, from_moved), likelihood, share)
 
 
-def best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate, share: float) -> Affine:
+def find_best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate, share: float) -> Affine:
     """The affine map with the least Pareto k that moments of the weighted draws lead to, step by step; see `match_moments`."""
     size, center = draws.shape[1], draws.mean(axis=0)
-    found = Affine(np.eye(size), np.zeros(size), center)
+    best = Affine(np.eye(size), np.zeros(size), center)
 
     def weighed(candidate: Affine) -> tuple[np.ndarray, float]:
         density, likelihood = evaluate(candidate(draws))
         return smooth_weights(density - likelihood - log_density, share)
 
-    log_weights, k = weighed(found)
+    log_weights, k = weighed(best)
     for _ in range(_MOST_STEPS):
         if k <= _GOOD_ENOUGH:
             break
-        for candidate in _steps(found, draws, np.exp(log_weights)):
+        for candidate in _propose_maps(best, draws, np.exp(log_weights)):
             candidate_weights, candidate_k = weighed(candidate)
             if candidate_k < k:
-                found, log_weights, k = candidate, candidate_weights, candidate_k
+                best, log_weights, k = candidate, candidate_weights, candidate_k
                 break
         else:
             break
-    return found
+    return best
 
 
-def _steps(found: Affine, draws: np.ndarray, weights: np.ndarray) -> Iterator[Affine]:
+def _propose_maps(current: Affine, draws: np.ndarray, weights: np.ndarray) -> Iterator[Affine]:
     """Maps onto the weighted mean; and the weighted standard deviations; and the weighted covariance."""
-    moved = found(draws)
+    moved = current(draws)
     mean = weights @ moved
-    shift = mean - found.center
-    yield Affine(found.matrix, shift, found.center)
+    shift = mean - current.center
+    yield Affine(current.matrix, shift, current.center)
     wanted, present = _covariance(moved, weights), _covariance(moved)
     ratio = np.sqrt(np.maximum(np.diag(wanted), _FLOOR) / np.maximum(np.diag(present), _FLOOR))
-    yield Affine(ratio[:, None] * found.matrix, shift, found.center)
+    yield Affine(ratio[:, None] * current.matrix, shift, current.center)
     if np.linalg.eigvalsh(wanted)[0] > _FLOOR < np.linalg.eigvalsh(present)[0]:
         stretch = np.linalg.solve(np.linalg.cholesky(present).T, np.linalg.cholesky(wanted).T).T
-        yield Affine(stretch @ found.matrix, shift, found.center)
+        yield Affine(stretch @ current.matrix, shift, current.center)
 
 
 def _covariance(draws: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:

@@ -84,12 +84,12 @@ def fitted_t(numbers: RandomNumbers, moving: Array, resting: Array) -> tuple[Arr
     It brings walkers in from far outside in tens of steps, and forgets where they were where the posterior is about normal.
     """
     size, normal = moving.shape[1], numbers.normal
-    drawn = normal[:, :size] * jnp.sqrt(FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
+    standard_draws = normal[:, :size] * jnp.sqrt(FREEDOM / jnp.sum(normal[:, size:] ** 2, axis=1, keepdims=True))
     mean = resting.mean(axis=0)
     covariance = (resting - mean).T @ (resting - mean) / (len(resting) - 1)
     root = jnp.linalg.cholesky(covariance * (1 + JITTER * jnp.eye(size)), symmetrize_input=False)
     present = jax.scipy.linalg.solve_triangular(root, (moving - mean).T, lower=True).T
-    return mean + drawn @ root.T, _log_t(present) - _log_t(drawn)
+    return mean + standard_draws @ root.T, _log_t(present) - _log_t(standard_draws)
 
 
 def _whole_number(uniform: Array, count: int) -> Array:

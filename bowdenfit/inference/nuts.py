@@ -25,10 +25,10 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, stuck_walkers, worst_diagnostics
-from bowdenfit.inference.checkpoint import append, records
+from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, describe_stuck_walkers, worst_diagnostics
+from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
+from bowdenfit.inference.diagnostics import Trajectories, compute_energy_mixing, describe_trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
@@ -37,8 +37,11 @@ BLOCK = 50  # steps between two reports
 WINDOWS = (1, 1, 2, 4, 2)  # blocks of warm-up with one mass matrix each; the last leaves only its step size
 WARM_UP = sum(WINDOWS)
 MOST_DOUBLINGS = 10  # of a trajectory
-FINE_EVERY, FINER = 10, 16  # every so many trajectories one with so much shorter steps; a block has a whole number
-_FIRST_LOOK = 5  # blocks of draws before the first look
+FINE_EVERY, FINE_FACTOR = (
+    10,
+    16,
+)  # every so many trajectories one with so much shorter steps; a block has a whole number
+_FIRST_CHECK = 5  # blocks of draws before the first look
 _KEPT = 20_480  # draws of all chains that are kept at least, spread evenly; as many as of emcee's walkers by default
 _FIRST_STEP, _STREAM = 0.1, 3
 _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
@@ -46,7 +49,7 @@ _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps"
 Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of its steps, and the tuning at its end
 
 
-def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[..., Any]:
+def compile_nuts(posterior: LogDensity, settings: SamplerSettings) -> Callable[..., Any]:
     """Compiled: `BLOCK` steps of every chain; what it makes depends on the seed and the number of the block alone.
 
     Args:
@@ -54,10 +57,10 @@ def make_program(posterior: LogDensity, settings: SamplerSettings) -> Callable[.
         settings: Number of chains and the acceptance that their step sizes aim at.
     """
     size = posterior.model.space.size
-    return block_program(posterior.log_density, (size, size), posterior.data, settings)
+    return compile_block(posterior.log_density, (size, size), posterior.data, settings)
 
 
-def block_program(
+def compile_block(
     log_density: Callable[[Array, Any], Array],
     mass: tuple[int, ...],
     data: Any,
@@ -73,7 +76,7 @@ def block_program(
         settings: Number of chains and the acceptance that their step sizes aim at.
         fine: Whether every tenth trajectory takes finer steps.
     """
-    chains, finer = settings.n_chains, _fine(BLOCK) & fine
+    chains, finer = settings.n_chains, _is_fine(BLOCK) & fine
     kernel, (_, adapted, _) = nuts.build_kernel(), dual_averaging_adaptation(settings.target_acceptance)
 
     def block(
@@ -88,7 +91,7 @@ def block_program(
         def step(carried: Any, turn: Any) -> Any:
             (states, tuning), (key, fine) = carried, turn
             step_sizes = jnp.exp(jnp.where(adapting, tuning.log_step_size, tuning.log_step_size_avg))
-            step_sizes = jnp.where(fine, step_sizes / FINER, step_sizes)
+            step_sizes = jnp.where(fine, step_sizes / FINE_FACTOR, step_sizes)
             states, info = jax.vmap(move)(jax.random.split(key, chains), states, step_sizes)
             acceptance = jnp.nan_to_num(info.acceptance_rate)
             changed = jax.vmap(adapted)(tuning, acceptance)
@@ -100,20 +103,20 @@ def block_program(
         states = jax.vmap(lambda one: nuts.init(one, density))(z)
         carried = states, DualAveragingAdaptationState(*tuning)
         (_, tuned), steps = jax.lax.scan(step, carried, (keys, finer))
-        found = dict(zip(("z", *_STATISTICS), steps, strict=True))
-        return found | {"tuning": jnp.stack(tuned), "inverse_mass": inverse_mass}
+        result = dict(zip(("z", *_STATISTICS), steps, strict=True))
+        return result | {"tuning": jnp.stack(tuned), "inverse_mass": inverse_mass}
 
     whole, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
     shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, mass[0]), (5, chains), mass)]
     return compile_program(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], data)
 
 
-def _fine(steps: int) -> np.ndarray:
+def _is_fine(steps: int) -> np.ndarray:
     """Which of the steps are fine."""
     return np.arange(steps) % FINE_EVERY == FINE_EVERY - 1
 
 
-def starting_points(
+def draw_starting_points(
     posterior: LogDensity, start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator
 ) -> np.ndarray:
     """Over-dispersed starts, (chain, parameter).
@@ -126,46 +129,50 @@ def starting_points(
     return np.where(noise_scales(posterior), np.abs(z), z)
 
 
-def sample(asked: SamplingRequest, program: Callable[..., Any]) -> Chain:
+def sample(request: SamplingRequest, program: Callable[..., Any]) -> Chain:
     """Sample by chains of trajectories.
 
     Args:
         asked: What of, how long, and so on.
         program: What `make_program` made for it.
     """
-    posterior, settings, seed = asked.posterior, asked.settings, asked.seed
-    points = starting_points(posterior, asked.start, settings, np.random.default_rng([seed, _STREAM]))
-    blocks = records(asked.checkpoint, _shapes(*points.shape)) if asked.checkpoint is not None and asked.resume else []
+    posterior, settings, seed = request.posterior, request.settings, request.seed
+    points = draw_starting_points(posterior, request.start, settings, np.random.default_rng([seed, _STREAM]))
+    blocks = (
+        read_records(request.checkpoint, _record_shapes(*points.shape))
+        if request.checkpoint is not None and request.resume
+        else []
+    )
     limit = WARM_UP + max(settings.max_steps // BLOCK, 1)
-    target = WARM_UP + _FIRST_LOOK
+    target = WARM_UP + _FIRST_CHECK
     while target < len(blocks):  # the looks of a sampling that nothing interrupted
-        target = _next_look(target)
+        target = _next_check(target)
     target = min(target, limit)
-    seen: tuple[float | None, float | None] = (None, None)
+    worst: tuple[float | None, float | None] = (None, None)
     while True:
         while len(blocks) < target:
-            z, tuning, mass = next_block_state(blocks, points, asked.start.covariance)
+            z, tuning, mass = next_block_state(blocks, points, request.start.covariance)
             numbers = np.uint32(seed), np.uint32(len(blocks))
             done = program(*numbers, z, tuning, np.bool_(len(blocks) < WARM_UP), mass, posterior.data)
             blocks.append(jax.tree.map(np.asarray, done))
-            if asked.checkpoint is not None:
-                append(asked.checkpoint, blocks[-1])
-            asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
-        chain, could_improve = _summarized(asked, blocks)
-        seen = worst_diagnostics(chain)
-        asked.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *seen, "nuts"))
+            if request.checkpoint is not None:
+                append_record(request.checkpoint, blocks[-1])
+            request.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *worst, "nuts"))
+        chain, could_improve = _summarize(request, blocks)
+        worst = worst_diagnostics(chain)
+        request.report(Progress(len(blocks) * BLOCK, limit * BLOCK, *worst, "nuts"))
         if not could_improve or target >= limit:
             return chain
-        target = min(_next_look(target), limit)
+        target = min(_next_check(target), limit)
 
 
-def _shapes(chains: int, size: int) -> dict[str, tuple[int, ...]]:
+def _record_shapes(chains: int, size: int) -> dict[str, tuple[int, ...]]:
     """Of what a block is kept as."""
     steps = dict.fromkeys(_STATISTICS, (BLOCK, chains))
     return {"z": (BLOCK, chains, size), "tuning": (5, chains), "inverse_mass": (size, size), **steps}
 
 
-def _next_look(blocks: int) -> int:
+def _next_check(blocks: int) -> int:
     """Blocks at the look after one at so many."""
     return blocks + (blocks - WARM_UP + 2) // 3
 
@@ -181,7 +188,7 @@ def next_block_state(
         covariance: That the first inverse mass matrix is; of one dimension where that is diagonal.
     """
     if not blocks:
-        return points, _untuned(_FIRST_STEP, len(points)), covariance
+        return points, _initial_tuning(_FIRST_STEP, len(points)), covariance
     z, tuning, mass = blocks[-1]["z"][-1], blocks[-1]["tuning"], blocks[-1]["inverse_mass"]
     ends = list(accumulate(WINDOWS))
     if len(blocks) not in ends:
@@ -190,49 +197,53 @@ def next_block_state(
     if len(blocks) == WARM_UP:
         return z, np.concatenate([tuning[:1], np.full((1, len(z)), average), tuning[2:]]), mass
     window = np.concatenate([block["z"] for block in blocks[-WINDOWS[ends.index(len(blocks))] :]])
-    found = _shrunk(window.reshape(-1, z.shape[1])) if mass.ndim > 1 else _shrunk_variances(window.reshape(-1, len(mass)))
-    return z, _untuned(float(np.exp(average)), len(z)), found
+    new_mass = (
+        _shrink_covariance(window.reshape(-1, z.shape[1]))
+        if mass.ndim > 1
+        else _shrink_variances(window.reshape(-1, len(mass)))
+    )
+    return z, _initial_tuning(float(np.exp(average)), len(z)), new_mass
 
 
-def _untuned(step_size: float, chains: int) -> np.ndarray:
+def _initial_tuning(step_size: float, chains: int) -> np.ndarray:
     """Tuning of every chain (columns) at the start of a window: the fields of blackjax's state, in their order."""
     init, _, _ = dual_averaging_adaptation(0.8)
     return np.repeat(np.asarray([float(x) for x in init(step_size)])[:, None], chains, axis=1)
 
 
-def _shrunk(draws: np.ndarray) -> np.ndarray:
+def _shrink_covariance(draws: np.ndarray) -> np.ndarray:
     """Covariance of draws (rows), shrunk toward a small multiple of the identity as Stan does."""
     n, size = draws.shape
     return n / (n + 5) * np.cov(draws.T).reshape(size, size) + 1e-3 * 5 / (n + 5) * np.eye(size)
 
 
-def _shrunk_variances(draws: np.ndarray) -> np.ndarray:
+def _shrink_variances(draws: np.ndarray) -> np.ndarray:
     """The same of variances alone, in coordinates that are about standard normal, to which they are shrunk."""
     n = len(draws)
     return n / (n + 5) * draws.var(axis=0, ddof=1) + 5 / (n + 5)
 
 
-def _summarized(asked: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain, bool]:
+def _summarize(request: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain, bool]:
     """The draws after warm-up, with their diagnostics, and whether more of them could change what those say."""
-    drawn = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
-    steps, chains = drawn["energy"].shape
-    fine = _fine(steps)
-    wanted = max(_KEPT, 2 * asked.settings.target_ess) // chains
-    kept = np.unique(np.linspace(0, steps - 1, min(steps, wanted)).round().astype(int))
-    z = np.ascontiguousarray(drawn["z"][kept].transpose(1, 0, 2))
+    samples = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
+    steps, chains = samples["energy"].shape
+    fine = _is_fine(steps)
+    n_kept = max(_KEPT, 2 * request.settings.target_ess) // chains
+    kept = np.unique(np.linspace(0, steps - 1, min(steps, n_kept)).round().astype(int))
+    z = np.ascontiguousarray(samples["z"][kept].transpose(1, 0, 2))
     trajectories = Trajectories(
         WARM_UP * BLOCK,
         steps * chains,
-        int(drawn["diverging"].sum()),
+        int(samples["diverging"].sum()),
         int(fine.sum()) * chains,
-        int(drawn["diverging"][fine].sum()),
-        int((drawn["tree_depth"][~fine] >= MOST_DOUBLINGS).sum()),
-        energy_mixing(drawn["energy"].T),
+        int(samples["diverging"][fine].sum()),
+        int((samples["tree_depth"][~fine] >= MOST_DOUBLINGS).sum()),
+        compute_energy_mixing(samples["energy"].T),
         float(np.exp(blocks[-1]["tuning"][1, 0])),
         int(sum(b["n_steps"].sum() for b in blocks)),
-        {name: np.ascontiguousarray(drawn[name][kept].T) for name in _STATISTICS},
+        {name: np.ascontiguousarray(samples[name][kept].T) for name in _STATISTICS},
     )
-    went = {"acceptance": float(drawn["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
-    chain = asked.chain_of(z, chains, steps=steps, **went)
-    reasons = (*chain.reasons, *stuck_walkers(z[:, z.shape[1] // 2 :]))
-    return replace(chain, reasons=(*reasons, *trajectory_shortfalls(trajectories))), bool(reasons)
+    details = {"acceptance": float(samples["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
+    chain = request.make_chain(z, chains, steps=steps, **details)
+    reasons = (*chain.reasons, *describe_stuck_walkers(z[:, z.shape[1] // 2 :]))
+    return replace(chain, reasons=(*reasons, *describe_trajectory_shortfalls(trajectories))), bool(reasons)

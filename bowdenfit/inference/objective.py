@@ -13,7 +13,7 @@ from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.solver import PRECISE, Precision, minimize, prepare
+from bowdenfit.inference.solver import PRECISE, Precision, compile_solver, minimize
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 
@@ -21,7 +21,7 @@ Solution = dict[str, Any]
 Objective = Callable[..., Solution]
 
 _TIE = 1e-6  # weight of z that keeps what no reading tells from wandering off, and moves nothing else
-_KEPT = 4  # evaluations, the last of which is mostly where a solve ends
+_CACHE_SIZE = 4  # evaluations, the last of which is mostly where a solve ends
 LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
 
 
@@ -38,34 +38,34 @@ def make_objective(posterior: LogDensity) -> Objective:
     vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
     rows = sum(count for term in posterior.model.terms for count, _ in term.residual_blocks)
     with ThreadPoolExecutor(1) as thread:
-        thread.submit(prepare, rows + space.size, space.size)
-        program = compile_program(_program(posterior), vector, vector, posterior.data, run_once=True)
+        thread.submit(compile_solver, rows + space.size, space.size)
+        program = compile_program(_evaluation_program(posterior), vector, vector, posterior.data, run_once=True)
 
     def objective(
         start: np.ndarray, pinned: np.ndarray, pin: np.ndarray, weight: np.ndarray, data: Any, precision: Precision
     ) -> Solution:
-        @lru_cache(_KEPT)
-        def kept(z: bytes) -> Solution:
+        @lru_cache(_CACHE_SIZE)
+        def evaluate_cached(z: bytes) -> Solution:
             return program(np.frombuffer(z), weight, data)
 
-        def everything(z: np.ndarray) -> Solution:
-            return kept(np.where(pinned, pin, z).tobytes())
+        def evaluate_all(z: np.ndarray) -> Solution:
+            return evaluate_cached(np.where(pinned, pin, z).tobytes())
 
         def evaluate(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            found = everything(z)
-            return np.asarray(found["stacked"]), np.where(pinned, 0.0, found["jacobian"])
+            solution = evaluate_all(z)
+            return np.asarray(solution["stacked"]), np.where(pinned, 0.0, solution["jacobian"])
 
         minimum = minimize(evaluate, np.where(pinned, pin, start), precision)
-        found = jax.tree.map(np.asarray, everything(minimum.x))
-        sensitivity = found["jacobian"][: -space.size]
+        solution = jax.tree.map(np.asarray, evaluate_all(minimum.x))
+        sensitivity = solution["jacobian"][: -space.size]
         jacobian = np.where(pinned, 0.0, sensitivity)
-        said = {"succeeded": minimum.succeeded, "fall": minimum.fall}
-        return found | {"jacobian": jacobian, "sensitivity": sensitivity} | said
+        status = {"succeeded": minimum.succeeded, "fall": minimum.fall}
+        return solution | {"jacobian": jacobian, "sensitivity": sensitivity} | status
 
     return objective
 
 
-def _program(posterior: LogDensity) -> Callable[..., Solution]:
+def _evaluation_program(posterior: LogDensity) -> Callable[..., Solution]:
     """Everything that one z gives."""
     space = posterior.model.space
 
@@ -84,8 +84,8 @@ def _program(posterior: LogDensity) -> Callable[..., Solution]:
         jacobian = jnp.concatenate([by_z, jnp.diag(weight)])
         named, terms = space.named(values), zip(posterior.model.terms, data, strict=True)
         readings = {term.name: term.expected(named, d) for term, d in terms}
-        found = {"z": z, "values": values, "slope": slope, "readings": readings, "jacobian": jacobian}
-        return found | {"stacked": jnp.concatenate([read, weight * z]), "residuals": by_term}
+        outputs = {"z": z, "values": values, "slope": slope, "readings": readings, "jacobian": jacobian}
+        return outputs | {"stacked": jnp.concatenate([read, weight * z]), "residuals": by_term}
 
     return evaluated
 
@@ -134,14 +134,14 @@ class Problem:
         return self.objective(start, self.noise | pinned, at, self.weight, self.data, precision)
 
 
-def sum_of_squares(found: Solution) -> float:
+def sum_of_squares(solution: Solution) -> float:
     """Sum of squares of the standardized residuals, without those of the priors."""
-    return float(sum(np.sum(r**2) for r in found["residuals"].values()))
+    return float(sum(np.sum(r**2) for r in solution["residuals"].values()))
 
 
-def total_squares(found: Solution) -> float:
+def total_squares(solution: Solution) -> float:
     """Sum of squares of everything that counts, priors too where they do."""
-    return float(found["stacked"] @ found["stacked"])
+    return float(solution["stacked"] @ solution["stacked"])
 
 
 def noise_scales(posterior: LogDensity) -> np.ndarray:

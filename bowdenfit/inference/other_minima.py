@@ -17,7 +17,7 @@ _EXACT = 1e-6  # scatter of readings that fit without any
 _APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
 
 
-def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:
+def find_rivals(solution: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:
     """Those of the trials that fit about as well as what was found.
 
     Args:
@@ -29,11 +29,11 @@ def fitting_as_well(found: Solution, trials: Sequence[Solution], scale: np.ndarr
     from scipy.special import stdtrit
 
     # Readings without any scatter fit nothing else, whatever their weight.
-    exact = np.concatenate([np.full(len(r), not np.any(r)) for r in found["residuals"].values()])
+    exact = np.concatenate([np.full(len(r), not np.any(r)) for r in solution["residuals"].values()])
     scale = np.where(exact, _EXACT, scale)
-    spare = max(sum(np.count_nonzero(r) for r in found["residuals"].values()) - n_informed, 1)
-    limit = _scaled(found, scale) + float(stdtrit(spare, _AS_WELL)) ** 2
-    return [trial for trial in trials if _scaled(trial, scale) <= limit]
+    spare = max(sum(np.count_nonzero(r) for r in solution["residuals"].values()) - n_informed, 1)
+    limit = _scaled_squares(solution, scale) + float(stdtrit(spare, _AS_WELL)) ** 2
+    return [trial for trial in trials if _scaled_squares(trial, scale) <= limit]
 
 
 def range_of_minima(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
@@ -43,6 +43,6 @@ def range_of_minima(value: float, error: float, rivals: Sequence[float]) -> tupl
     return min(value, *rivals), max(value, *rivals)
 
 
-def _scaled(solution: Solution, scale: np.ndarray) -> float:
+def _scaled_squares(solution: Solution, scale: np.ndarray) -> float:
     total = float(np.sum((np.concatenate(list(solution["residuals"].values())) / scale) ** 2))
     return total if np.isfinite(total) else float("inf")

@@ -48,7 +48,7 @@ class LooPredictive:
     pareto_k: np.ndarray
 
 
-def loo_predictive(
+def predict_left_out(
     log_likelihood: np.ndarray, replicated: np.ndarray, observed: np.ndarray, at_most: np.ndarray, n_effective: float
 ) -> LooPredictive:
     """Predictions of the readings of one table, each from everything else.
@@ -62,14 +62,16 @@ def loo_predictive(
     """
     share, every = min(n_effective / len(log_likelihood), 1.0), max(1, len(log_likelihood) // _DRAWS)
     rows = []
-    for likelihood, drawn, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
+    for likelihood, replicates, reading, bound in zip(log_likelihood.T, replicated.T, observed, at_most, strict=True):
         log_weights, k = smooth_weights(-likelihood, share)
         weights = np.exp(log_weights - log_weights.max())[::every]
-        rows.append((*_place(drawn[::every], weights / weights.sum(), float(reading), bool(bound)), k))
+        rows.append((*_locate_reading(replicates[::every], weights / weights.sum(), float(reading), bool(bound)), k))
     return LooPredictive(*np.array(rows).reshape(-1, len(fields(LooPredictive))).T)
 
 
-def replace_by_refit(found: LooPredictive, place: int, drawn: np.ndarray, reading: float, at_most: bool) -> LooPredictive:
+def replace_by_refit(
+    predictions: LooPredictive, index: int, replicates: np.ndarray, reading: float, at_most: bool
+) -> LooPredictive:
     """The predictions with one from a fit without its reading; how far the fit with it leans on it stays.
 
     Args:
@@ -78,16 +80,19 @@ def replace_by_refit(found: LooPredictive, place: int, drawn: np.ndarray, readin
         drawn: The reading drawn anew, by draws of the fit without it.
         reading, at_most: See `loo_predictive`.
     """
-    row = (*_place(drawn, np.full(len(drawn), 1 / len(drawn)), reading, at_most), found.pareto_k[place])
-    changed = {field.name: np.array(getattr(found, field.name)) for field in fields(LooPredictive)}
+    row = (
+        *_locate_reading(replicates, np.full(len(replicates), 1 / len(replicates)), reading, at_most),
+        predictions.pareto_k[index],
+    )
+    changed = {field.name: np.array(getattr(predictions, field.name)) for field in fields(LooPredictive)}
     for column, value in zip(changed.values(), row, strict=True):
-        column[place] = value
+        column[index] = value
     return LooPredictive(**changed)
 
 
-def _place(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
+def _locate_reading(replicates: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
     """The fields of `LooPredictive` of one reading, but for its Pareto k."""
-    within = np.clip(np.nan_to_num(drawn, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
+    within = np.clip(np.nan_to_num(replicates, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
     order = np.argsort(within)
     x, w = within[order], weights[order]
     mean = float(w @ x)
@@ -96,12 +101,12 @@ def _place(drawn: np.ndarray, weights: np.ndarray, reading: float, at_most: bool
     q05, median, q95 = (float(q) for q in np.interp((0.05, 0.5, 0.95), rank, x))
     up_to = float(w[: np.searchsorted(x, reading, "right")].sum())
     below = 0.0 if at_most else float(w[: np.searchsorted(x, reading, "left")].sum())
-    low, high = _beyond(-x[::-1], w[::-1], -reading), _beyond(x, w, reading)
+    low, high = _tail_probability(-x[::-1], w[::-1], -reading), _tail_probability(x, w, reading)
     tail = low if at_most else 2 * min(low, high, 0.5)
     return mean, sd, q05, median, q95, below, up_to, tail
 
 
-def _beyond(x: np.ndarray, weights: np.ndarray, reading: float) -> float:
+def _tail_probability(x: np.ndarray, weights: np.ndarray, reading: float) -> float:
     r"""Probability of a value as large as the reading, beyond the draws by a Pareto distribution fitted to their tail.
 
     .. math:: P(X > y) = P(X > u) \left(1 + \xi \frac{y - u}{s}\right)^{-1/\xi}
@@ -132,12 +137,12 @@ def _pareto_survival(excess: float, shape: float) -> float:
     return float(np.exp(-excess) if shape < 1e-6 else (1 + shape * excess) ** (-1 / shape))
 
 
-def randomized_pit(found: LooPredictive, generator: np.random.Generator) -> np.ndarray:
+def draw_randomized_pit(predictions: LooPredictive, generator: np.random.Generator) -> np.ndarray:
     """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
 
     Of a bound only an interval is known; it takes a place at random inside.
     """
-    return np.clip(generator.uniform(found.below, np.maximum(found.up_to, found.below)), 0.0, 1.0)
+    return np.clip(generator.uniform(predictions.below, np.maximum(predictions.up_to, predictions.below)), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -173,7 +178,7 @@ class Uniformity:
         return "lie lower than the fit says" if low + high > 0 else "lie higher than the fit says"
 
 
-def check_uniformity(places: np.ndarray, probability: float) -> Uniformity:
+def check_uniformity(pit: np.ndarray, probability: float) -> Uniformity:
     """The distribution function of numbers between 0 and 1 beside the band that uniform ones would stay in.
 
     Args:
@@ -182,5 +187,5 @@ def check_uniformity(places: np.ndarray, probability: float) -> Uniformity:
     """
     from arviz_stats.ecdf_utils import ecdf_pit
 
-    at, share, low, high = ecdf_pit(places, probability, _SIMULATIONS)
+    at, share, low, high = ecdf_pit(pit, probability, _SIMULATIONS)
     return Uniformity(at, share, low, high, probability)

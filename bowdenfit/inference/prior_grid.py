@@ -17,7 +17,7 @@ from bowdenfit.parameters.space import ParameterSpace
 
 NODES = np.linspace(-6.0, 6.0, 241)
 _WIDTH = float(NODES[1] - NODES[0])
-_BENT = 1e-6  # relative change of slope below which a value is linear in z, and charting it does nothing
+_LEAST_CURVATURE = 1e-6  # relative change of slope below which a value is linear in z, and charting it does nothing
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PriorGrid:
     """
 
     size: int
-    which: np.ndarray
+    indices: np.ndarray
     values: np.ndarray
 
     @cached_property
@@ -46,28 +46,28 @@ class PriorGrid:
         """Log of the coordinate per z between nodes."""
         return np.log(self.rises / _WIDTH)
 
-    def _between(self, node: Array) -> Array:
+    def _look_up(self, node: Array) -> Array:
         """Coordinate at nodes, its rise to the next, and the log of the slope, of each parameter; one look for all three."""
         table = np.stack([self.values[:-1], self.rises, self.log_slopes], axis=-1).reshape(-1, 3)
-        columns = len(self.which)
-        found = jnp.take(jnp.asarray(table), node * columns + jnp.arange(columns), axis=0, mode="clip")
-        return jnp.moveaxis(found, -1, 0)
+        columns = len(self.indices)
+        entries = jnp.take(jnp.asarray(table), node * columns + jnp.arange(columns), axis=0, mode="clip")
+        return jnp.moveaxis(entries, -1, 0)
 
-    def at(self, given: Array, is_z: Array) -> tuple[Array, Array, Array]:
+    def map_points(self, points: Array, is_z: Array) -> tuple[Array, Array, Array]:
         """Coordinates and z, and log of the volume in z of a unit of the coordinates there, of one of the two.
 
         Args:
             given: Z or coordinates, (walker, parameter).
             is_z: Whether it is z.
         """
-        own = given[:, self.which]
+        own = points[:, self.indices]
         search = jax.vmap(partial(jnp.searchsorted, side="right", method="scan"), in_axes=1, out_axes=1)
         along = (own - NODES[0]) / _WIDTH
         node = jnp.where(is_z, jnp.clip(along, 0, len(NODES) - 2).astype(int), search(jnp.asarray(self.values[1:-1]), own))
-        value, rise, log_slope = self._between(node)
-        found = jnp.where(is_z, value + (along - node) * rise, own)
+        value, rise, log_slope = self._look_up(node)
+        w = jnp.where(is_z, value + (along - node) * rise, own)
         z = jnp.where(is_z, own, NODES[0] + _WIDTH * (node + (own - value) / rise))
-        return given.at[:, self.which].set(found), given.at[:, self.which].set(z), -log_slope.sum(axis=1)
+        return points.at[:, self.indices].set(w), points.at[:, self.indices].set(z), -log_slope.sum(axis=1)
 
 
 @lru_cache(maxsize=8)
@@ -78,6 +78,6 @@ def make_prior_grid(space: ParameterSpace) -> PriorGrid:
     values = np.asarray(compile_program(jax.vmap(space.vector), shape, run_once=True)(grid))
     slopes = np.diff(values, axis=0)
     rising = np.all(np.isfinite(values), axis=0) & np.all(slopes > 0, axis=0)
-    bent = np.ptp(slopes, axis=0) > _BENT * np.max(np.abs(slopes), axis=0)
+    bent = np.ptp(slopes, axis=0) > _LEAST_CURVATURE * np.max(np.abs(slopes), axis=0)
     which = np.flatnonzero(rising & bent & np.array([p.role != "noise" for p in space.free], dtype=bool))
     return PriorGrid(space.size, which, values[:, which])

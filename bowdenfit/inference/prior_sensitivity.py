@@ -24,8 +24,9 @@ if TYPE_CHECKING:  # another process works this out, without JAX
 
 SENSITIVE = 0.05  # from which a quantity is said to be sensitive
 FOLLOWS = 1.15  # factor by which a doubled or halved scale changes a width that is said to follow a prior
-_ODD = 2.0  # prior standard deviations from the prior's median, beyond which a prior that counts is at odds with the readings
-FAR = 3.0  # the same, beyond which any prior is
+# Prior standard deviations from the prior's median beyond which a prior that counts conflicts with the readings.
+_CONFLICT_SDS = 2.0
+FAR_SDS = 3.0  # the same, beyond which any prior is
 _POWERS = (0.99, 1.01)
 _TAILS = (0.05, 0.5, 0.95)
 
@@ -85,10 +86,10 @@ class Sensitivity:
     def diagnosis(self) -> str:
         """What it means: "readings decide", "prior decides", "conflict", "both count" or "prior sets the width"."""
         if not self.prior > SENSITIVE:
-            return "prior sets the width" if self.followed or self.untold else "readings decide"
+            return "prior sets the width" if self.followed or self.undetermined else "readings decide"
         if not self.likelihood > SENSITIVE:
             return "prior decides"
-        return "conflict" if abs(self.prior_sds) > _ODD else "both count"
+        return "conflict" if abs(self.prior_sds) > _CONFLICT_SDS else "both count"
 
     @property
     def followed(self) -> list[WidthSensitivity]:
@@ -96,7 +97,7 @@ class Sensitivity:
         return sorted((w for w in self.widths if w.size > FOLLOWS), key=lambda w: -w.size)
 
     @property
-    def untold(self) -> list[str]:
+    def undetermined(self) -> list[str]:
         """Parameters of which the draws cannot tell whether its width follows their priors."""
         return [w.parameter for w in self.widths if np.isnan(w.size)]
 
@@ -114,15 +115,25 @@ class PriorConflict:
     prior_sds: float
 
 
-def prior_conflicts(z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]) -> tuple[PriorConflict, ...]:
+def find_prior_conflicts(
+    z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]
+) -> tuple[PriorConflict, ...]:
     """Parameters beyond 3 standard deviations of their priors, but for those at an end that the prior allows.
 
     Args:
         z: Draws of each parameter in z, by name.
         parameters: The parameters.
     """
-    found = [PriorConflict(name, _inside(parameters[name].prior.allowed_ends, float(np.median(at)))) for name, at in z.items()]
-    return tuple(sorted((f for f in found if abs(f.prior_sds) > FAR), key=lambda f: -abs(f.prior_sds)))
+    conflicts = [
+        PriorConflict(name, _z_unless_at_end(parameters[name].prior.allowed_ends, float(np.median(draws))))
+        for name, draws in z.items()
+    ]
+    return tuple(
+        sorted(
+            (conflict for conflict in conflicts if abs(conflict.prior_sds) > FAR_SDS),
+            key=lambda conflict: -abs(conflict.prior_sds),
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -145,7 +156,7 @@ def rescale_prior(prior: "Prior", values: np.ndarray) -> RescaledPrior:
     return RescaledPrior(doubled, halved, prior.allowed_ends)
 
 
-def sensitivities(
+def compute_sensitivities(
     quantities: Mapping[str, np.ndarray],
     z: Mapping[str, np.ndarray],
     log_likelihood: np.ndarray,
@@ -159,17 +170,17 @@ def sensitivities(
         log_likelihood: Sum over all readings, (chain, draw).
         priors: Of each parameter, by name.
     """
-    of_readings = _scaled(log_likelihood)
-    of_priors = {name: _scaled(-(values**2) / 2) for name, values in z.items()}
-    weighted = {name: _Weighted.of(prior) for name, prior in priors.items()}
-    found = []
+    of_readings = _make_power_scaling(log_likelihood)
+    of_priors = {name: _make_power_scaling(-(values**2) / 2) for name, values in z.items()}
+    weighted = {name: _ScaleWeights.of(prior) for name, prior in priors.items()}
+    results = []
     for name, draws in quantities.items():
         by_prior = {parameter: sense(draws) for parameter, sense in of_priors.items()}
         most = max(by_prior, key=lambda parameter: by_prior[parameter])
         flat = draws.ravel()
         order = np.argsort(flat)
         plain = _quantiles(flat, order, np.ones(len(flat)))
-        found.append(
+        results.append(
             Sensitivity(
                 name,
                 most,
@@ -178,21 +189,21 @@ def sensitivities(
                 float(plain[1]),
                 float(np.std(flat)),
                 float(_quantiles(flat, order, weighted[most].doubled)[1]),
-                _inside(priors[most].allowed_ends, float(np.mean(z[most]))),
+                _z_unless_at_end(priors[most].allowed_ends, float(np.mean(z[most]))),
                 tuple(w.width(parameter, flat, order, plain) for parameter, w in weighted.items()),
             )
         )
-    return tuple(found)
+    return tuple(results)
 
 
-def _inside(allowed_ends: tuple[bool, bool], z: float) -> float:
+def _z_unless_at_end(allowed_ends: tuple[bool, bool], z: float) -> float:
     """Z, and 0 at an end of the range that the prior allows."""
     lower, upper = allowed_ends
     return 0.0 if (lower and z < 0) or (upper and z > 0) else z
 
 
 @dataclass(frozen=True)
-class _Weighted:
+class _ScaleWeights:
     """Weights of the draws with the scale of one prior doubled and halved; NaN where they lean on few draws."""
 
     doubled: np.ndarray
@@ -201,9 +212,9 @@ class _Weighted:
     k_halved: float
 
     @classmethod
-    def of(cls, prior: RescaledPrior) -> "_Weighted":
+    def of(cls, prior: RescaledPrior) -> "_ScaleWeights":
         """By what other scales do."""
-        (doubled, k_doubled), (halved, k_halved) = (_weights(ratio) for ratio in (prior.doubled, prior.halved))
+        (doubled, k_doubled), (halved, k_halved) = (_reliable_weights(ratio) for ratio in (prior.doubled, prior.halved))
         return cls(doubled, halved, k_doubled, k_halved)
 
     def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> WidthSensitivity:
@@ -214,7 +225,7 @@ class _Weighted:
         return WidthSensitivity(parameter, doubled, halved, self.k_doubled, self.k_halved)
 
 
-def _weights(log_ratio: np.ndarray) -> tuple[np.ndarray, float]:
+def _reliable_weights(log_ratio: np.ndarray) -> tuple[np.ndarray, float]:
     log_weights, pareto_k = smooth_weights(log_ratio)
     reliable = pareto_k <= RELIABLE_K
     return (np.exp(log_weights - log_weights.max()) if reliable else np.full(len(log_weights), np.nan)), pareto_k
@@ -228,7 +239,7 @@ def _quantiles(values: np.ndarray, order: np.ndarray, weights: np.ndarray) -> np
     return np.interp(_TAILS, share, values[order])
 
 
-def _scaled(part: np.ndarray) -> Callable[[np.ndarray], float]:
+def _make_power_scaling(part: np.ndarray) -> Callable[[np.ndarray], float]:
     """Function that gives a quantity's sensitivity to one part of the log density."""
     from arviz_stats.base import array_stats
 

@@ -19,7 +19,7 @@ _MOST_STEPS = 50
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
 
 
-def interval_ends(
+def find_interval_ends(
     rise: Callable[[float], float], center: float, error: float, ratio: float, freedom: float
 ) -> tuple[float, float]:
     """Limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
@@ -31,22 +31,23 @@ def interval_ends(
         ratio: V/C, variance of the parameter over what readings of unit scatter would give it.
         freedom: Degrees of freedom.
     """
-    far = quantile(freedom)
+    far = student_quantile(freedom)
 
     def above(z: float) -> float:
         risen = rise(z)
         return np.sqrt(max(risen, 0.0) / ratio) - far if np.isfinite(risen) else float("nan")
 
     step = float(np.clip(far * error, _LEAST_STEP, _MOST_STEP))
-    return _limit(above, center, -step), _limit(above, center, step)
+    return _find_limit(above, center, -step), _find_limit(above, center, step)
 
 
-def _limit(above: Callable[[float], float], center: float, step: float) -> float:
+def _find_limit(above: Callable[[float], float], center: float, step: float) -> float:
     """Where a function that is negative at the center first becomes positive, going by growing steps.
 
     About a good minimum it is nearly straight. So the second step goes a little farther than a straight line would have to,
     and no farther than the usual one. Where it is not a number short of there, the interval is the wider one.
     """
+
     def known(z: float) -> float:
         return float(np.nan_to_num(above(z), nan=-1.0))
 
@@ -63,7 +64,9 @@ def _limit(above: Callable[[float], float], center: float, step: float) -> float
         if np.isnan(reached):
             step = ahead = ahead / 4
         else:
-            straight = abs(_BEYOND * ahead * reached / (reached - least)) if inside == center and reached > least else np.inf
+            straight = (
+                abs(_BEYOND * ahead * reached / (reached - least)) if inside == center and reached > least else np.inf
+            )
             step = float(np.clip(2 * step, -_LONGEST_STEP, _LONGEST_STEP)) if ahead == step else step
             inside, ahead = outside, float(np.copysign(min(abs(step), straight), step))
         if inside == end or abs(step) < _LEAST_STEP:
@@ -85,28 +88,35 @@ def find_crossing(
         tolerance: How near a point has to be.
         close: Size of the function that is as good as zero.
     """
-    (last, found), (other, opposite) = (outside, above(outside)), (inside, above(inside))
-    part, least = found / (found - opposite), min(tolerance / 2 / abs(inside - outside), 0.5)
+    (last, last_value), (other, other_value) = (outside, above(outside)), (inside, above(inside))
+    part, least = last_value / (last_value - other_value), min(tolerance / 2 / abs(inside - outside), 0.5)
     part = min(max(part, least), 1 - least)
     while True:
         at = last + part * (other - last)
         value = above(at)
-        before, was = last, found
-        if (value > 0) != (found > 0):
-            before, was, other, opposite = other, opposite, last, found
-        last, found = at, value
+        older, older_value = last, last_value
+        if (value > 0) != (last_value > 0):
+            older, older_value, other, other_value = other, other_value, last, last_value
+        last, last_value = at, value
         least = tolerance / 2 / abs(other - last)
-        if abs(found) <= close or least > 0.5:
-            return last if abs(found) < abs(opposite) else other
-        place, height = (last - other) / (before - other), (found - opposite) / (was - opposite)
+        if abs(last_value) <= close or least > 0.5:
+            return last if abs(last_value) < abs(other_value) else other
+        x_ratio, y_ratio = (last - other) / (older - other), (last_value - other_value) / (older_value - other_value)
         part = 0.5
-        if height * height < place and (1 - height) * (1 - height) < 1 - place:
-            part = found / (opposite - found) * was / (opposite - was)
-            part += (before - last) / (other - last) * found / (was - found) * opposite / (was - opposite)
+        if y_ratio * y_ratio < x_ratio and (1 - y_ratio) * (1 - y_ratio) < 1 - x_ratio:
+            part = last_value / (other_value - last_value) * older_value / (other_value - older_value)
+            part += (
+                (older - last)
+                / (other - last)
+                * last_value
+                / (older_value - last_value)
+                * other_value
+                / (older_value - other_value)
+            )
         part = min(max(part, least), 1 - least)
 
 
-def quantile(freedom: float) -> float:
+def student_quantile(freedom: float) -> float:
     """Student's t that the interval reaches to."""
     from scipy.special import stdtrit
 

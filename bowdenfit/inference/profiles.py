@@ -23,15 +23,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bowdenfit.inference.linearized import blocks, linearize
+from bowdenfit.inference.linearized import iterate_blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, Problem, Solution, has_lower_end, total_squares
-from bowdenfit.inference.profile_limits import FARTHEST, interval_ends, quantile
-from bowdenfit.inference.solver import QUICK, gauss_newton
+from bowdenfit.inference.profile_limits import FARTHEST, find_interval_ends, student_quantile
+from bowdenfit.inference.solver import QUICK, gauss_newton_step
 from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
 
-UNKNOWN = (float("nan"), float("nan"))
+UNKNOWN_LIMITS = (float("nan"), float("nan"))
 _STUCK = 0.05  # part of what limits a parameter by which the sum of squares yet falls where the solver is stuck
 _ROUNDING = 1e-12  # of a sum of squares, which all of it is without scatter
 _ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
@@ -69,7 +69,7 @@ class Basin:
     """
 
     problem: Problem
-    found: Solution
+    solution: Solution
     at_end: np.ndarray
 
     @property
@@ -77,7 +77,7 @@ class Basin:
         """The free parameters."""
         return self.problem.posterior.model.space.free
 
-    def moved(self, index: int, z: float, near: Solution) -> Solution:
+    def solve_pinned(self, index: int, z: float, near: Solution) -> Solution:
         """The minimum with one parameter pinned at z; others leave the end of their range where that is better.
 
         Args:
@@ -85,32 +85,34 @@ class Basin:
             z: Where it is pinned.
             near: The minimum with it pinned elsewhere, or free.
         """
-        this = np.arange(len(near["z"])) == index
-        ended = self.at_end & ~this
-        pin = np.where(this, z, self.found["z"])
-        found = self._solved(self._toward(near, this, z), this | ended, pin)
-        side = np.sign(self.found["z"])
-        if not ended.any() or not np.any(ended & (side * self._gradient(np.where(ended, side * _AT_END, found["z"])) > 0)):
-            return found
-        return min(found, self._solved(np.where(ended, side * _INSIDE, found["z"]), this, pin), key=total_squares)
+        mask = np.arange(len(near["z"])) == index
+        ended = self.at_end & ~mask
+        pin = np.where(mask, z, self.solution["z"])
+        solution = self._solve(self._extrapolate(near, mask, z), mask | ended, pin)
+        side = np.sign(self.solution["z"])
+        if not ended.any() or not np.any(
+            ended & (side * self._gradient(np.where(ended, side * _AT_END, solution["z"])) > 0)
+        ):
+            return solution
+        return min(solution, self._solve(np.where(ended, side * _INSIDE, solution["z"]), mask, pin), key=total_squares)
 
-    def _toward(self, near: Solution, this: np.ndarray, z: float) -> np.ndarray:
+    def _extrapolate(self, near: Solution, mask: np.ndarray, z: float) -> np.ndarray:
         """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""
-        others = ~(self.problem.noise | self.at_end | this)
+        others = ~(self.problem.noise | self.at_end | mask)
         jacobian = np.concatenate([near["sensitivity"], np.diag(self.problem.weight)])
-        residuals = near["stacked"] + jacobian @ np.where(this, z - near["z"], 0.0)
+        residuals = near["stacked"] + jacobian @ np.where(mask, z - near["z"], 0.0)
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residuals))):
             return near["z"]
-        step = np.zeros(len(this))
-        step[others] = gauss_newton(jacobian[:, others], residuals)
+        step = np.zeros(len(mask))
+        step[others] = gauss_newton_step(jacobian[:, others], residuals)
         return near["z"] + step if np.all(np.abs(step) <= _FAR) else near["z"]
 
-    def _solved(self, start: np.ndarray, pinned: np.ndarray | bool, pin: np.ndarray) -> Solution:
+    def _solve(self, start: np.ndarray, pinned: np.ndarray | bool, pin: np.ndarray) -> Solution:
         return self.problem.solve(start, pinned, pin, QUICK)
 
     def _gradient(self, z: np.ndarray) -> np.ndarray:
         """Of half the sum of squares."""
-        there = self._solved(z, True, z)
+        there = self._solve(z, True, z)
         return there["stacked"][: -len(z)] @ there["sensitivity"]
 
     def value(self, index: int, z: float) -> float:
@@ -121,7 +123,7 @@ class Basin:
         if z < 0 and not (has_lower_end((parameter,))[0] or np.isfinite(z)):
             return float("-inf")
         at = np.clip(np.full(len(self.parameters), z), -FARTHEST, FARTHEST)
-        values = self._solved(at, True, at)["values"]
+        values = self._solve(at, True, at)["values"]
         return float(values[index]) * parameter.shown_scale
 
 
@@ -137,23 +139,23 @@ class Rise:
 
     def __init__(self, basin: Basin, index: int) -> None:
         self._basin, self._index = basin, index
-        self._known = {float(basin.found["z"][index]): basin.found}
-        self._center, self._least = float(basin.found["z"][index]), total_squares(basin.found)
+        self._known = {float(basin.solution["z"][index]): basin.solution}
+        self._center, self._least = float(basin.solution["z"][index]), total_squares(basin.solution)
 
     def __call__(self, z: float) -> float:
         """The rise at z."""
         if z not in self._known:
-            way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._told(at)]
-            self._known[z] = self._basin.moved(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
-        return total_squares(self._known[z]) - self._least if self._told(z) else float("nan")
+            way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._is_known(at)]
+            self._known[z] = self._basin.solve_pinned(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
+        return total_squares(self._known[z]) - self._least if self._is_known(z) else float("nan")
 
-    def _told(self, z: float) -> bool:
+    def _is_known(self, z: float) -> bool:
         return bool(np.isfinite(total_squares(self._known[z])))
 
     @property
     def lowest(self) -> Solution:
         """Where the sum of squares was the least."""
-        return min((found for at, found in self._known.items() if self._told(at)), key=total_squares)
+        return min((solution for at, solution in self._known.items() if self._is_known(at)), key=total_squares)
 
     @property
     def most_fall(self) -> float:
@@ -161,10 +163,10 @@ class Rise:
 
         At a kink of the residuals it ends where their tangent plane says that much is to be gained.
         """
-        return max(found["fall"] for at, found in self._known.items() if self._told(at))
+        return max(solution["fall"] for at, solution in self._known.items() if self._is_known(at))
 
 
-def profile(
+def compute_profile(
     posterior: LogDensity,
     objective: Objective,
     name: str,
@@ -183,11 +185,11 @@ def profile(
         with_priors: Whether the priors count as measurements of the parameters.
     """
     problem, index = Problem(posterior, objective, with_priors), posterior.model.space.index[name]
-    found = problem.solve(start)
-    basin = Basin(problem, found, np.zeros_like(problem.noise))
+    solution = problem.solve(start)
+    basin = Basin(problem, solution, np.zeros_like(problem.noise))
     rise = Rise(basin, index)
     pins = [float(pin) for pin in np.sort(z)]
-    rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - found["z"][index]))}  # outward
+    rises = {pin: rise(pin) for pin in sorted(pins, key=lambda pin: abs(pin - solution["z"][index]))}  # outward
     return Profile(name, np.array([basin.value(index, pin) for pin in pins]), np.array([rises[pin] for pin in pins]))
 
 
@@ -201,26 +203,26 @@ class ProfileIntervals:
         lower: Where the sum of squares was the least, if that is lower than the minimum.
     """
 
-    of: dict[str, tuple[float, float]] = field(default_factory=dict)
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     stuck: bool = False
     lower: Solution | None = None
 
 
-def profile_intervals(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> ProfileIntervals:
+def compute_profile_intervals(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> ProfileIntervals:
     """90 % intervals of determined parameters, by the scatter of each residual about the minimum."""
-    found, lowest, least_level = {}, basin.found, np.inf
-    cheap = basin.found["jacobian"].size <= _SMALL
+    limits, lowest, least_level = {}, basin.solution, np.inf
+    cheap = basin.solution["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
         if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):
-            error, ratio, freedom = _spread(basin, scale, i)
+            error, ratio, freedom = _estimate_spread(basin, scale, i)
             if ratio > 0:
-                rise, level = Rise(basin, i), ratio * quantile(freedom) ** 2
-                ends = interval_ends(rise, float(basin.found["z"][i]), error, ratio, freedom)
+                rise, level = Rise(basin, i), ratio * student_quantile(freedom) ** 2
+                ends = find_interval_ends(rise, float(basin.solution["z"][i]), error, ratio, freedom)
                 of_this = basin.value(i, ends[0]), basin.value(i, ends[1])
-                found[p.name] = UNKNOWN if is_stuck(rise.most_fall, level) else of_this
+                limits[p.name] = UNKNOWN_LIMITS if is_stuck(rise.most_fall, level) else of_this
                 lowest, least_level = min(lowest, rise.lowest, key=total_squares), min(level, least_level)
-    lower = total_squares(lowest) < total_squares(basin.found) - max(_LOWER * least_level, _ROUNDING)
-    return ProfileIntervals(found, is_stuck(basin.found["fall"], least_level), lowest if lower else None)
+    lower = total_squares(lowest) < total_squares(basin.solution) - max(_LOWER * least_level, _ROUNDING)
+    return ProfileIntervals(limits, is_stuck(basin.solution["fall"], least_level), lowest if lower else None)
 
 
 def is_stuck(fall: float, level: float) -> bool:
@@ -228,26 +230,30 @@ def is_stuck(fall: float, level: float) -> bool:
     return bool(fall > max(_STUCK * level, _ROUNDING))
 
 
-def _spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, float]:
+def _estimate_spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, float]:
     """Standard error of z of a parameter, its variance over that by readings of unit scatter, and degrees of freedom.
 
     Not numbers where the readings say nothing of it, not even a little inside its range.
     """
-    found, terms = basin.found, basin.problem.posterior.model.terms
+    solution, terms = basin.solution, basin.problem.posterior.model.terms
     if basin.at_end[index]:  # where z has no influence; a little inside its range
-        found = basin.moved(index, float(np.copysign(_INSIDE, basin.found["z"][index])), basin.found)
+        solution = basin.solve_pinned(index, float(np.copysign(_INSIDE, basin.solution["z"][index])), basin.solution)
     columns = np.flatnonzero(~basin.problem.noise & ~basin.at_end | (np.arange(len(basin.at_end)) == index))
-    about = linearize(found["sensitivity"][:, columns])
-    place = int(np.searchsorted(columns, index))
-    if not about.determined[place] or not about.unit_error[place] > 0:
+    linearized = linearize(solution["sensitivity"][:, columns])
+    column = int(np.searchsorted(columns, index))
+    if not linearized.determined[column] or not linearized.unit_error[column] > 0:
         return float("nan"), float("nan"), 1.0
-    moves = about.moves(scale)[place] ** 2
+    moves = linearized.moves(scale)[column] ** 2
     parts = [
         (np.sum(moves[rows]), freedom)
-        for _, rows, _, freedom in blocks(terms, basin.found["residuals"], about.leverage)
+        for _, rows, _, freedom in iterate_blocks(terms, basin.solution["residuals"], linearized.leverage)
     ]
     variance = float(np.sum(moves))
-    return float(np.sqrt(variance)), variance / float(about.unit_error[place]) ** 2, satterthwaite_freedom(*np.array(parts).T)
+    return (
+        float(np.sqrt(variance)),
+        variance / float(linearized.unit_error[column]) ** 2,
+        satterthwaite_freedom(*np.array(parts).T),
+    )
 
 
 def satterthwaite_freedom(parts: np.ndarray, freedom: np.ndarray) -> float:

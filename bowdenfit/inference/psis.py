@@ -37,7 +37,7 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
     if not np.ptp(ratios) > _FLAT:
         return equal, 0.0
     try:
-        with _no_tail_is_an_error():
+        with _raise_without_tail():
             # ArviZ's function takes what is left out, the log likelihood, and turns its sign itself.
             log_weights, k = array_stats.psislw(-ratios, r_eff=share, axis=0)
     except (ValueError, UserWarning):
@@ -76,14 +76,14 @@ def power_weights(part: np.ndarray, alpha: float) -> np.ndarray:
     from arviz_stats.base import array_stats
 
     try:
-        with _no_tail_is_an_error():
+        with _raise_without_tail():
             return np.exp(array_stats.power_scale_lw(part, alpha, axis=(-2, -1)))
     except (ValueError, UserWarning):
         return np.exp((alpha - 1) * part - np.max((alpha - 1) * part))
 
 
 @contextmanager
-def _no_tail_is_an_error() -> Iterator[None]:
+def _raise_without_tail() -> Iterator[None]:
     """ArviZ raises where all draws of a tail are alike, and warns where they are too few: an error too, for its caller.
 
     Where the lower quarter of a tail is alike it divides by zero; what is not finite then is looked at by the caller.

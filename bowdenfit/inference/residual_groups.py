@@ -47,7 +47,7 @@ class ResidualGroup:
     rows: slice
     residuals: np.ndarray
     jacobian: np.ndarray
-    of_runs: np.ndarray
+    run_columns: np.ndarray
     unit: np.ndarray
     reading: np.ndarray
     lever: np.ndarray
@@ -61,11 +61,11 @@ class ResidualGroup:
     scatter: float = 1.0
     effect: np.ndarray | None = None
 
-    def excess(self, some: np.ndarray) -> float:
+    def excess(self, selected: np.ndarray) -> float:
         """How much more some of them read than the model says, over what is read [1]."""
-        read = np.abs(self.reading[some])
+        read = np.abs(self.reading[selected])
         total = np.sum(read) or len(read) * np.mean(np.abs(self.reading))  # where nothing is read there, of all of them
-        return float(np.sum((self.unit * self.residuals)[some]) / total)
+        return float(np.sum((self.unit * self.residuals)[selected]) / total)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class ResidualGroups:
     readings: tuple[ResidualGroup, ...]
 
 
-def group_residuals(model: Model, found: Mapping[str, Any]) -> ResidualGroups:
+def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups:
     """Every residual of least squares in its place.
 
     Args:
@@ -91,28 +91,28 @@ def group_residuals(model: Model, found: Mapping[str, Any]) -> ResidualGroups:
         found: The minimum: residuals and expected readings by term, Jacobian, values.
     """
     values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
-    values |= dict(zip((p.name for p in model.space.free), found["values"], strict=True))
+    values |= dict(zip((p.name for p in model.space.free), solution["values"], strict=True))
     blocks, start, position = list[ResidualGroup](), 0, 0
     for term in model.terms:
-        size = len(found["residuals"][term.name])
-        of_term = found["residuals"][term.name], found["jacobian"][position : position + size]
+        size = len(solution["residuals"][term.name])
+        of_term = solution["residuals"][term.name], solution["jacobian"][position : position + size]
         position += size
-        for block in _blocks(term, model.places.get(term.name), *of_term, found["readings"][term.name], values):
+        for block in _make_blocks(term, model.places.get(term.name), *of_term, solution["readings"][term.name], values):
             stop = start + len(block.residuals)
             blocks.append(replace(block, rows=slice(start, stop)))
             start = stop
-    return _weighed(blocks)
+    return _weigh_by_scatter(blocks)
 
 
-def _weighed(blocks: list[ResidualGroup]) -> ResidualGroups:
+def _weigh_by_scatter(blocks: list[ResidualGroup]) -> ResidualGroups:
     """Weighed by the scatter that the parameters leave, which needs the parameters' share of each residual first."""
-    residuals, followed = _projected(blocks)
+    residuals, followed = _project_out(blocks)
     for i, block in enumerate(blocks):
         freedom = block.count - float(np.sum(followed[block.rows] ** 2))
         left = float(np.sum(residuals[block.rows] ** 2)) + block.extra
         if freedom > _LEAST_FREEDOM and left > 0:
             blocks[i] = replace(block, scatter=float(np.sqrt(left / freedom)), extra=block.extra * freedom / left)
-    residuals, followed = _projected(blocks)
+    residuals, followed = _project_out(blocks)
     freedoms = [block.count - float(np.sum(followed[block.rows] ** 2)) for block in blocks]
     tested = (
         replace(block, freedom=freedom)
@@ -122,23 +122,23 @@ def _weighed(blocks: list[ResidualGroup]) -> ResidualGroups:
     return ResidualGroups(residuals, followed, tuple(tested))
 
 
-def _projected(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
+def _project_out(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
     """Residuals less what can be followed, and orthonormal columns of that."""
     residuals = np.concatenate([block.residuals / block.scatter for block in blocks])
-    n_runs = sum(block.of_runs.shape[1] for block in blocks)
+    n_runs = sum(block.run_columns.shape[1] for block in blocks)
     columns = np.zeros((len(residuals), blocks[0].jacobian.shape[1] + n_runs))
     at = blocks[0].jacobian.shape[1]
     for block in blocks:
         columns[block.rows, : block.jacobian.shape[1]] = block.jacobian / block.scatter
-        columns[block.rows, at : at + block.of_runs.shape[1]] = block.of_runs
-        at += block.of_runs.shape[1]
+        columns[block.rows, at : at + block.run_columns.shape[1]] = block.run_columns
+        at += block.run_columns.shape[1]
     size = np.linalg.norm(columns, axis=0)
     u, s, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
     followed = u[:, s > _SINGULAR]
     return residuals - followed @ (followed.T @ residuals), followed
 
 
-def _blocks(
+def _make_blocks(
     term: Term,
     places: Places | None,
     residuals: np.ndarray,
@@ -148,7 +148,7 @@ def _blocks(
 ) -> Iterator[ResidualGroup]:
     """Readings of a term that scatter alike: the first are told apart, further ones only where they are inside runs."""
     first, *others = term.residual_blocks
-    of_labels = _of_labels(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
+    of_labels = _labelled_block(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
     effect = getattr(term, "friction_effect", None)
     yield of_labels if effect is None else replace(of_labels, effect=np.asarray(effect(values)))
     start = first[0]
@@ -156,13 +156,13 @@ def _blocks(
         rows = slice(start, start + count)
         inside = getattr(term, "inside", None)
         if inside is not None:
-            yield _inside(term, inside, residuals[rows], jacobian[rows], values)
+            yield _inside_run_block(term, inside, residuals[rows], jacobian[rows], values)
         else:
-            yield _untold(term, residuals[rows], jacobian[rows], independent)
+            yield _bare_block(term, residuals[rows], jacobian[rows], independent)
         start = rows.stop
 
 
-def _untold(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> ResidualGroup:
+def _bare_block(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> ResidualGroup:
     """Residuals that nothing is known of but their scatter."""
     n = len(residuals)
     nothing, none = np.zeros(n), np.zeros(n, dtype=bool)
@@ -171,32 +171,32 @@ def _untold(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: floa
     )  # fmt: skip
 
 
-def _of_labels(
+def _labelled_block(
     term: Term, places: Places | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
 ) -> ResidualGroup:
     """The readings that results name, or whole runs."""
     n = len(residuals)
-    untold = _untold(term, residuals, jacobian, float(np.count_nonzero(residuals)))
+    bare = _bare_block(term, residuals, jacobian, float(np.count_nonzero(residuals)))
     observed = term.observed()
     if places is None or len(observed) < n or len(expected) != len(observed):
-        return untold
-    read, said = observed[:n], np.asarray(expected)[:n]
+        return bare
+    read, predicted = observed[:n], np.asarray(expected)[:n]
     if term.unit == "1":
-        read, said = -np.log(read), -np.log(np.maximum(said, _NOTHING_LEFT))
+        read, predicted = -np.log(read), -np.log(np.maximum(predicted, _NOTHING_LEFT))
     used = np.isfinite(read) & (np.abs(residuals) > _SINGULAR)
-    unit = np.abs(np.divide(read - said, residuals, out=np.full(n, np.nan), where=used))
+    unit = np.abs(np.divide(read - predicted, residuals, out=np.full(n, np.nan), where=used))
     unit = np.where(unit > 0, unit, np.nanmedian(unit[unit > 0]) if np.any(unit > 0) else 1.0)
-    sign = np.sign(np.nansum((read - said) * residuals))
+    sign = np.sign(np.nansum((read - predicted) * residuals))
     reading = np.where(used, read, 0.0)
     numbers = {label: x[:n] for label, x in places.numbers.items() if label != RUN}  # which is their order
     back = {STROKE: places.back[:n].astype(float)}
     return replace(
-        untold, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],
+        bare, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],
         at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()), labels=tuple(term.labels[:n]),
     )  # fmt: skip
 
 
-def _inside(
+def _inside_run_block(
     term: Any, inside: InsideRuns, residuals: np.ndarray, jacobian: np.ndarray, values: Mapping[str, float]
 ) -> ResidualGroup:
     """Readings inside runs, one by one: the residual of their cell, and how far they lie from it."""

@@ -68,7 +68,7 @@ class SamplerAgreement:
         return self.first, self.second
 
     @property
-    def beyond_chance(self) -> tuple[SamplerDifference, ...]:
+    def significant(self) -> tuple[SamplerDifference, ...]:
         """Differences that chance does not explain and that are large enough to matter, the largest first."""
         seen = [d for d in self.differences if d.errors > self.limit and abs(d.sds) > NOTICEABLE]
         return tuple(sorted(seen, key=lambda d: -abs(d.sds)))
@@ -81,7 +81,7 @@ class SamplerAgreement:
     @property
     def agree(self) -> bool:
         """Whether no difference is beyond chance and noticeable."""
-        return not self.beyond_chance
+        return not self.significant
 
     def sentence(self) -> str:
         """What was found, for people."""
@@ -93,7 +93,7 @@ class SamplerAgreement:
                 f"parameter and answer differ by at most {abs(most.sds):.2f} standard deviations ({most.summary} of "
                 f"{most.quantity}, whose Monte Carlo error is {most.error:.2f}).{sharper}"
             )
-        first, *others = self.beyond_chance
+        first, *others = self.significant
         more = f" and on {len(others)} more" if others else ""
         return (
             f"{one} and {two} disagree on the {first.summary} of {first.quantity}, by {abs(first.sds):.2f} standard "
@@ -127,9 +127,9 @@ class SamplerDraws:
         """
         ratios = []
         for draws in self.draws.values():
-            parts = [_values(part) for part in np.split(draws, self.n_ensembles)]
+            parts = [_summarize(part) for part in np.split(draws, self.n_ensembles)]
             between = np.var(parts, axis=0, ddof=1) / self.n_ensembles
-            errors = np.array(_errors(draws))
+            errors = np.array(_standard_errors(draws))
             known = np.isfinite(errors) & (errors > 0)
             ratios += list(between[known] / errors[known] ** 2)
         return float(np.sqrt(max(np.mean(ratios), 1.0))) if ratios else 1.0
@@ -142,43 +142,43 @@ def compare_samplers(first: SamplerDraws, second: SamplerDraws) -> SamplerAgreem
     thousand comparisons of fits at the most.
     """
     scales = first.error_scale(), second.error_scale()
-    found = tuple(d for name in first.draws for d in _differences(name, first, second, scales))
-    limit = NormalDist().inv_cdf(1 - FALSE_ALARM / 2 / max(len(found), 1))
-    return SamplerAgreement(first.sampler, second.sampler, found, limit)
+    differences = tuple(d for name in first.draws for d in _differences(name, first, second, scales))
+    limit = NormalDist().inv_cdf(1 - FALSE_ALARM / 2 / max(len(differences), 1))
+    return SamplerAgreement(first.sampler, second.sampler, differences, limit)
 
 
 def _differences(name: str, first: SamplerDraws, second: SamplerDraws, scales: tuple[float, float]) -> list[SamplerDifference]:
     draws, others = first.draws[name], second.draws[name]
     sd = float(np.sqrt((np.var(draws) + np.var(others)) / 2)) or 1.0
-    found = []
+    differences = []
     for summary, value, other, error, other_error in zip(
-        SUMMARIES, _values(draws), _values(others), _errors(draws), _errors(others), strict=True
+        SUMMARIES, _summarize(draws), _summarize(others), _standard_errors(draws), _standard_errors(others), strict=True
     ):
         both = float(np.hypot(scales[0] * error, scales[1] * other_error))
-        found.append(SamplerDifference(name, summary, float(other - value) / sd, both / sd))
-    return found
+        differences.append(SamplerDifference(name, summary, float(other - value) / sd, both / sd))
+    return differences
 
 
-def _values(draws: np.ndarray) -> list[float]:
+def _summarize(draws: np.ndarray) -> list[float]:
     """Of `SUMMARIES`."""
     return [float(np.mean(draws)), float(np.std(draws)), *map(float, np.quantile(draws, (0.05, 0.95)))]
 
 
-def _errors(draws: np.ndarray) -> list[float]:
+def _standard_errors(draws: np.ndarray) -> list[float]:
     """Monte Carlo standard errors of `SUMMARIES`, if every walker is independent of the others."""
     from arviz_stats.base import array_stats
 
     if np.ptp(draws) == 0:
         return [0.0] * len(SUMMARIES)
-    asked: tuple[dict[str, Any], ...] = (
+    statistics: tuple[dict[str, Any], ...] = (
         {"method": "mean"},
         {"method": "sd"},
         *({"method": "quantile", "prob": p} for p in (0.05, 0.95)),
     )
-    return [float(array_stats.mcse(draws, chain_axis=0, draw_axis=1, **options)) for options in asked]
+    return [float(array_stats.mcse(draws, chain_axis=0, draw_axis=1, **options)) for options in statistics]
 
 
-def recommendation(sampler: str, n_parameters: int, short: bool) -> str:
+def recommend_sampler(sampler: str, n_parameters: int, short: bool) -> str:
     """A sentence that recommends the other sampler where emcee does badly, or is likely to; empty otherwise."""
     if sampler != "emcee":
         return ""

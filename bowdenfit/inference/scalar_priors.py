@@ -17,12 +17,12 @@ _FARTHEST = 6.0
 
 def value_at(prior: Prior, z: float) -> float:
     """`Prior.constrain` of one number."""
-    return _through(prior, "constrain", z)
+    return _apply(prior, "constrain", z)
 
 
 def z_at(prior: Prior, value: float) -> float:
     """`Prior.unconstrain` of one number."""
-    return _through(prior, "unconstrain", value)
+    return _apply(prior, "unconstrain", value)
 
 
 def clipped_z(prior: Prior, value: float) -> float:
@@ -30,9 +30,9 @@ def clipped_z(prior: Prior, value: float) -> float:
     return float(np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST))
 
 
-def _through(prior: Prior, way: str, number: float) -> float:
+def _apply(prior: Prior, way: str, number: float) -> float:
     with jax.enable_x64(True):
-        return float(_program(type(prior), way)({name: float(each) for name, each in vars(prior).items()}, float(number)))
+        return float(_program(type(prior), way)({name: float(value) for name, value in vars(prior).items()}, float(number)))
 
 
 @cache

@@ -69,7 +69,7 @@ class Minimum:
     @cached_property
     def fall(self) -> float:
         """By how much the sum of squares would yet fall if residuals were straight: nothing at a minimum, but at kinks."""
-        return _left(self)[1] ** 2 if np.all(np.isfinite(self.residuals)) else float("inf")
+        return _remaining_step(self)[1] ** 2 if np.all(np.isfinite(self.residuals)) else float("inf")
 
 
 def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECISE) -> Minimum:
@@ -85,26 +85,26 @@ def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECI
         return first
     if not np.any(first.jacobian):  # nothing moves the residuals
         return replace(first, succeeded=True)
-    found = _polish(evaluate, _descend(evaluate, first, precision, _RADIUS), precision)
-    if found.succeeded and found.fall <= _SMOOTH**2 * found.sum_of_squares:
-        return found
+    minimum = _polish(evaluate, _descend(evaluate, first, precision, _RADIUS), precision)
+    if minimum.succeeded and minimum.fall <= _SMOOTH**2 * minimum.sum_of_squares:
+        return minimum
     # It has stopped short: at a kink of the residuals, or in a long bend. One that ran out of evaluations goes on.
-    again = (found,) if precision != PRECISE and not found.succeeded else (first, found)
+    again = (minimum,) if precision != PRECISE and not minimum.succeeded else (first, minimum)
     others = [_polish(evaluate, _descend(evaluate, at, precision, _BOLD_RADIUS), precision) for at in again]
-    return min([found, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
+    return min([minimum, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
 
 
-def prepare(rows: int, columns: int) -> None:
+def compile_solver(rows: int, columns: int) -> None:
     """Compile what solves of a shape need, in a thread beside something else; the first of them does it otherwise."""
     import jax
 
-    from bowdenfit.inference.levenberg_marquardt import stepper
+    from bowdenfit.inference.levenberg_marquardt import compile_stepper
 
     with jax.enable_x64(True):  # the setting is each thread's own
-        stepper(rows, columns)
+        compile_stepper(rows, columns)
 
 
-def orthogonal(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def orthogonalize(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Q and the inverse of R of a Jacobian's QR decomposition: errors of readings e move the parameters by R^-1 Q^T e.
 
     The normal equations, whose condition number is the square, are never formed.
@@ -117,7 +117,7 @@ def orthogonal(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return q, np.linalg.inv(r) / size[:, None]
 
 
-def gauss_newton(jacobian: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+def gauss_newton_step(jacobian: np.ndarray, residuals: np.ndarray) -> np.ndarray:
     """The undamped step: to the minimum where residuals are linear, and none in a direction that they do not tell."""
     size = np.linalg.norm(jacobian, axis=0)
     size = np.where(size > 0, size, np.inf)
@@ -126,10 +126,10 @@ def gauss_newton(jacobian: np.ndarray, residuals: np.ndarray) -> np.ndarray:
 
 def _descend(evaluate: Evaluate, at: Minimum, precision: Precision, radius: float) -> Minimum:
     """Where Levenberg-Marquardt from a point ends."""
-    from bowdenfit.inference.levenberg_marquardt import stepper
+    from bowdenfit.inference.levenberg_marquardt import compile_stepper
 
     settings = precision.change, precision.gradient, radius
-    advance, state = stepper(*at.jacobian.shape)
+    advance, state = compile_stepper(*at.jacobian.shape)
     best, x = replace(at, succeeded=False), at.x
     with np.errstate(over="ignore", invalid="ignore"):  # a step may go where nothing can be computed, and is taken back
         for count in range(precision.evaluations):
@@ -141,27 +141,27 @@ def _descend(evaluate: Evaluate, at: Minimum, precision: Precision, radius: floa
     return best
 
 
-def _polish(evaluate: Evaluate, found: Minimum, precision: Precision) -> Minimum:
+def _polish(evaluate: Evaluate, minimum: Minimum, precision: Precision) -> Minimum:
     """Gauss-Newton steps from where a method stopped, as long as each shortens what is left of the gradient."""
-    step, left = _left(found)
+    step, left = _remaining_step(minimum)
     for _ in range(_MOST_POLISHING):
-        flat = left <= precision.gradient * np.linalg.norm(found.residuals)
-        if flat or np.any(np.abs(step) > np.maximum(np.abs(found.x), 1.0)):
+        flat = left <= precision.gradient * np.linalg.norm(minimum.residuals)
+        if flat or np.any(np.abs(step) > np.maximum(np.abs(minimum.x), 1.0)):
             break
-        x = found.x + step
-        trial = Minimum(x, *evaluate(x), found.succeeded)
+        x = minimum.x + step
+        trial = Minimum(x, *evaluate(x), minimum.succeeded)
         if not np.all(np.isfinite(trial.residuals)) or not np.all(np.isfinite(trial.jacobian)):
             break
-        next_step, next_left = _left(trial)
-        bent = np.linalg.norm(trial.residuals - found.residuals - found.jacobian @ step)
+        next_step, next_left = _remaining_step(trial)
+        bent = np.linalg.norm(trial.residuals - minimum.residuals - minimum.jacobian @ step)
         if next_left > _SHRINKS * left or bent > _STRAIGHT * left:
             break
-        found, step, left = trial, next_step, next_left
-    return found
+        minimum, step, left = trial, next_step, next_left
+    return minimum
 
 
-def _left(found: Minimum) -> tuple[np.ndarray, float]:
+def _remaining_step(minimum: Minimum) -> tuple[np.ndarray, float]:
     """The undamped step, and the length of the residuals along the tangent plane, which it would take off."""
-    jacobian = np.where(np.isfinite(found.jacobian), found.jacobian, 0.0)
-    step = gauss_newton(jacobian, found.residuals)
+    jacobian = np.where(np.isfinite(minimum.jacobian), minimum.jacobian, 0.0)
+    step = gauss_newton_step(jacobian, minimum.residuals)
     return step, float(np.linalg.norm(jacobian @ step))

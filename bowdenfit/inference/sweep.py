@@ -48,7 +48,7 @@ def count_walker_numbers(size: int) -> int:
     return 1 + count_move_numbers(size)
 
 
-def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps) -> Callable[..., Any]:
+def make_walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps) -> Callable[..., Any]:
     """Steps of all walkers of an ensemble, of what is `SweepChoices`, z (walker, parameter), and data.
 
     They give z and log densities after them, and how many proposals of every walker were accepted. The halves of the ensemble
@@ -61,10 +61,10 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
     """
     proposals = [move for move, _ in moves]
 
-    def sweep(chosen: SweepChoices, z: Array, data: Any) -> tuple[Array, Array, Array]:
-        def place(given: Array, is_z: bool) -> Walkers:
-            ways = [partial(_through, frame, is_z) for frame, _ in frames]
-            w, z, volume = jax.lax.switch(chosen.frame, ways, given, data)
+    def sweep(choices: SweepChoices, z: Array, data: Any) -> tuple[Array, Array, Array]:
+        def evaluate(points: Array, is_z: bool) -> Walkers:
+            ways = [partial(_apply_map, frame, is_z) for frame, _ in frames]
+            w, z, volume = jax.lax.switch(choices.frame, ways, points, data)
             value = jax.vmap(lambda one: log_density(one, data))(z)
             value, known = jnp.where(jnp.isnan(value), -jnp.inf, value), jnp.isfinite(volume)
             # Where coordinates do not reach: nothing is proposed there, and a walker that is there already stays.
@@ -75,24 +75,24 @@ def walker_sweep(log_density: Callable[[Array, Any], Array], moves: Moves, frame
         def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, RandomNumbers]) -> Any:
             (moving, resting), (kind, chance, numbers) = halves, turn
             w, factors = jax.lax.switch(kind, proposals, numbers, moving.w, resting.w)
-            proposed = place(w, is_z=False)._replace(accepted=moving.accepted + 1)
+            proposed = evaluate(w, is_z=False)._replace(accepted=moving.accepted + 1)
             better = factors + proposed.value_in_w - moving.value_in_w > jnp.log(chance)
             moved = jax.tree.map(lambda new, old: jax.vmap(jnp.where)(better, new, old), proposed, moving)
             return (resting, moved), None
 
-        begin, half = place(z, is_z=True), len(z) // 2
+        begin, half = evaluate(z, is_z=True), len(z) // 2
         halves = jax.tree.map(lambda rows: rows[:half], begin), jax.tree.map(lambda rows: rows[half:], begin)
-        uniform = to_uniform(chosen.bits).reshape(-1, *chosen.bits.shape[2:])
-        turns = jnp.repeat(chosen.kinds, 2), uniform[..., 0], random_numbers(uniform[..., 1:])
+        uniform = to_uniform(choices.bits).reshape(-1, *choices.bits.shape[2:])
+        turns = jnp.repeat(choices.kinds, 2), uniform[..., 0], random_numbers(uniform[..., 1:])
         ended = jax.tree.map(lambda *rows: jnp.concatenate(rows), *jax.lax.scan(half_step, halves, turns)[0])
         return ended.z, ended.value, ended.accepted
 
     return sweep
 
 
-def _through(frame: CoordinateMap, is_z: bool, given: Array, data: Any) -> tuple[Array, Array, Array]:
+def _apply_map(frame: CoordinateMap, is_z: bool, points: Array, data: Any) -> tuple[Array, Array, Array]:
     """W, z and log volume of walkers, of either of the first two."""
-    return frame(given, jnp.asarray(is_z), data)
+    return frame(points, jnp.asarray(is_z), data)
 
 
 def to_uniform(bits: Array | np.ndarray) -> Array:

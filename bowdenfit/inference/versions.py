@@ -15,15 +15,15 @@ def versions() -> dict[str, str]:
     """Of bowdenfit, Python and the libraries that computed."""
     from importlib.metadata import PackageNotFoundError, distribution
 
-    def of(package: str) -> str:
+    def version_of(package: str) -> str:
         try:
-            found = distribution(package)
+            installed = distribution(package)
         except PackageNotFoundError:
             return "(not installed)"
-        stated = re.search(r"^Version: (.+)$", found.read_text("METADATA") or "", re.MULTILINE)  # parsing all takes longer
-        return stated[1] if stated else found.version
+        stated = re.search(r"^Version: (.+)$", installed.read_text("METADATA") or "", re.MULTILINE)  # parsing all takes longer
+        return stated[1] if stated else installed.version
 
-    return {package: of(package) for package in VERSIONED} | {"python": platform.python_version()}
+    return {package: version_of(package) for package in VERSIONED} | {"python": platform.python_version()}
 
 
 def refuse_other_versions(of_client: dict[str, str]) -> None:
@@ -36,13 +36,13 @@ def refuse_other_versions(of_client: dict[str, str]) -> None:
         UsageError: Some differ.
     """
     here = versions()
-    other = [
+    differing = [
         f"{name} {here.get(name, '(not installed)')} (here {version})"
         for name, version in of_client.items()
         if here.get(name) != version
     ]
-    if other:
+    if differing:
         raise UsageError(
-            f"a worker has other versions: {listed(other)}. Draws must not depend on who makes them: install the same "
+            f"a worker has other versions: {listed(differing)}. Draws must not depend on who makes them: install the same "
             "versions on all workers as here, such as from constraints.txt."
         )

@@ -17,10 +17,10 @@ from bowdenfit.inference.conditional import Conditional
 from bowdenfit.inference.coordinates import CoordinateMaps, coordinate_maps, maps_without_ridge, z_map
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, default_moves
-from bowdenfit.inference.sweep import SweepChoices, count_walker_numbers, walker_sweep
+from bowdenfit.inference.sweep import SweepChoices, count_walker_numbers, make_walker_sweep
 
 
-class Shares(NamedTuple):
+class MoveShares(NamedTuple):
     """How often what is done.
 
     Args:
@@ -51,11 +51,11 @@ class WalkerPrograms(NamedTuple):
     """
 
     sweep: Callable[..., Any]
-    shares: Shares
+    shares: MoveShares
     later: "Callable[[], WalkerPrograms] | None" = None
 
 
-def walker_programs(
+def compile_walkers(
     posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None, beside: Executor | None = None
 ) -> WalkerPrograms:
     """The programs of one posterior.
@@ -72,21 +72,21 @@ def walker_programs(
     space = posterior.model.space
     of_what = posterior.log_density, posterior.data, space.size, settings
     if moves is not None:
-        return compiled_walkers(*of_what, ((z_map, 1.0),), moves, beside)
+        return compile_density_walkers(*of_what, ((z_map, 1.0),), moves, beside)
     if Conditional(posterior).is_narrow:
-        return compiled_walkers(*of_what, coordinate_maps(posterior), beside=beside)
+        return compile_density_walkers(*of_what, coordinate_maps(posterior), beside=beside)
     plain = maps_without_ridge(space)
-    first = compiled_walkers(*of_what, plain, beside=beside)
+    first = compile_density_walkers(*of_what, plain, beside=beside)
 
     @cache
     def later() -> WalkerPrograms:
         frames = coordinate_maps(posterior)
-        return compiled_walkers(*of_what, frames) if len(frames) > len(plain) else first
+        return compile_density_walkers(*of_what, frames) if len(frames) > len(plain) else first
 
     return first._replace(later=later)
 
 
-def compiled_walkers(
+def compile_density_walkers(
     log_density: Callable[[Array, Any], Array],
     data: Any,
     size: int,
@@ -108,7 +108,7 @@ def compiled_walkers(
     """
     shape = settings.walkers(size), size
     moves = moves or default_moves(size, shape[0])
-    shares = Shares(*(tuple(share for _, share in each) for each in (moves, frames)))
-    chosen = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
-    sweep, z = walker_sweep(log_density, moves, frames), jax.ShapeDtypeStruct(shape, jnp.float64)
-    return WalkerPrograms(compile_program(sweep, chosen, z, data, beside=beside), shares)
+    shares = MoveShares(*(tuple(share for _, share in weighted) for weighted in (moves, frames)))
+    choices = shares.choose(np.random.RandomState(0), shape)  # any, for its shapes
+    sweep, z = make_walker_sweep(log_density, moves, frames), jax.ShapeDtypeStruct(shape, jnp.float64)
+    return WalkerPrograms(compile_program(sweep, choices, z, data, beside=beside), shares)

@@ -37,7 +37,7 @@ def force_noise(at: Circumstances, meaning: str = "standard deviation of a force
 def noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
     """How forces scatter, in proportion to the loads."""
     load, part = at.cable.friction.conditions.load, at.defaults.force_noise_share
-    return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.share(part))
+    return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.describe_share(part))
 
 
 def offsets(at: Circumstances) -> list[Parameter]:
@@ -45,7 +45,7 @@ def offsets(at: Circumstances) -> list[Parameter]:
     if not at.description.fits_offsets:
         return []
     stated, load, part = at.description.sensors.offset_sd, at.cable.friction.conditions.load, at.defaults.offset_share
-    sd, by = (stated.to("force"), "") if stated is not None else (part * load.value, load.share(part))
+    sd, by = (stated.to("force"), "") if stated is not None else (part * load.value, load.describe_share(part))
     return [
         Parameter(
             name, f"$b$ {end}", f"offset of the {end} load cell", "sensor",

@@ -23,6 +23,6 @@ class Scale:
         """Such as "the median load, 39.1 N"."""
         return f"the {self.name}, {significant(self.value)} {self.unit}"
 
-    def share(self, part: float) -> str:
+    def describe_share(self, part: float) -> str:
         """Such as "5 % of the median load, 39.1 N"."""
         return f"{significant(100 * part)} % of {self}"

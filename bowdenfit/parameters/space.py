@@ -103,7 +103,7 @@ class ParameterSpace:
         for i, parameter in enumerate(self.free):
             kinds.setdefault(type(parameter.prior), []).append(i)
         return tuple(
-            (np.array(where), _stacked(kind, [self.free[i].prior for i in where])) for kind, where in kinds.items()
+            (np.array(where), _stack_priors(kind, [self.free[i].prior for i in where])) for kind, where in kinds.items()
         )
 
     @cached_property
@@ -139,6 +139,6 @@ class ParameterSpace:
         )
 
 
-def _stacked(kind: type, priors: list[Any]) -> Prior:
+def _stack_priors(kind: type, priors: list[Any]) -> Prior:
     """One prior of the given kind whose hyperparameters are the arrays of those of several."""
     return kind(**{field.name: np.array([getattr(p, field.name) for p in priors]) for field in fields(kind)})

@@ -11,7 +11,7 @@ _COMMAND = re.compile(r"\\([a-zA-Z]+) ?")
 _INDEX = re.compile(r"[a-zA-Z0-9]{1,2}")
 
 
-def symbol_of(letter: str, name: str) -> str:
+def make_symbol(letter: str, name: str) -> str:
     """A letter with a name behind it, or below it where that is no longer than an index.
 
     Args:
@@ -22,12 +22,12 @@ def symbol_of(letter: str, name: str) -> str:
     return rf"${letter}_\mathrm{{{plain}}}$" if _INDEX.fullmatch(plain) else f"${letter}$ " + plain.replace("$", r"\$")
 
 
-def in_letters(symbol: str) -> str:
+def to_plain_text(symbol: str) -> str:
     r"""A symbol as plain text can show it: 'μ1' of '$\mu_1$'."""
     formula = r"(?<!\\)\$(.*?)(?<!\\)\$"
-    return re.sub(formula, lambda found: _without_commands(found[1]), symbol).replace(r"\$", "$")
+    return re.sub(formula, lambda match: _strip_commands(match[1]), symbol).replace(r"\$", "$")
 
 
-def _without_commands(formula: str) -> str:
-    letters = _COMMAND.sub(lambda found: _GREEK.get(found[1], ""), formula)
+def _strip_commands(formula: str) -> str:
+    letters = _COMMAND.sub(lambda match: _GREEK.get(match[1], ""), formula)
     return re.sub(r"[{}_]", "", letters)

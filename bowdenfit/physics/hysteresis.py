@@ -41,15 +41,15 @@ def play_operator(
     References:
         On-body paper, figure 12 (its three phases are this operator's three states).
     """
-    anew = jnp.full(low.shape, jnp.nan) if restart is None else restart
+    restarts = jnp.full(low.shape, jnp.nan) if restart is None else restart
 
     def step(carry: tuple[Array, Array], now: tuple[Any, ...]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        (y, slope), (low, high, own, anew) = carry, now
+        (y, slope), (low, high, own, restarts) = carry, now
         by_low, by_high = (-1.0, 1.0) if own is None else own
-        y, slope = jnp.where(jnp.isnan(anew), y, anew), jnp.where(jnp.isnan(anew), slope, 0.0)
+        y, slope = jnp.where(jnp.isnan(restarts), y, restarts), jnp.where(jnp.isnan(restarts), slope, 0.0)
         slope = jnp.where(y < low, by_low, jnp.where(y > high, by_high, slope))
         y = jnp.clip(y, low, high)
         return (y, slope), (y, slope)
 
     begin = jnp.broadcast_to(start, low.shape[1:]).astype(low.dtype)
-    return jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (low, high, slopes, anew))[1]
+    return jax.lax.scan(step, (begin, jnp.zeros_like(begin)), (low, high, slopes, restarts))[1]

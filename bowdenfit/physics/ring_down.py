@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 _LEAST = 1e-12  # of 1 - zeta^2, at and beyond critical damping
 
 
-def peaks(
+def compute_peaks(
     amplitude: Float[Array, "*runs"],
     decay: Float[Array, "*runs"],
     held: Float[Array, "*runs"],
@@ -80,11 +80,11 @@ def ring_down(
     half = jnp.where(swinging, jnp.pi / (omega * root), jnp.inf)
     decay = jnp.where(swinging, jnp.exp(-jnp.pi * zeta / root), 0.0)
     held = friction / stiffness
-    begun = peaks(amplitude, decay, held * jnp.ones_like(decay), swings + 1)
+    peak_angles = compute_peaks(amplitude, decay, held * jnp.ones_like(decay), swings + 1)
     since = jnp.maximum(time, 0.0)
     passed = jnp.where(jnp.isinf(half[run]), 0.0, since / jnp.where(jnp.isinf(half[run]), 1.0, half[run]))
     number = jnp.minimum(jnp.floor(passed), swings).astype(int)
-    peak = begun[number, run]
+    peak = peak_angles[number, run]
     moves = (jnp.abs(peak) > held) & (number < swings)
     center = jnp.sign(peak) * held
     y = jnp.where(moves, peak - center, 0.0)

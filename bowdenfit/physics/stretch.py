@@ -84,9 +84,9 @@ def tension_from_extension(
     w = jnp.where(large, log_w - jnp.log(jnp.where(large, log_w, 2.0)), small / (1 + 0.63 * small))
     w = jnp.maximum(w, 1e-300)
     for _ in range(_ITERATIONS):
-        rest = log_w - jnp.log(w) - w
-        q = 2 * (1 + w) * (1 + w + 2 * rest / 3)
-        w = jnp.maximum(w * (1 + rest / (1 + w) * (q - rest) / (q - 2 * rest)), 1e-300)
+        residual = log_w - jnp.log(w) - w
+        q = 2 * (1 + w) * (1 + w + 2 * residual / 3)
+        w = jnp.maximum(w * (1 + residual / (1 + w) * (q - residual) / (q - 2 * residual)), 1e-300)
     tension = jnp.clip(bedding_load * (a + w), 0.0, stiffness * e)
     for _ in range(_POLISHES):
         missing = e - extension(tension, stiffness, bedding_stretch, bedding_load)
@@ -197,8 +197,8 @@ def mean_tension_from_shares(
     partly = 0.5 * jnp.log(jnp.minimum(ratio, 1e30)) <= friction_exponent
     # A load of 0 is never in this part; 1 in its place keeps the derivative of its root finite.
     held, now = jnp.sqrt(jnp.where(peak > 0, peak, 1.0)), jnp.sqrt(jnp.where(force > 0, force, 1.0))
-    given_back = (held - now) ** 2 / jnp.where(friction_exponent > 0, friction_exponent, 1.0)
-    return jnp.where(partly, peak * loading_share - given_back, force * unloading_share)
+    released = (held - now) ** 2 / jnp.where(friction_exponent > 0, friction_exponent, 1.0)
+    return jnp.where(partly, peak * loading_share - released, force * unloading_share)
 
 
 def preload_at(

@@ -114,18 +114,18 @@ class Tendon:
         force = self.rope.motor_force(travel, share, self.end_compliance * jnp.exp(-along))
         return force, share * force
 
-    def since(self, turn: Turn, travel: Array, stroke: Array) -> tuple[Array, Array]:
+    def sliding_after_turn(self, turn: Turn, travel: Array, stroke: Array) -> tuple[Array, Array]:
         """The same after a turn, until the slip front has crossed the rope and from then on."""
         moved = jnp.maximum(stroke * (travel - turn.travel), 0.0)
         mean = self.rope.tension(self.rope.extension(turn.mean) + stroke * moved)
-        before = _root(turn.force)
-        root = before + stroke * _root(self.exponent * jnp.abs(mean - turn.mean))
+        before = _safe_root(turn.force)
+        root = before + stroke * _safe_root(self.exponent * jnp.abs(mean - turn.mean))
         crossed = stroke * (root - before * jnp.exp(stroke * self.exponent)) >= 0
         force, of_sliding = self.sliding(travel, stroke)
         return jnp.where(crossed, force, root**2), jnp.where(crossed, of_sliding, mean)
 
 
-def _root(value: Array) -> Array:
+def _safe_root(value: Array) -> Array:
     """Square root with a derivative of 0 at 0."""
     positive = value > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, value, 1.0)), 0.0)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from bowdenfit.parameters.symbols import in_letters
+from bowdenfit.parameters.symbols import to_plain_text
 from bowdenfit.words import counted
 
 
@@ -36,5 +36,5 @@ def symbol_words(symbols: Iterable[tuple[str, str]]) -> str:
     Args:
         symbols: Each in matplotlib's math notation, and what it stands for; those that nothing is said of are left out.
     """
-    said = "; ".join(f"{in_letters(symbol)}: {what}" for symbol, what in symbols if what)
+    said = "; ".join(f"{to_plain_text(symbol)}: {what}" for symbol, what in symbols if what)
     return f"Symbols: {said}. " if said else ""

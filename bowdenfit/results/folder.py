@@ -296,10 +296,10 @@ def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
     Raises:
         StoreError: The folder cannot be written.
     """
-    from bowdenfit.inference.checkpoint import heading
+    from bowdenfit.inference.checkpoint import checkpoint_header
 
     with folder_to_write(path.parent), replace_when_whole(path) as temporary:
-        temporary.write_bytes(heading(fingerprint))
+        temporary.write_bytes(checkpoint_header(fingerprint))
 
 
 def read_checkpoint(folder: Path) -> dict[str, Any]:
@@ -308,19 +308,19 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
     Raises:
         StoreError: There is no checkpoint, or it is damaged.
     """
-    from bowdenfit.inference.checkpoint import damaged_checkpoint, fingerprint_of
+    from bowdenfit.inference.checkpoint import damaged_checkpoint_error, read_fingerprint
 
     path = folder / CHAIN
     if not path.exists():
         raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
     try:
-        found = fingerprint_of(path)
+        found = read_fingerprint(path)
         refuse_no_seed(found["seed"])
         if isinstance(found["description"], dict) and isinstance(found["sha256"], dict):
             return found
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         pass
-    raise damaged_checkpoint(path)
+    raise damaged_checkpoint_error(path)
 
 
 def refuse_no_seed(seed: Any) -> None:

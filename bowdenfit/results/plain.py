@@ -1,7 +1,7 @@
 """Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -12,7 +12,8 @@ def plain(answer: Any) -> Any:
     """An answer as programs read it: what is no finite number is None.
 
     A dataclass gives its fields, or what its `JSON` lists: names of attributes and methods, where `...` stands for all fields,
-    ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None.
+    ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None. A field with
+    `metadata={"key": ...}` stands under that key.
 
     Args:
         answer: Dataclasses, dictionaries, sequences, arrays and numbers, one in the other.
@@ -53,7 +54,7 @@ def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
     """Keys and values of a dataclass."""
     for entry in listed:
         if entry is ...:
-            yield from ((f.name, getattr(data, f.name)) for f in fields(data))
+            yield from ((stored_key(f), getattr(data, f.name)) for f in fields(data))
             continue
         key, name = entry if isinstance(entry, tuple) else (entry.removesuffix("?"), entry)
         value = getattr(data, name.removesuffix("?"))
@@ -85,11 +86,17 @@ def rebuilt(kind: Any, value: Any) -> Any:
         return tuple(rebuilt(part, item) for part, item in zip(each, value, strict=True))
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
-        since = {f.name for f in fields(kind) if f.name not in value and f.default is not MISSING}  # that it was stored
-        return kind(**{f.name: rebuilt(hints[f.name], value[f.name]) for f in fields(kind) if f.name not in since})
+        named = [(f, stored_key(f)) for f in fields(kind)]
+        present = [(f.name, key) for f, key in named if key in value or f.default is MISSING]  # others are newer than the data
+        return kind(**{name: rebuilt(hints[name], value[key]) for name, key in present})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
     return _number(value) if kind is float else value
+
+
+def stored_key(field: Field[Any]) -> str:
+    """Return the key under which a field is stored: its name, or the "key" of its metadata."""
+    return str(field.metadata.get("key", field.name))
 
 
 def _array(kind: Any, value: list[Any]) -> np.ndarray:

@@ -13,7 +13,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.engines.memory import refuse_shortage
-from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.versions import versions
@@ -82,13 +82,13 @@ def find_maximum(density: LogDensity, watch: Stopwatch) -> tuple[Objective, Maxi
         with watch.stage("compile least squares"):
             objective = make_objective(density)
         with watch.stage("maximum of the posterior"):
-            return objective, maximum_posterior(density, objective)
+            return objective, find_maximum_posterior(density, objective)
 
 
 def estimate(density: LogDensity, objective: Objective, start: MaximumPosterior, watch: Stopwatch) -> LeastSquares:
     """Return the classical estimates, which begin at the maximum of the posterior."""
     with jax.enable_x64(True), watch.stage("least squares"):
-        return least_squares(density, objective, start.z)
+        return fit_least_squares(density, objective, start.z)
 
 
 def _with_memory(report: Callable[..., None] | None) -> Callable[..., None]:

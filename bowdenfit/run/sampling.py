@@ -15,7 +15,7 @@ from bowdenfit.inference.chain import Chain, SamplingRequest
 from bowdenfit.inference.draws import for_each_draw, replicator
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.sampler_agreement import SAMPLER_NAMES, SamplerDraws, compare_samplers
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import Model
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws
@@ -73,7 +73,7 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
     model, settings, programs = density.model, density.model.description.sampler, dict[str, Any]()
     for name in samplers_of(settings.method):
         if name == "emcee":
-            programs[name] = walker_programs(density, settings, beside=beside)
+            programs[name] = compile_walkers(density, settings, beside=beside)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
     optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None

@@ -9,7 +9,7 @@ from warnings import warn
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, PLACE, Output, Seed, checked
-from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.inference.engines.memory import refuse_low_memory
 from bowdenfit.inference.engines.processes import keep_compiled_programs
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
@@ -62,7 +62,7 @@ def fit(
     from bowdenfit.results.folder import reserved
     from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler
 
-    refuse_too_little()
+    refuse_low_memory()
     folder = Path(output) if output is not None else None
     data = with_sampler(read(dataset, **reading), sampler, mcmc)
     with reserved(folder):

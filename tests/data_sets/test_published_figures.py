@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bowdenfit.dataset import Dataset, read_dataset
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
@@ -32,7 +32,7 @@ MEASURED = {440: 0.77, 470: 0.785, 510: 0.753, 550: 0.678}
 def _fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:
     posterior = LogDensity(build_model(dataset))
     objective = make_objective(posterior)
-    return posterior, least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+    return posterior, fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
 
 
 def _raw(folder: Path) -> dict:

@@ -77,10 +77,10 @@ def test_coefficients_given_everything_else_have_a_way_back_and_the_volume_of_th
         posterior = LogDensity(build_model(load_dataset(DATA / name)))
         given_others, data = Conditional(posterior), posterior.data
         z = jnp.asarray(np.random.default_rng(1).standard_normal((20, posterior.model.space.size)))
-        both_of = jax.jit(jax.vmap(given_others.at, (0, None, None)))
+        both_of = jax.jit(jax.vmap(given_others.map_point, (0, None, None)))
         w, _, of_z = both_of(z, True, data)
         _, back, volume = both_of(w, False, data)
         np.testing.assert_allclose(back, z, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(of_z, volume, rtol=1e-6, atol=1e-6)
-        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda one: given_others.at(one, False, data)[1])))(w)
+        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda one: given_others.map_point(one, False, data)[1])))(w)
         np.testing.assert_allclose(volume, np.linalg.slogdet(slopes)[1], rtol=1e-6, atol=1e-6)

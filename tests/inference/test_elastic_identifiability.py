@@ -6,10 +6,10 @@ from cables import measured
 from slow_cases import some_slow
 
 import bowdenfit as bf
-from bowdenfit.inference.least_squares import least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.other_minima import fitting_as_well, range_of_minima
+from bowdenfit.inference.other_minima import find_rivals, range_of_minima
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model
@@ -85,7 +85,8 @@ def estimates_of(tables, design, truth, seeds):
         data, values = measured(cable_with(tables), seed, design=design_of(**design), once=True, **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
         objective = objective or make_objective(posterior)
-        estimates = least_squares(posterior, objective, maximum_posterior(posterior, objective).z, intervals=False).estimates
+        start = find_maximum_posterior(posterior, objective).z
+        estimates = fit_least_squares(posterior, objective, start, intervals=False).estimates
         true = {p.name: values[p.name] * p.shown_scale for p in posterior.model.space.free}
         found.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
     return found, data
@@ -152,7 +153,7 @@ def test_a_rival_counts_only_where_it_fits_as_well_and_lies_outside_the_error():
     residuals = np.array([1.0, -1.0, 1.0, -1.0, 0.5, -0.5])
     found = {"residuals": {"a": residuals}}
     near, far = ({"residuals": {"a": residuals * factor}} for factor in (1.1, 5.0))
-    assert fitting_as_well(found, [near, far], np.ones(6), 2) == [near]
+    assert find_rivals(found, [near, far], np.ones(6), 2) == [near]
     assert range_of_minima(10.0, 1.0, [13.0, 7.0]) is None
     assert range_of_minima(10.0, 1.0, [13.0, 1.0]) == (1.0, 13.0)
     assert range_of_minima(10.0, 0.0, [10.0]) is None

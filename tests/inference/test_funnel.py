@@ -22,7 +22,7 @@ from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import default_moves
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.parameters.priors import LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.results.folder import start_checkpoint
@@ -105,7 +105,7 @@ class Funnel:
         """Draws of the shortest path that is trusted, from the starts of a fit, (draw, ensemble, walker, parameter)."""
         middle = np.linalg.lstsq(self.angles, self.read, rcond=None)[0]
         start = MaximumPosterior(np.append(middle, 0.0), np.diag([0.01, 0.01, 0.01, 1.0]))
-        programs = programs or walker_programs(self.posterior, settings, moves)
+        programs = programs or compile_walkers(self.posterior, settings, moves)
         z = sample(SamplingRequest(self.posterior, start, settings, 1, **options), programs).z
         return z.reshape(ENSEMBLES, WALKERS, -1, COUNT + 1).transpose(2, 0, 1, 3)
 
@@ -159,8 +159,8 @@ def test_walkers_that_move_in_z_alone_do_not_reach_it(narrow):
 
 def test_where_enough_readings_tell_the_scatter_walkers_do_without_the_ridge(wide, narrow):
     """From a start that is far wider, and at another scatter; p < 0.001 by chance once in a thousand seeds."""
-    programs = walker_programs(wide.posterior, SETTINGS)
-    assert len(programs.shares.frames) == 2 and walker_programs(narrow.posterior, SETTINGS).later is None
+    programs = compile_walkers(wide.posterior, SETTINGS)
+    assert len(programs.shares.frames) == 2 and compile_walkers(narrow.posterior, SETTINGS).later is None
     assert wide.p_value(wide.sampled(programs=programs)) > 0.001
 
 
@@ -174,7 +174,7 @@ def surprised(narrow):
     """Programs for a funnel that was not expected to be narrow."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Conditional, "is_narrow", False)
-        return walker_programs(narrow.posterior, SETTINGS)
+        return compile_walkers(narrow.posterior, SETTINGS)
 
 
 def lasting(steps):

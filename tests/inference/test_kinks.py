@@ -6,9 +6,9 @@ from elastic_cables import TRUTH, bench, elastic_cable
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.least_squares import KINKED, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import KINKED, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.minimum import lowest_minimum
+from bowdenfit.inference.minimum import find_lowest_minimum
 from bowdenfit.inference.objective import Problem, make_objective, sum_of_squares
 from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.inference.solver import QUICK
@@ -53,7 +53,7 @@ def rises(tables: tuple[str, ...], seed: int) -> list[tuple[float, float]]:
     """By how much the sum of squares is larger at each limit that is given, as the limit has it and from other starts."""
     posterior = LogDensity(build_model(loop(tables, seed)))
     objective, space = make_objective(posterior), posterior.model.space
-    found = least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+    found = fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
     problem, rng, asked = Problem(posterior, objective), np.random.default_rng(seed), []
 
     def rise(start, this, pin):
@@ -82,8 +82,8 @@ def test_other_starts_find_no_lower_sum_of_squares_at_the_limits_that_are_given(
 def test_a_minimum_from_which_a_profile_leads_to_a_lower_one_is_left():
     posterior = LogDensity(build_model(loop(("stretch", "preload", "loop"), 11)))
     objective = make_objective(posterior)
-    problem, start = Problem(posterior, objective), maximum_posterior(posterior, objective).z
-    without, _ = lowest_minimum(problem, start, intervals=False)
-    followed, profiled = lowest_minimum(problem, start, intervals=True)
-    assert sum_of_squares(followed.basin.found) < sum_of_squares(without.basin.found) - 1.0
+    problem, start = Problem(posterior, objective), find_maximum_posterior(posterior, objective).z
+    without, _ = find_lowest_minimum(problem, start, intervals=False)
+    followed, profiled = find_lowest_minimum(problem, start, intervals=True)
+    assert sum_of_squares(followed.basin.solution) < sum_of_squares(without.basin.solution) - 1.0
     assert profiled.lower is None

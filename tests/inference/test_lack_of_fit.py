@@ -17,7 +17,7 @@ from slow_cases import some_slow
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.departure import FALSE_ALARM
-from bowdenfit.inference.least_squares import least_squares
+from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.inside_runs import ORDER, STROKE
@@ -85,7 +85,7 @@ class Judge:
             if shape not in self.objectives:
                 self.objectives[shape] = make_objective(posterior)
             start = np.zeros(posterior.model.space.size)
-            return least_squares(posterior, self.objectives[shape], start, intervals=False).departures
+            return fit_least_squares(posterior, self.objectives[shape], start, intervals=False).departures
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ HEALTHY = {
 
 def alarms(judge, make, tmp_path, count, friction=None):
     """How many of so many benches are said not to be described."""
-    said = [any(d.worth_saying for d in judge(make(tmp_path, seed), friction)) for seed in range(count)]
+    said = [any(d.is_noticeable for d in judge(make(tmp_path, seed), friction)) for seed in range(count)]
     return int(np.sum(said))
 
 
@@ -136,7 +136,7 @@ def alarms_again(judge, what, count):
     """How many of a data set's tables measured again are said not to be described."""
     name, values = AGAIN[what]
     made = measured_again(ROOT / "datasets" / name, count, **values)
-    return int(np.sum([any(d.worth_saying for d in judge.of(data)) for data in made]))
+    return int(np.sum([any(d.is_noticeable for d in judge.of(data)) for data in made]))
 
 
 @pytest.mark.slow
@@ -160,7 +160,7 @@ def test_chances_of_healthy_benches_are_uniform(tmp_path, judge, count, least, m
 
     At a fifth more than 12 of 30 are in 3 of 1000 runs of this test with other seeds, and none in 1 of 1000.
     """
-    smallest = [min(d.chance for d in judge(forces(tmp_path, seed))) for seed in range(count)]
+    smallest = [min(d.p_value for d in judge(forces(tmp_path, seed))) for seed in range(count)]
     assert least <= np.sum(np.array(smallest) < 0.2) <= most
 
 
@@ -176,7 +176,7 @@ FAULTS = {
 def test_faults_inside_runs_are_named(tmp_path, judge, fault):
     wrong, against = FAULTS[fault]
     for seed in range(3):
-        clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.worth_saying]
+        clear = [d for d in judge(forces(tmp_path, seed, **wrong)) if d.is_noticeable]
         assert against in {d.against for d in clear}
         assert all(d.inside for d in clear if d.against == against)
 
@@ -188,7 +188,7 @@ def test_a_bend_that_nobody_measured_is_told_by_the_other_bends(tmp_path, judge)
             np.random.default_rng(seed), BENDS, 0.12 * np.deg2rad(np.array(BENDS) + 40.0), LOADS, noise=(0.4, 0.4), scatter=0.01
         )
         folder = hand_bench.write(tmp_path / str(seed), rows)
-        clear = [d for d in judge(folder) if d.worth_saying]
+        clear = [d for d in judge(folder) if d.is_noticeable]
         assert WRAP_ANGLE in {d.against for d in clear}
     (reason,) = bf.fit(folder, mcmc=False).verdict().reasons[:1]
     assert "around a wrap angle of" in reason and "a bend that nobody measured" in reason
@@ -212,20 +212,20 @@ def test_stretch_that_the_rope_does_not_have_is_named(judge, stretched, planted,
     table = stretched.measurements.table(StretchTable)
     wrong = replace(table, stretch=table.stretch * planted(table))
     measurements = stretched.measurements.with_tables(wrong)
-    assert not [d for d in judge.of(stretched) if d.worth_saying]
-    clear = [d for d in judge.of(replace(stretched, measurements=measurements)) if d.worth_saying and d.table == "stretch"]
+    assert not [d for d in judge.of(stretched) if d.is_noticeable]
+    clear = [d for d in judge.of(replace(stretched, measurements=measurements)) if d.is_noticeable and d.table == "stretch"]
     assert against in {d.against for d in clear}
 
 
 def test_a_model_with_the_drag_describes_the_bench_that_has_one(tmp_path, judge):
     for seed in range(3):
-        assert not any(d.worth_saying for d in judge(forces(tmp_path, seed, drag=3.5), "drag"))
+        assert not any(d.is_noticeable for d in judge(forces(tmp_path, seed, drag=3.5), "drag"))
 
 
 @pytest.mark.parametrize(("shape", "curve"), [("parabola", "gaussian"), ("gaussian", "line"), ("logistic", "line")])
 def test_a_route_that_its_curve_cannot_follow_is_named(tmp_path, judge, shape, curve):
     for seed in range(3):
-        clear = [d for d in judge(route(tmp_path, seed, shape, curve)) if d.worth_saying]
+        clear = [d for d in judge(route(tmp_path, seed, shape, curve)) if d.is_noticeable]
         assert clear and clear[0].group == "sheath_angle"
 
 
@@ -250,8 +250,8 @@ def test_the_verdict_names_the_curve_that_would_fit(tmp_path):
 def test_chances_are_corrected_for_how_many_were_asked_about(tmp_path, judge):
     assert FALSE_ALARM < 0.01
     found = judge(forces(tmp_path, 3))
-    assert len(found) > 3 and all(0 <= d.chance <= 1 for d in found)
-    assert [d.chance for d in found] == sorted(d.chance for d in found)
+    assert len(found) > 3 and all(0 <= d.p_value <= 1 for d in found)
+    assert [d.p_value for d in found] == sorted(d.p_value for d in found)
 
 
 def test_a_slipped_angle_stands_out_of_least_squares_and_healthy_ones_do_not(tmp_path):

@@ -9,7 +9,7 @@ from rows import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.inference.batch.mixture import StudentMixture, mixture_among
+from bowdenfit.inference.batch.mixture import StudentMixture, start_mixture
 from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.batch.proposals import LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.batch.weights import BLOCK
@@ -45,12 +45,12 @@ def test_draws_of_student_ts_are_of_their_density():
 
 def test_student_ts_move_to_where_draws_are():
     rows = TWO.draw(np.random.default_rng(4), 8000)
-    begun = mixture_among(rows, 2)
-    moved = begun.moved(rows).moved(rows).moved(rows)
+    begun = start_mixture(rows, 2)
+    moved = begun.refined(rows).refined(rows).refined(rows)
     gains = [np.mean(each.log_density(rows)) for each in (begun, moved, TWO)]
     assert gains[0] < gains[1]
     assert abs(gains[1] - gains[2]) < 0.02
-    wide = moved.with_wide(rows, 3.0, 0.25)
+    wide = moved.with_wide_component(rows, 3.0, 0.25)
     np.testing.assert_allclose(wide.share.sum(), 1.0)
     assert np.all(wide.log_density(rows + 20) > moved.log_density(rows + 20))
 
@@ -61,7 +61,7 @@ def bent():
     posterior = LogDensity(build_model(of_rows(ANGLES @ np.array([0.1, 0.15]) + np.array([0.01, -0.01, 0.02, 0.0]), ANGLES)))
     with jax.enable_x64(True):
         programs = BatchPrograms(posterior, RANKS)
-        places = programs.places
+        places = programs.evaluate_points
 
     def evaluate(given: np.ndarray, is_z: np.ndarray) -> ProposedPoints:
         with jax.enable_x64(True):

@@ -14,7 +14,7 @@ from scipy import optimize
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference import solver
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.solver import minimize
@@ -28,7 +28,7 @@ from bowdenfit.questions.simulate.simulation import with_readings
 def fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:
     posterior = LogDensity(build_model(dataset))
     objective = make_objective(posterior)
-    return posterior, least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+    return posterior, fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
 
 
 @cache
@@ -36,7 +36,7 @@ def plain() -> tuple[LogDensity, Objective, LeastSquares]:
     """Three contacts with noise, nothing set by the user."""
     posterior = LogDensity(build_model(measured(cable(3), seed=1, once=True)[0]))
     objective = make_objective(posterior)
-    return posterior, objective, least_squares(posterior, objective, np.zeros(posterior.model.space.size))
+    return posterior, objective, fit_least_squares(posterior, objective, np.zeros(posterior.model.space.size))
 
 
 @pytest.mark.parametrize(("n_contacts", "tables"), [(2, "forces"), (3, "efficiencies"), (4, "forces"), (5, "forces")])
@@ -86,7 +86,7 @@ def test_the_solution_does_not_depend_on_the_start():
     posterior, objective, found = plain()
     for seed in range(8):  # the first of them leaps to zero curvature, and must find its way back
         start = np.random.default_rng(seed).standard_normal(posterior.model.space.size)
-        again = least_squares(posterior, objective, start, intervals=False)
+        again = fit_least_squares(posterior, objective, start, intervals=False)
         for name, estimate in found.estimates.items():
             assert again.estimates[name].value == pytest.approx(estimate.value, rel=1e-5, abs=1e-6), name
             assert again.estimates[name].standard_error == pytest.approx(estimate.standard_error, rel=1e-4), name
@@ -114,7 +114,7 @@ def _many_fits(description, n: int) -> tuple[dict[str, np.ndarray], dict[str, np
         space = space or model.space
         posterior = LogDensity(replace(model, space=space))
         objective = objective or make_objective(posterior)
-        found = least_squares(posterior, objective, np.zeros(space.size), intervals=False)
+        found = fit_least_squares(posterior, objective, np.zeros(space.size), intervals=False)
         for name, estimate in found.estimates.items():
             values.setdefault(name, []).append(estimate.value)
             errors.setdefault(name, []).append(estimate.standard_error)
@@ -247,11 +247,11 @@ def test_a_prior_moves_the_maximum_of_the_posterior_and_not_the_classical_estima
     description = cable(3, friction={"mu_free": {"measured": {"value": 0.2, "sd": 0.005}}})
     posterior = LogDensity(build_model(measured(description, seed=1, once=True)[0]))
     objective = make_objective(posterior)
-    best = maximum_posterior(posterior, objective)
+    best = find_maximum_posterior(posterior, objective)
     assert float(jax.jit(posterior.model.space.constrain)(best.z)["mu_free"]) > 0.17
     assert np.all(np.linalg.eigvalsh(best.covariance) > 0)
     assert np.all(np.diag(best.covariance) <= 1 + 1e-9)  # never wider than the prior
-    found = least_squares(posterior, objective, np.zeros(posterior.model.space.size))
+    found = fit_least_squares(posterior, objective, np.zeros(posterior.model.space.size))
     for name, estimate in without.estimates.items():
         if name != "mu_free":  # 23 sd away from its prior, in whose units the data say little
             assert found.estimates[name].value == pytest.approx(estimate.value, rel=1e-6), name

@@ -9,7 +9,7 @@ from cables import cable, measured
 from strd import digits_alike, problem
 
 from bowdenfit.inference import levenberg_marquardt, solver
-from bowdenfit.inference.least_squares import least_squares
+from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.levenberg_marquardt import LevenbergMarquardt, RadiusSearch, ScaledDescent
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
@@ -69,13 +69,13 @@ def test_without_enough_steps_it_does_not_claim_an_end():
 def test_a_fit_whose_solver_did_not_end_says_so(monkeypatch):
     posterior = LogDensity(build_model(measured(cable(2, ("angles", "efficiencies")), seed=1)[0]))
     objective, start = make_objective(posterior), np.zeros(posterior.model.space.size)
-    assert least_squares(posterior, objective, start, intervals=False).message == ""
+    assert fit_least_squares(posterior, objective, start, intervals=False).message == ""
     monkeypatch.setattr(solver, "_MOST_POLISHING", 0)
 
     def one_evaluation(*asked):
         return objective(*asked[:-1], asked[-1]._replace(evaluations=1))
 
-    found = least_squares(posterior, one_evaluation, start, intervals=False)
+    found = fit_least_squares(posterior, one_evaluation, start, intervals=False)
     assert not found.converged
     assert "stopped before it met its tolerance" in found.message
 
@@ -147,8 +147,8 @@ def test_the_search_goes_where_the_sum_of_squares_falls_as_predicted_and_back_wh
 
 def test_tables_that_differ_by_a_few_rows_are_stepped_by_one_program():
     """The certified minima above are those of such tables: the 33 rows of mgh17 are stepped as 40."""
-    rows, before = 33, levenberg_marquardt._compiled.cache_info().misses
+    rows, before = 33, levenberg_marquardt._compile_step.cache_info().misses
     assert rounded_up(rows) == 40
     for count in range(rows, 41):
-        levenberg_marquardt.stepper(count, 2)
-    assert levenberg_marquardt._compiled.cache_info().misses <= before + 1
+        levenberg_marquardt.compile_stepper(count, 2)
+    assert levenberg_marquardt._compile_step.cache_info().misses <= before + 1

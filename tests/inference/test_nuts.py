@@ -15,8 +15,8 @@ import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference import nuts
 from bowdenfit.inference.chain import SamplingRequest
-from bowdenfit.inference.checkpoint import heading
-from bowdenfit.inference.diagnostics import Trajectories, energy_mixing, trajectory_shortfalls
+from bowdenfit.inference.checkpoint import checkpoint_header
+from bowdenfit.inference.diagnostics import Trajectories, compute_energy_mixing, describe_trajectory_shortfalls
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
@@ -75,7 +75,7 @@ class Target:
 @pytest.fixture(scope="module")
 def program():
     """What samples every target."""
-    return nuts.make_program(Target(log_normals), SETTINGS)
+    return nuts.compile_nuts(Target(log_normals), SETTINGS)
 
 
 def sampled(log_density, program, covariance: np.ndarray, settings: SamplerSettings = SETTINGS, **options):
@@ -118,7 +118,7 @@ def test_fine_steps_get_through_where_the_others_break_off(funnel):
     trajectories = funnel.trajectories
     assert trajectories.fine_diverged <= trajectories.fine / 1000
     assert trajectories.fine == trajectories.drawn // nuts.FINE_EVERY
-    assert trajectory_shortfalls(trajectories) == ()
+    assert describe_trajectory_shortfalls(trajectories) == ()
 
 
 def test_nuts_reproduces_correlated_normals_of_unlike_scales(program):
@@ -154,7 +154,7 @@ GOOD = Trajectories(500, 10_000, 50, 1000, 0, 0, 0.8, 0.1, 1, {})
     ],
 )
 def test_bad_trajectories_are_reasons_in_words(changes, says):
-    reasons = trajectory_shortfalls(replace(GOOD, **changes))
+    reasons = describe_trajectory_shortfalls(replace(GOOD, **changes))
     assert len(reasons) == len(says)
     for reason, expected in zip(reasons, says, strict=True):
         assert expected in reason
@@ -163,10 +163,10 @@ def test_bad_trajectories_are_reasons_in_words(changes, says):
 def test_energy_mixing_is_that_of_the_worst_chain():
     """Independent energies have E-BFMI 2 (+- 0.2 in 500 draws); a slow one, whose steps are a tenth, about 0.01."""
     random = np.random.default_rng(1).normal(size=(4, 500))
-    assert energy_mixing(random) == pytest.approx(2.0, abs=0.4)
+    assert compute_energy_mixing(random) == pytest.approx(2.0, abs=0.4)
     random[2] = np.cumsum(0.1 * random[2])
-    assert energy_mixing(random) < 0.3
-    assert np.isnan(energy_mixing(np.ones((2, 10))))
+    assert compute_energy_mixing(random) < 0.3
+    assert np.isnan(compute_energy_mixing(np.ones((2, 10))))
 
 
 # Fits -------------------------------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ def test_resumed_chains_equal_those_that_were_never_interrupted(program, tmp_pat
         return sampled(log_normals, program, np.eye(3), replace_settings(max_steps=300, target_ess=100), **options)
 
     path = tmp_path / "chain.checkpoint"
-    path.write_bytes(heading({}))
+    path.write_bytes(checkpoint_header({}))
     with pytest.raises(Stop):
         run(checkpoint=path, report=stop)
     np.testing.assert_array_equal(run(checkpoint=path, resume=True).z, run().z)

@@ -14,13 +14,13 @@ from snooker import snooker_mixture
 
 import bowdenfit as bf
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.chain import Chain, SamplingRequest, stuck_walkers
+from bowdenfit.inference.chain import Chain, SamplingRequest, describe_stuck_walkers
 from bowdenfit.inference.draws import for_each_draw, value_function
 from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import build_model
 from bowdenfit.results.optimum import optimum_of
 from bowdenfit.results.store import posterior_page
@@ -78,11 +78,11 @@ class Bench:
         names, optimum = value_function(posterior.model), optimum_of(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
-        self._programs = cache(lambda walkers: walker_programs(posterior, SamplerSettings(n_walkers=walkers)))
+        self._programs = cache(lambda walkers: compile_walkers(posterior, SamplerSettings(n_walkers=walkers)))
 
     @cached_property
     def _start(self):
-        return maximum_posterior(self.posterior, make_objective(self.posterior))
+        return find_maximum_posterior(self.posterior, make_objective(self.posterior))
 
     def quantities(self, z: np.ndarray) -> Draws:
         """Every parameter in z and as shown, and the optimum; A, B and C have no moments and stay out."""
@@ -95,7 +95,7 @@ class Bench:
 
     def sample(self, settings: SamplerSettings, seed: int, moves=None) -> Chain:
         walkers = settings.walkers(self.posterior.model.space.size)
-        programs = self._programs(walkers) if moves is None else walker_programs(self.posterior, settings, moves)
+        programs = self._programs(walkers) if moves is None else compile_walkers(self.posterior, settings, moves)
         return sample(SamplingRequest(self.posterior, self._start, settings, seed), programs)
 
 
@@ -258,9 +258,9 @@ def test_too_few_steps_are_called_not_converged_with_reasons(bench):
 def test_walkers_that_never_move_are_a_reason_not_to_trust_the_draws():
     """Three of 256 far out pass R-hat, effective sample size and drift, and spoil standard deviations."""
     z = np.random.default_rng(0).normal(size=(256, 20, 3))
-    assert stuck_walkers(z) == ()
+    assert describe_stuck_walkers(z) == ()
     z[:3] = z[:3, :1] + 30.0
-    (reason,) = stuck_walkers(z)
+    (reason,) = describe_stuck_walkers(z)
     assert reason.startswith("3 of 256 sampled paths did not move")
 
 

@@ -12,12 +12,12 @@ from strd import Problem, problem
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.profile_limits import find_crossing, interval_ends
-from bowdenfit.inference.profiles import profile, satterthwaite_freedom
-from bowdenfit.inference.solver import minimize, orthogonal
+from bowdenfit.inference.profile_limits import find_crossing, find_interval_ends
+from bowdenfit.inference.profiles import compute_profile, satterthwaite_freedom
+from bowdenfit.inference.solver import minimize, orthogonalize
 from bowdenfit.model import build_model
 
 pytestmark = pytest.mark.extended
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.extended
 def fitted(dataset: Dataset) -> tuple[LogDensity, Objective, LeastSquares]:
     posterior = LogDensity(build_model(dataset))
     objective = make_objective(posterior)
-    return posterior, objective, least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+    return posterior, objective, fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
 
 
 def _rows(seed: int, n: int = 9, truth: tuple[float, ...] = (0.15, 0.1)) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +106,7 @@ def _profiled(given: Problem, index: int) -> tuple[float, float, float, float]:
 
         return minimize(pinned, best[others]).sum_of_squares - given.residual_sum_of_squares
 
-    low, high = interval_ends(rise, 0.0, 1.0, given.residual_sum_of_squares / spare, float(spare))
+    low, high = find_interval_ends(rise, 0.0, 1.0, given.residual_sum_of_squares / spare, float(spare))
     return center, error, center + error * low, center + error * high
 
 
@@ -128,7 +128,7 @@ def test_of_a_strongly_curved_certified_problem_the_interval_is_lopsided():
 
 def test_standard_errors_by_qr_are_those_of_the_normal_equations_where_these_are_sound():
     jacobian = np.random.default_rng(5).standard_normal((12, 3)) * np.array([1.0, 1e-5, 1e6])
-    _, root = orthogonal(jacobian)
+    _, root = orthogonalize(jacobian)
     size = np.array([1.0, 1e-5, 1e6])
     exact = np.linalg.inv((jacobian / size).T @ (jacobian / size)) / np.outer(size, size)
     np.testing.assert_allclose(root @ root.T, exact, rtol=1e-10)
@@ -145,18 +145,18 @@ def test_degrees_of_freedom_follow_what_decides():
 
 
 def test_an_interval_is_open_where_the_sum_of_squares_stops_rising():
-    low, high = interval_ends(lambda z: z**2 if z < 0 else 1.5 * np.tanh(z) ** 2, 0.0, 1.0, 1.0, 1e9)
+    low, high = find_interval_ends(lambda z: z**2 if z < 0 else 1.5 * np.tanh(z) ** 2, 0.0, 1.0, 1.0, 1e9)
     assert low == pytest.approx(-stats.norm.ppf(0.95), abs=1e-3)
     assert high == np.inf
 
 
 def test_an_interval_is_open_where_the_model_cannot_be_computed():
-    low, high = interval_ends(lambda z: z**2 if z < 1.0 else float("nan"), 0.0, 1.0, 1.0, 1e9)
+    low, high = find_interval_ends(lambda z: z**2 if z < 1.0 else float("nan"), 0.0, 1.0, 1.0, 1e9)
     assert np.isfinite(low) and high == np.inf
 
 
 def test_where_the_model_cannot_be_computed_short_of_the_limit_the_interval_is_the_wider_one():
-    low, high = interval_ends(lambda z: float("nan") if 1.6 < z < 1.7 else z**2, 0.0, 1.0, 1.0, 1e9)
+    low, high = find_interval_ends(lambda z: float("nan") if 1.6 < z < 1.7 else z**2, 0.0, 1.0, 1.0, 1e9)
     assert -low == pytest.approx(stats.norm.ppf(0.95), abs=1e-3)
     assert stats.norm.ppf(0.95) < high <= 1.71
 
@@ -165,10 +165,10 @@ def test_a_limit_just_beyond_a_step_or_far_beyond_a_flat_stretch_is_found():
     """A first step that falls short by any little must not leave steps too small to get on with."""
     quantile = stats.norm.ppf(0.95)
     for short in 10.0 ** -np.arange(1, 14):
-        _, high = interval_ends(lambda z, s=short: z**2 * (1 - s) ** 2, 0.0, 1.0, 1.0, 1e9)
+        _, high = find_interval_ends(lambda z, s=short: z**2 * (1 - s) ** 2, 0.0, 1.0, 1.0, 1e9)
         assert high == pytest.approx(quantile / (1 - short), rel=1e-3)
         flat = (quantile * (1 - short)) ** 2  # where it stays from the first step to 20, and then rises
-        _, high = interval_ends(lambda z, f=flat: max(min(z**2, f), (z - 20.0) ** 3), 0.0, 1.0, 1.0, 1e9)
+        _, high = find_interval_ends(lambda z, f=flat: max(min(z**2, f), (z - 20.0) ** 3), 0.0, 1.0, 1.0, 1e9)
         near = quantile if short < 3e-4 else 20.0 + quantile ** (2 / 3)  # within the precision of a limit, or not
         assert near - 0.01 < high < 20.0 + quantile ** (2 / 3) + 0.01
 
@@ -182,7 +182,7 @@ def test_an_interval_takes_few_solves(bend, most):
         asked.add(z)
         return (z / 0.1) ** 2 * (1 + bend * z / 0.1)
 
-    low, high = interval_ends(rise, 0.0, 0.1, 1.0, 1e9)
+    low, high = find_interval_ends(rise, 0.0, 0.1, 1.0, 1e9)
     assert [rise(low), rise(high)] == pytest.approx([quantile**2] * 2, rel=1e-3)
     assert len(asked - {0.0, low, high}) + 2 <= most
 
@@ -264,7 +264,7 @@ def test_a_fixed_parameter_and_an_undetermined_one_have_no_interval():
 def test_a_profile_is_a_parabola_of_a_linear_model():
     loss, angle = _rows(1)
     posterior, objective, found = fitted(of_rows(loss, angle))
-    plain = profile(posterior, objective, "mu1", found.z, np.linspace(-0.5, 0.5, 9))
+    plain = compute_profile(posterior, objective, "mu1", found.z, np.linspace(-0.5, 0.5, 9))
     curvature = plain.rise / (plain.values - found.estimates["mu1"].value) ** 2
     np.testing.assert_allclose(curvature, curvature[0], rtol=1e-5)
     values = [0.12 * np.exp(1.4 * z) for z in np.linspace(-0.5, 0.5, 9)]
@@ -274,9 +274,9 @@ def test_a_profile_is_a_parabola_of_a_linear_model():
 def test_the_profile_of_what_readings_do_not_tell_is_flat_until_the_prior_counts():
     loss, angle = _rows(1)
     posterior, objective, found = fitted(of_rows(loss, np.column_stack([angle[:, 0], 0 * angle[:, 0]])))
-    flat = profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0])
+    flat = compute_profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0])
     np.testing.assert_allclose(flat.rise, 0.0, atol=1e-9)
-    informed = profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0], with_priors=True)
+    informed = compute_profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0], with_priors=True)
     np.testing.assert_allclose(informed.rise, [4.0, 0.0, 4.0], atol=1e-6)
 
 
@@ -296,7 +296,7 @@ def test_nine_in_ten_intervals_hold_the_truth(experiments):
         space = space or posterior.model.space
         posterior = LogDensity(replace(posterior.model, space=space))
         objective = objective or make_objective(posterior)
-        found = least_squares(posterior, objective, np.zeros(space.size))
+        found = fit_least_squares(posterior, objective, np.zeros(space.size))
         ends = [(found.estimates[name].lower, found.estimates[name].upper) for name in ("mu1", "mu2")]
         hits += [low <= value <= high for (low, high), value in zip(ends, truth, strict=True)]
     assert np.all(np.abs(hits - 0.9 * experiments) < 3.8 * np.sqrt(experiments * 0.9 * 0.1))

@@ -14,7 +14,7 @@ from snooker import snooker
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.coordinates import CoordinateMap, value_map, z_map
-from bowdenfit.inference.ensemble import EnsembleMove, initial_state
+from bowdenfit.inference.ensemble import EnsembleMove, make_initial_state
 from bowdenfit.inference.moves import (
     count_move_numbers,
     default_moves,
@@ -24,7 +24,7 @@ from bowdenfit.inference.moves import (
     stretch,
 )
 from bowdenfit.inference.prior_grid import NODES, PriorGrid
-from bowdenfit.inference.walkers import compiled_walkers
+from bowdenfit.inference.walkers import compile_density_walkers
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5
 _ROOT = np.linalg.cholesky(np.array([[2.0 ** (-abs(i - j)) for j in range(DIMENSIONS)] for i in range(DIMENSIONS)]))
@@ -59,7 +59,7 @@ def draw_t(generator: np.random.Generator, n: int) -> np.ndarray:
 def programs_of(log_density, data, walkers: int, dimensions: int, frames, moves):
     """What is compiled for ensembles of so many walkers."""
     settings = SamplerSettings.model_construct(n_walkers=walkers)
-    return compiled_walkers(log_density, data, dimensions, settings, frames, moves)
+    return compile_density_walkers(log_density, data, dimensions, settings, frames, moves)
 
 
 compiled_once = cache(programs_of)  # where there are no data, which have no hash
@@ -73,7 +73,7 @@ def run_side_by_side(moves, log_density, start: np.ndarray, steps: int, seed: in
         programs = find(log_density, data, walkers, dimensions, tuple(frames), tuple(moves))
         sweep, flat = EnsembleMove(programs, data, ensembles), start.reshape(-1, dimensions)
         sampler = emcee.EnsembleSampler(*flat.shape, log_density, moves=sweep)
-        sampler.run_mcmc(initial_state(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)
+        sampler.run_mcmc(make_initial_state(flat, np.random.RandomState(seed)), steps // THIN, skip_initial_state_check=True)
         return sampler.get_chain().reshape(-1, ensembles, walkers, dimensions)
 
 

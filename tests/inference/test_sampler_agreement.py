@@ -16,7 +16,7 @@ from bowdenfit.inference.sampler_agreement import (
     SamplerAgreement,
     SamplerDraws,
     compare_samplers,
-    recommendation,
+    recommend_sampler,
 )
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.words import full_text
@@ -64,8 +64,8 @@ def test_a_sampler_that_is_wrong_is_caught(disturb, summary):
     wrong["q3"] = disturb(wrong["q3"])
     found = compared(right, wrong)
     assert not found.agree
-    assert {d.quantity for d in found.beyond_chance} == {"q3"}
-    assert summary in {d.summary for d in found.beyond_chance}
+    assert {d.quantity for d in found.significant} == {"q3"}
+    assert summary in {d.summary for d in found.significant}
     (reason,) = found.reasons()
     assert reason.startswith("emcee and NUTS disagree on the")
 
@@ -104,10 +104,10 @@ def test_a_quantity_that_cannot_vary_agrees_with_itself_and_with_nothing_else():
 
 
 def test_nuts_is_recommended_for_many_parameters_and_where_emcee_fails():
-    assert recommendation("emcee", 25, False) == ""
-    assert "26 free parameters" in recommendation("emcee", 26, False)
-    assert "--sampler nuts" in recommendation("emcee", 3, True)
-    assert recommendation("nuts", 40, True) == ""
+    assert recommend_sampler("emcee", 25, False) == ""
+    assert "26 free parameters" in recommend_sampler("emcee", 26, False)
+    assert "--sampler nuts" in recommend_sampler("emcee", 3, True)
+    assert recommend_sampler("nuts", 40, True) == ""
 
 
 DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))

@@ -16,7 +16,7 @@ from rows import of_rows
 from scipy import optimize
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.least_squares import LeastSquares, least_squares
+from bowdenfit.inference.least_squares import LeastSquares, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
@@ -29,7 +29,7 @@ MU, TAU = 0.14, 0.01
 
 def fitted(dataset: Dataset, start: float = 0.0) -> LeastSquares:
     posterior = LogDensity(build_model(dataset))
-    return least_squares(posterior, make_objective(posterior), np.full(posterior.model.space.size, start))
+    return fit_least_squares(posterior, make_objective(posterior), np.full(posterior.model.space.size, start))
 
 
 def _misread(seed: int, sd: float, n: int = 14) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from scipy import integrate, stats
 from bowdenfit.cable.cable import Cable
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Preparation
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import runs as runs_of_model
@@ -395,7 +395,7 @@ def test_saturated_blocks_that_are_left_out_do_not_pull_the_coefficient(cell, li
 def _fitted(model: Model) -> LeastSquares:
     posterior = LogDensity(model)
     objective = make_objective(posterior)
-    return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+    return fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
 
 
 RATE = {"stribeck": 0.3, "stribeck_speed": 15.0, "viscous": 0.002}

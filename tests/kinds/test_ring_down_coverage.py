@@ -10,7 +10,7 @@ from scipy.stats import chi2, kstest
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.batch.fitting import fit_batch
-from bowdenfit.inference.least_squares import maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import Model, build_model
@@ -92,7 +92,7 @@ def distances(posteriors, truth):
     objective, found = make_objective(posteriors[0]), []
     at = [posteriors[0].model.space.index[name] for name in NAMES]
     for i, posterior in enumerate(posteriors):
-        best = maximum_posterior(posterior, objective)
+        best = find_maximum_posterior(posterior, objective)
         away = best.z[at] - true_z(posterior, truth, i)
         found.append(float(away @ np.linalg.solve(best.covariance[np.ix_(at, at)], away)))
     return np.array(found)

@@ -16,7 +16,7 @@ import bowdenfit as bf
 from bowdenfit.cable.noise import NormalNoise, StudentNoise, noise_law, scatter
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.least_squares import maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
@@ -331,7 +331,7 @@ def _best_fits(noise: str, folders: tuple[Path, Path]) -> list[dict[str, float]]
     """Values of the parameters at the maximum of the posterior of each data set, as the first one's priors have it."""
     posteriors = [LogDensity(build_model(load_dataset(folder, [f'noise="{noise}"']))) for folder in folders]
     space, objective = posteriors[0].model.space, make_objective(posteriors[0])
-    z = [maximum_posterior(posterior, objective).z for posterior in posteriors]
+    z = [find_maximum_posterior(posterior, objective).z for posterior in posteriors]
     return [{name: float(value) for name, value in space.constrain(jnp.asarray(at)).items()} for at in z]
 
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bowdenfit.physics.ring_down import peaks, ring_down
+from bowdenfit.physics.ring_down import compute_peaks, ring_down
 
 J, K = 1e-3, 20.0
 RING_DOWN = jax.jit(ring_down, static_argnums=7)
@@ -73,5 +73,5 @@ def test_nothing_moves_before_the_release_and_derivatives_are_finite():
 
 
 def test_peaks_change_sides():
-    found = peaks(jnp.array([0.2]), jnp.array([1.0]), jnp.array([0.03]), 6)[:, 0]
+    found = compute_peaks(jnp.array([0.2]), jnp.array([1.0]), jnp.array([0.03]), 6)[:, 0]
     np.testing.assert_allclose(found, [0.2, -0.14, 0.08, -0.02, -0.02, -0.02], atol=1e-7)

@@ -34,13 +34,13 @@ def forces_by_turns(catheter, displacements):
         force, mean = (
             tendon.sliding(travel, jnp.asarray(float(turns.stroke[k])))
             if after == k
-            else tendon.since(states[after], travel, jnp.asarray(float(turns.stroke[k])))
+            else tendon.sliding_after_turn(states[after], travel, jnp.asarray(float(turns.stroke[k])))
         )
         states.append(Turn(travel, force, mean))
     found = []
     for x, stroke, after, slides in zip(displacements, motion.stroke, motion.after, motion.slides, strict=True):
         at = jnp.asarray(x - catheter.zero), jnp.asarray(float(stroke))
-        found.append(float((tendon.sliding(*at) if slides else tendon.since(states[after], *at))[0]))
+        found.append(float((tendon.sliding(*at) if slides else tendon.sliding_after_turn(states[after], *at))[0]))
     return np.array(found)
 
 

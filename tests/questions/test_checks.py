@@ -18,14 +18,14 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.draws import shown_values
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.inference.predictive_checks import check_uniformity, loo_predictive, randomized_pit
+from bowdenfit.inference.predictive_checks import check_uniformity, draw_randomized_pit, predict_left_out
 from bowdenfit.inference.prior_sensitivity import (
     SENSITIVE,
     Sensitivity,
     WidthSensitivity,
-    prior_conflicts,
+    compute_sensitivities,
+    find_prior_conflicts,
     rescale_prior,
-    sensitivities,
 )
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.table import AngleTable
@@ -78,7 +78,7 @@ def test_predictions_without_a_reading_are_those_of_the_textbook():
     x = np.linspace(-1, 1, 15)
     y = 1 + 2 * x + 0.3 * np.random.default_rng(1).standard_normal(15)
     log_likelihood, replicated = line_through(x, y, 0.3)
-    found = loo_predictive(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
+    found = predict_left_out(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
     mean, sd = textbook(x, y, 0.3)
     np.testing.assert_allclose((found.mean - mean) / sd, 0.0, atol=0.06)
     np.testing.assert_allclose(found.sd / sd, 1.0, atol=0.06)
@@ -91,21 +91,21 @@ def test_a_tail_beyond_all_draws_is_small_but_never_smaller_than_a_normal_one(z)
     """The Pareto tail is exponential at the least, so it errs to the side of no alarm, and by less than two sds."""
     draws = np.random.default_rng(0).standard_normal((20_000, 1))
     flat = np.zeros_like(draws)
-    (tail,) = loo_predictive(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
+    (tail,) = predict_left_out(flat, draws, np.array([z]), np.zeros(1, dtype=bool), 20_000).tail
     assert 0.7 * 2 * stats.norm.sf(z) < tail < 2 * stats.norm.sf(z - 1.0)
-    (other,) = loo_predictive(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
+    (other,) = predict_left_out(flat, draws, np.array([-z]), np.zeros(1, dtype=bool), 20_000).tail
     assert other == pytest.approx(tail, rel=1.0)
 
 
 def test_a_bound_takes_a_place_below_itself_and_stands_out_only_where_more_was_expected():
     draws = np.random.default_rng(0).normal(20.0, 2.0, (8000, 2))
     at_most = np.array([True, True])
-    found = loo_predictive(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
+    found = predict_left_out(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
     assert found.below[0] == 0.0
     assert found.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
     assert found.tail[0] == pytest.approx(found.up_to[0], abs=1e-9)
     assert found.tail[1] < 1e-3
-    places = [randomized_pit(found, np.random.default_rng(i))[0] for i in range(200)]
+    places = [draw_randomized_pit(found, np.random.default_rng(i))[0] for i in range(200)]
     assert min(places) > 0.0
     assert max(places) < found.up_to[0]
 
@@ -114,7 +114,7 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
     draws = np.random.default_rng(0).standard_normal((4000, 2))
     log_likelihood = np.zeros((4000, 2))
     log_likelihood[7, 0] = -800.0
-    found = loo_predictive(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
+    found = predict_left_out(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
     assert np.isinf(found.pareto_k[0])
     assert found.pareto_k[1] == 0.0
     np.testing.assert_allclose(found.median, 0.0, atol=0.06)
@@ -124,7 +124,7 @@ def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_
 def test_readings_that_a_draw_puts_beyond_all_numbers_are_far_out_without_a_warning():
     replicated = np.random.default_rng(1).standard_normal((2000, 1))
     replicated[:3, 0] = np.inf, -np.inf, np.nan
-    found = loo_predictive(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
+    found = predict_left_out(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
     assert abs(found.median[0]) < 0.1 and abs(found.below[0] - stats.norm.cdf(0.5)) < 0.05
 
 
@@ -146,7 +146,7 @@ def parameter(name, prior):
 def weighed(quantities, drawn, log_likelihood):
     """Sensitivities where every prior is a standard normal."""
     priors = {name: rescale_prior(Normal(0.0, 1.0), values) for name, values in drawn.items()}
-    return sensitivities(quantities, drawn, log_likelihood, priors)
+    return compute_sensitivities(quantities, drawn, log_likelihood, priors)
 
 
 def normal_posterior(reading, sd, seed=0):
@@ -248,7 +248,7 @@ def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
 )
 def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, said):
     drawn = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
-    assert bool(prior_conflicts(drawn, {"x": parameter("x", prior)})) == said
+    assert bool(find_prior_conflicts(drawn, {"x": parameter("x", prior)})) == said
 
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")

@@ -21,7 +21,7 @@ from bowdenfit.inference.comparison import (
 )
 from bowdenfit.inference.leave_one_out import REFIT, LooDensity, LooRefits, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moment_matching import Affine, best_map, match_moments
+from bowdenfit.inference.moment_matching import Affine, find_best_map, match_moments
 from bowdenfit.inference.psis import reliable_k
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
@@ -169,7 +169,7 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
     plain = psis_loo({"": likelihood[None, :, None]}, 8000.0)
     assert plain.pareto_k[0] > 0.7
     assert abs(plain.elpd[0] - truth) > 0.3
-    found = best_map(draws, density, evaluate, 1.0)
+    found = find_best_map(draws, density, evaluate, 1.0)
     np.testing.assert_allclose(found.back(found(draws)), draws, atol=1e-9)
 
 

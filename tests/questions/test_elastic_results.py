@@ -16,7 +16,7 @@ from scipy import stats
 import bowdenfit as bf
 from bowdenfit import predict
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.least_squares import least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
@@ -252,7 +252,7 @@ def solved(simulated):
 
     def solve(dataset):
         posterior = LogDensity(with_parameters_of(model, dataset))
-        return least_squares(posterior, objective, maximum_posterior(posterior, objective).z, intervals=False)
+        return fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z, intervals=False)
 
     return solve
 

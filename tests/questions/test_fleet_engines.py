@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.inference.engines.choice import slurm
+from bowdenfit.inference.engines.choice import make_slurm_executor
 from bowdenfit.questions.fleet.store import KEPT
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import FLEET_DRAWS
@@ -69,7 +69,7 @@ def test_a_dask_cluster_writes_the_same_file(whole, fleet, cluster, tmp_path):
 
 @pytest.mark.slow
 def test_jobs_as_slurm_has_them_write_the_same_file(whole, fleet, tmp_path):
-    with slurm(tmp_path / "jobs", 2, "local") as executor:
+    with make_slurm_executor(tmp_path / "jobs", 2, "local") as executor:
         bf.fleet(fleet, output=tmp_path / "results", seed=SEED, engine=executor, workers=2)
     assert (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole
 

@@ -49,7 +49,7 @@ def test_the_sum_that_was_measured_is_the_combination_found():
     assert together.words == "a + 0.8 b"
     assert together.value == pytest.approx(2.6)
     assert together.sd == pytest.approx(0.005, rel=1e-3)
-    assert found.by_themselves == ()
+    assert found.identified == ()
     assert found.undetermined is not None
     assert found.collinearity > 1e6
 
@@ -58,8 +58,8 @@ def test_parameters_read_one_by_one_are_known_by_themselves_and_others_rest_on_t
     prior_sd, value = np.full(3, PRIOR_SD), np.ones(3)
     rows = ((np.array([1.0, 0, 0]), 0.05), (np.array([0, 1.0, 0]), 0.7))
     found = analyze_covariance(("a", "b", "c"), value, seen_through(*rows, prior_sd=prior_sd), prior_sd)
-    assert [p.name for p in found.by_themselves] == ["a"]
-    assert [p.name for p in found.partly] == ["b"]
+    assert [p.name for p in found.identified] == ["a"]
+    assert [p.name for p in found.partly_identified] == ["b"]
     assert [p.name for p in found.on_prior] == ["c"]
     assert [p.contraction for p in found.parameters] == pytest.approx([1 - 1 / (1 + 196), 0.5, 0.0], abs=1e-9)
     assert [p.inflation for p in found.parameters] == pytest.approx([1, 1, 1])
@@ -106,7 +106,7 @@ def test_the_judgment_before_sampling_agrees_with_the_fit(on_body):
     after = identify(found).groups["friction"]
     for p, q in zip(before.parameters, after.parameters, strict=True):
         assert p.sd == pytest.approx(q.sd, rel=0.33), p.name
-    assert [p.name for p in after.by_themselves] == ["mu1", "mu2", "mu3"]
+    assert [p.name for p in after.identified] == ["mu1", "mu2", "mu3"]
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +145,7 @@ def test_a_coefficient_measured_separately_makes_the_other_known(two_turns, tmp_
     after = identify(bf.load(tmp_path / "fit")).groups["friction"]
     for p, q in zip(before.parameters, after.parameters, strict=True):
         assert p.sd == pytest.approx(q.sd, rel=0.33), p.name
-    assert [p.name for p in before.by_themselves] == [p.name for p in after.by_themselves] == ["mu_a"]  # mu_b is as stated
+    assert [p.name for p in before.identified] == [p.name for p in after.identified] == ["mu_a"]  # mu_b is as stated
 
 
 def test_without_sampling_the_same_data_are_not_trusted_either(two_turns, tmp_path, run):

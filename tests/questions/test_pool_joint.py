@@ -141,7 +141,7 @@ def test_without_a_population_cables_are_as_single_fits_say():
         prior = {"mean": inspected.prior_mean, "spread": inspected.prior_sd, "effects": np.zeros(2)}
 
         def cables_of(z):
-            return density.cables_of(z, inspected.data, prior)
+            return density.cables_at(z, inspected.data, prior)
 
         z = 1.5 * generator.standard_t(3, (100_000, density.size))  # tails as heavy as those of single fits
         values, _ = jax.vmap(cables_of)(z)
@@ -182,8 +182,8 @@ def test_the_density_is_that_of_the_model_written_out():
 
         @jax.jit
         def values_of(z):
-            found = density.population(z, data)
-            return found, density.cables_of(z, data, found)[0]
+            found = density.population_at(z, data)
+            return found, density.cables_at(z, data, found)[0]
 
         def of_values(z):
             found, cables = values_of(z)

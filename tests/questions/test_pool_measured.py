@@ -47,7 +47,7 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
             pairs = list(zip(point, part.data, strict=True))
             at = np.zeros((1, 2, 2))
             at[0, list(part.rows)] = [[np.log(posterior.values(*pair)[name]) for name in part.names] for pair in pairs]
-            ours = part.log_density(at, point[:, list(part.others)].ravel(), part.given(known.inspected.places))
+            ours = part.log_density(at, point[:, list(part.others)].ravel(), part.stack(known.inspected.positions))
             single = sum(posterior.log_density(*pair) for pair in pairs)
             pooled = [i for i in range(4) if i not in part.others]
             differences.append(float(ours - single - np.sum(point[:, pooled] ** 2) / 2))

@@ -209,9 +209,9 @@ def test_the_better_model_is_seen_only_beyond_two_standard_errors():
     found = compare_predictions({"worse": LooPrediction(good - [5, 5.1, 4.9, 5], k), "best": LooPrediction(good, k)})
     assert list(found) == ["best", "worse"]
     assert found["worse"].elpd == pytest.approx(20.0)
-    assert found["worse"].is_seen
-    assert not ElpdDifference(20.0, 15.0, 0).is_seen
-    assert not ElpdDifference(1.0, 0.1, 0).is_seen
+    assert found["worse"].is_distinguishable
+    assert not ElpdDifference(20.0, 15.0, 0).is_distinguishable
+    assert not ElpdDifference(1.0, 0.1, 0).is_distinguishable
 
 
 def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():

@@ -8,7 +8,7 @@ import pytest
 from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
-from bowdenfit.inference.departure import FALSE_ALARM, MOVED
+from bowdenfit.inference.departure import FALSE_ALARM, NOTICEABLE_SHIFT
 from bowdenfit.kinds.inside_runs import ZERO
 
 pytestmark = pytest.mark.extended
@@ -27,7 +27,7 @@ def judged(folder, seed, **bench):
 def test_a_zero_that_moves_a_coefficient_is_said_with_its_size_and_a_remedy(tmp_path):
     """This fit was trusted, with its coefficient 2 % off and the truth outside its interval."""
     zero, said = judged(tmp_path / "bench", 7, drift=DRIFT)
-    assert zero.worth_saying
+    assert zero.is_noticeable
     assert zero.high - zero.low == pytest.approx(100 * DRIFT, rel=0.2)
     assert "the zero of the output drifts, by about" in said
     assert "tare before each recording" in said
@@ -36,13 +36,13 @@ def test_a_zero_that_moves_a_coefficient_is_said_with_its_size_and_a_remedy(tmp_
 def test_the_same_bench_without_a_drift_raises_no_alarm(tmp_path):
     """It does in 3 of 1000 runs of this test with other seeds."""
     zero, said = judged(tmp_path / "bench", 7)
-    assert zero.chance > FALSE_ALARM and zero.moved == 0
+    assert zero.p_value > FALSE_ALARM and zero.moved == 0
     assert "drifts" not in said
 
 
 def test_a_drift_over_many_cycles_is_seen_but_moves_nothing(tmp_path):
     zero, said = judged(tmp_path / "bench", 1, drift=DRIFT, length=180.0, period=3.0)
-    assert zero.chance < FALSE_ALARM and 0 < zero.moved < MOVED
+    assert zero.p_value < FALSE_ALARM and 0 < zero.moved < NOTICEABLE_SHIFT
     assert "drifts" not in said
 
 
@@ -50,4 +50,4 @@ def test_a_drift_over_many_cycles_is_seen_but_moves_nothing(tmp_path):
 def test_at_most_one_healthy_bench_in_a_hundred_has_a_zero_that_is_said_to_drift(tmp_path):
     """At 0.003 an alarm, more than two of 100 by chance in 4 of 1000 runs of this test with other seeds."""
     found = [judged(tmp_path / str(seed), seed)[0] for seed in range(100)]
-    assert sum(each.worth_saying for each in found) <= 2
+    assert sum(each.is_noticeable for each in found) <= 2

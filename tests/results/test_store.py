@@ -9,7 +9,7 @@ import pytest
 from sealed import edit_sealed
 
 import bowdenfit as bf
-from bowdenfit.inference.checkpoint import fingerprint_of, heading
+from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint
 from bowdenfit.results.folder import replace_when_whole
 
 QUICK = (
@@ -178,11 +178,11 @@ def test_a_checkpoint_from_before_a_setting_existed_is_resumed(saved, on_body, t
     """Settings that have come since stand at their defaults."""
     fit, folder = saved
     copy = shutil.copytree(folder, tmp_path / "copy")
-    page, path = fingerprint_of(copy / "chain.checkpoint"), copy / "chain.checkpoint"
-    now = heading(page)
+    page, path = read_fingerprint(copy / "chain.checkpoint"), copy / "chain.checkpoint"
+    now = checkpoint_header(page)
     for key in ("method", "n_chains", "target_acceptance"):
         del page["description"]["sampler"][key]
-    path.write_bytes(heading(page) + path.read_bytes().removeprefix(now))
+    path.write_bytes(checkpoint_header(page) + path.read_bytes().removeprefix(now))
     again = bf.fit(on_body, output=copy, settings=QUICK, figures=False, resume=True)
     np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
 
@@ -261,7 +261,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path):
 
 def test_the_checkpoint_carries_what_it_was_started_for(saved):
     fit, folder = saved
-    page = fingerprint_of(folder / "chain.checkpoint")
+    page = read_fingerprint(folder / "chain.checkpoint")
     assert page["seed"] == 3
     assert page["sha256"] == fit.dataset.sha256
 

@@ -13,7 +13,7 @@ import bowdenfit as bf
 from bowdenfit.cli import bowdenfit
 from bowdenfit.display import csv_text
 from bowdenfit.errors import DiskError
-from bowdenfit.parameters.symbols import symbol_of
+from bowdenfit.parameters.symbols import make_symbol
 from bowdenfit.plots.layout import empty_page
 from bowdenfit.plots.write import write_all
 from bowdenfit.results.netcdf import read_groups, write_groups
@@ -56,7 +56,7 @@ def called(on_body, place, *names):
 
 def test_letters_that_the_font_lacks_are_drawn_without_a_word_of_the_library(tmp_path, caplog):
     figure = empty_page(3.0, 2.0)
-    figure.text(0.1, 0.1, symbol_of(r"\mu", "\u65e5\u672c"))
+    figure.text(0.1, 0.1, make_symbol(r"\mu", "\u65e5\u672c"))
     figure.text(0.1, 0.5, "\u65e5")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -70,14 +70,14 @@ def test_every_printable_letter_can_be_set_behind_a_symbol(some):
     parser = MathTextParser("path")
     letters = [chr(i) for i in (*some, 0xE9, 0x142, 0x3BC, 0x2116, 0x4E2D, 0x1F600) if chr(i).isprintable()]
     for letter in letters:
-        parser.parse(symbol_of(r"\mu", f"x{letter}y"))
-        parser.parse(symbol_of(r"\mu", letter))
+        parser.parse(make_symbol(r"\mu", f"x{letter}y"))
+        parser.parse(make_symbol(r"\mu", letter))
 
 
 def test_a_coefficient_s_name_stands_behind_its_letter_and_only_an_index_below_it():
-    assert symbol_of(r"\mu", "sheath_edge") == r"$\mu$ sheath edge"
-    assert symbol_of(r"\mu", "a $ b") == r"$\mu$ a \$ b"
-    assert symbol_of(r"\mu", "1") == r"$\mu_\mathrm{1}$"
+    assert make_symbol(r"\mu", "sheath_edge") == r"$\mu$ sheath edge"
+    assert make_symbol(r"\mu", "a $ b") == r"$\mu$ a \$ b"
+    assert make_symbol(r"\mu", "1") == r"$\mu_\mathrm{1}$"
 
 
 def test_odd_names_come_back_from_the_file_of_draws(tmp_path):

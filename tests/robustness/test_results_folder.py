@@ -10,7 +10,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
-from bowdenfit.inference.checkpoint import append, fingerprint_of, heading, records
+from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_fingerprint, read_records
 from bowdenfit.questions.calibrate.store import open_replications
 from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
@@ -26,32 +26,32 @@ QUICK = ("sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=10
 @pytest.fixture
 def checkpoint(tmp_path):
     path = tmp_path / "chain.checkpoint"
-    path.write_bytes(heading({"seed": 3}))
+    path.write_bytes(checkpoint_header({"seed": 3}))
     for i in range(4):
-        append(path, {"z": np.full((5, 2), float(i)), "place": np.asarray(i)})
+        append_record(path, {"z": np.full((5, 2), float(i)), "place": np.asarray(i)})
     return path
 
 
 def test_a_checkpoint_gives_its_records_back(checkpoint):
-    assert fingerprint_of(checkpoint) == {"seed": 3}
-    assert [int(r["place"]) for r in records(checkpoint, SHAPES)] == [0, 1, 2, 3]
+    assert read_fingerprint(checkpoint) == {"seed": 3}
+    assert [int(r["place"]) for r in read_records(checkpoint, SHAPES)] == [0, 1, 2, 3]
 
 
 def test_a_checkpoint_cut_anywhere_keeps_every_whole_record(checkpoint):
-    whole, start = checkpoint.read_bytes(), len(heading({"seed": 3}))
+    whole, start = checkpoint.read_bytes(), len(checkpoint_header({"seed": 3}))
     each = (len(whole) - start) // 4
     for length in range(start, len(whole), 97):
         checkpoint.write_bytes(whole[:length])
-        assert len(records(checkpoint, SHAPES)) == (length - start) // each
-        append(checkpoint, {"z": np.zeros((5, 2)), "place": np.asarray(9)})
-        assert int(records(checkpoint, SHAPES)[-1]["place"]) == 9
+        assert len(read_records(checkpoint, SHAPES)) == (length - start) // each
+        append_record(checkpoint, {"z": np.zeros((5, 2)), "place": np.asarray(9)})
+        assert int(read_records(checkpoint, SHAPES)[-1]["place"]) == 9
 
 
 def test_a_flipped_bit_ends_a_checkpoint_before_its_record(checkpoint):
     content = bytearray(checkpoint.read_bytes())
     content[-30] ^= 1
     checkpoint.write_bytes(content)
-    assert [int(r["place"]) for r in records(checkpoint, SHAPES)] == [0, 1, 2]
+    assert [int(r["place"]) for r in read_records(checkpoint, SHAPES)] == [0, 1, 2]
 
 
 def _fit(on_body: Path, place: Path, compiled: Path, *before: str, more: tuple[str, ...] = ()):

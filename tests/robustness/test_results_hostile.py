@@ -13,7 +13,7 @@ import pytest
 from fuzzing_results import SHAPES, begun_fleet, resume_fleet
 
 import bowdenfit as bf
-from bowdenfit.inference.checkpoint import append, heading, records
+from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
 from bowdenfit.questions.fleet.store import KEPT
 from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
@@ -119,14 +119,15 @@ def test_packed_arrays_are_refused_unread(tmp_path):
 def test_a_checkpoint_and_pieces_of_a_fleet_hold_no_such_arrays(tmp_path, what):
     archive(tmp_path / "x.npz", ARCHIVES[what])
     path = tmp_path / "chain.checkpoint"
-    path.write_bytes(heading({"seed": 3}))
-    append(path, {"z": np.ones(2)})
+    path.write_bytes(checkpoint_header({"seed": 3}))
+    append_record(path, {"z": np.ones(2)})
     whole = path.read_bytes()
     content = (tmp_path / "x.npz").read_bytes()
-    path.write_bytes(heading({"seed": 3}) + len(content).to_bytes(8, "little") + crc32(content).to_bytes(4, "little") + content)
+    record = len(content).to_bytes(8, "little") + crc32(content).to_bytes(4, "little") + content
+    path.write_bytes(checkpoint_header({"seed": 3}) + record)
     assert whole.startswith(path.read_bytes()[:20])
     with pytest.raises(bf.StoreError, match=r"chain\.checkpoint is damaged"):
-        records(path, SHAPES)
+        read_records(path, SHAPES)
     folder = begun_fleet(tmp_path / "fleet")
     (piece,) = (folder / KEPT).glob("*.npz")
     shutil.copy(tmp_path / "x.npz", piece)

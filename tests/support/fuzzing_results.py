@@ -19,7 +19,7 @@ from fuzzing import Outcome, meet
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.pieces import PieceFit
-from bowdenfit.inference.checkpoint import append, records
+from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.ensemble import CheckpointedBackend
 from bowdenfit.inference.versions import versions
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
@@ -103,7 +103,7 @@ def mangle(chance: random.Random, path: Path) -> None:
 
 def _mangle_checkpoint(chance: random.Random, path: Path) -> None:
     """Another heading, or records with other arrays, whose checksums are right."""
-    lines, found = path.read_bytes().split(b"\n", 2), records(path, SHAPES)
+    lines, found = path.read_bytes().split(b"\n", 2), read_records(path, SHAPES)
     first = other_json(chance, lines[1].decode()) if chance.random() < 0.5 else lines[1].decode()
     path.write_bytes(lines[0] + b"\n" + first.encode("utf-8", "surrogatepass") + b"\n")
     for record in found:
@@ -113,7 +113,7 @@ def _mangle_checkpoint(chance: random.Random, path: Path) -> None:
                 del record[name]
             else:
                 record[name] = chance.choice(ODD_ARRAYS)
-        append(path, record)
+        append_record(path, record)
 
 
 def _mangle_arrays(chance: random.Random, path: Path) -> None:

@@ -13,10 +13,10 @@ from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.ensemble import sample
-from bowdenfit.inference.least_squares import LeastSquares, least_squares, maximum_posterior
+from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.walkers import walker_programs
+from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
@@ -44,12 +44,12 @@ class Laboratory:
         """Classical estimates, as a fit without MCMC gives them."""
         posterior = LogDensity(build_model(dataset))
         objective = self.program(posterior, make_objective)
-        return least_squares(posterior, objective, maximum_posterior(posterior, objective).z)
+        return fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
 
     def draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
-        start = maximum_posterior(posterior, self.program(posterior, make_objective))
-        programs = self.program(posterior, lambda p: walker_programs(p, self.sampler))
+        start = find_maximum_posterior(posterior, self.program(posterior, make_objective))
+        programs = self.program(posterior, lambda p: compile_walkers(p, self.sampler))
         asked = SamplingRequest(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
         return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
 

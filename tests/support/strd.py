@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.solver import minimize, orthogonal
+from bowdenfit.inference.solver import minimize, orthogonalize
 
 FOLDER = Path(__file__).parents[1] / "inference" / "nist"
 MOST_DIGITS = 11.0  # certified values have no more
@@ -79,7 +79,7 @@ def certify(given: Problem) -> tuple[Certification, Certification]:
         calls.clear()
         minimum = minimize(counted, start)
         residual_sd = np.sqrt(minimum.sum_of_squares / (len(given.y) - len(start)))
-        errors = residual_sd * np.linalg.norm(orthogonal(minimum.jacobian)[1], axis=1)
+        errors = residual_sd * np.linalg.norm(orthogonalize(minimum.jacobian)[1], axis=1)
         digits = [
             digits_alike(minimum.x, given.certified),
             digits_alike(errors, given.standard_deviation),

@@ -20,7 +20,7 @@ from bowdenfit.inference.batch.stages import BatchFit, sample_by_nuts, sample_da
 from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.log_density import LogDensity
 
-Given, Found = TypeVar("Given"), TypeVar("Found")
+Argument, Result = TypeVar("Given"), TypeVar("Found")
 
 
 @linear_algebra_in_one_thread()
@@ -43,25 +43,28 @@ def fit_batch(
     programs = programs or BatchPrograms(posterior, settings or BatchSettings())
     parts, pool, stop = list(zip(data, seeds, strict=True)), ThreadPoolExecutor(programs.threads), Event()
     try:
-        needed = ("gradients", "places", "noise", "friction", "names")  # by all, so before any
-        for one in [pool.submit(_in_64_bits, attrgetter(name), programs) for name in needed]:
-            one.result()
-        chunks = [pool.submit(_in_64_bits, partial(start_chunk, programs), chunk) for chunk in _chunks(parts, CHUNK)]
+        needed = ("gradients", "evaluate_points", "noise", "friction", "names")  # by all, so before any
+        for future in [pool.submit(_in_64_bits, attrgetter(name), programs) for name in needed]:
+            future.result()
+        chunks = [pool.submit(_in_64_bits, partial(start_chunk, programs), chunk) for chunk in _split(parts, CHUNK)]
         drawing = partial(_in_64_bits, partial(sample_dataset, programs, stopped=stop.is_set))
-        every = [pool.submit(drawing, begun) for chunk in chunks for begun in chunk.result()]
-        ended = [one.result() for one in every]
+        futures = [pool.submit(drawing, dataset) for chunk in chunks for dataset in chunk.result()]
+        outcomes = [future.result() for future in futures]
     finally:  # an interrupt, or an error of one data set, waits for none of the others
         stop.set()
         pool.shutdown(wait=False, cancel_futures=True)
-    again = programs.settings.nuts
-    return [sample_by_nuts(programs, one, one.start) if again and one.start is not None else one.fit for one in ended]
+    use_nuts = programs.settings.nuts
+    return [
+        sample_by_nuts(programs, future, future.start) if use_nuts and future.start is not None else future.fit
+        for future in outcomes
+    ]
 
 
-def _in_64_bits(function: Callable[[Given], Found], given: Given) -> Found:
+def _in_64_bits(function: Callable[[Argument], Result], argument: Argument) -> Result:
     """What a function gives in a thread, where the setting is the thread's own."""
     with jax.enable_x64(True):
-        return function(given)
+        return function(argument)
 
 
-def _chunks(parts: Sequence[Any], count: int) -> list[list[Any]]:
+def _split(parts: Sequence[Any], count: int) -> list[list[Any]]:
     return [list(parts[i : i + count]) for i in range(0, len(parts), count)]

@@ -11,10 +11,10 @@ from math import lgamma
 
 import numpy as np
 
-_FREEDOM = 5  # of the Student-t's
+_DEGREES_OF_FREEDOM = 5  # of the Student-t's
 _STEPS = 4  # in which a mixture is moved
 _LEAST_SHARE = 1e-3  # of a part that draws have left
-_OF_ALL = 0.5  # of the covariance of all draws, which is what a part has that few draws are near
+_SHRINKAGE = 0.5  # of the covariance of all draws, which is what a part has that few draws are near
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class StudentMixture:
         part = np.searchsorted(np.cumsum(self.share), (np.arange(count) + generator.uniform()) / count)
         part = np.minimum(part, len(self.share) - 1)
         rows = generator.standard_normal((count, self.center.shape[1]))
-        wide = np.sqrt(_FREEDOM / generator.chisquare(_FREEDOM, count))
+        wide = np.sqrt(_DEGREES_OF_FREEDOM / generator.chisquare(_DEGREES_OF_FREEDOM, count))
         for i in range(len(self.share)):
             here = part == i
             rows[here] = self.center[i] + wide[here, None] * (rows[here] @ self.root[i].T)
@@ -48,48 +48,54 @@ class StudentMixture:
 
     def log_density(self, rows: np.ndarray) -> np.ndarray:
         """Of every row."""
-        return _log_sum(self._of_parts(self._squares(rows)))
+        return _log_sum(self._log_components(self._squared_distances(rows)))
 
-    def _squares(self, rows: np.ndarray) -> np.ndarray:
+    def _squared_distances(self, rows: np.ndarray) -> np.ndarray:
         """Distance from every part in its own units, squared, (row, part)."""
         count, size = self.center.shape
         flat = self._inverse.reshape(-1, size)
         apart = (rows @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(-1, count, size)
         return np.einsum("nki,nki->nk", apart, apart)
 
-    def _of_parts(self, squares: np.ndarray) -> np.ndarray:
+    def _log_components(self, squares: np.ndarray) -> np.ndarray:
         """Log of share times density of every part, (row, part)."""
         size = self.center.shape[1]
-        constant = lgamma((_FREEDOM + size) / 2) - lgamma(_FREEDOM / 2) - size / 2 * np.log(_FREEDOM * np.pi)
+        constant = (
+            lgamma((_DEGREES_OF_FREEDOM + size) / 2)
+            - lgamma(_DEGREES_OF_FREEDOM / 2)
+            - size / 2 * np.log(_DEGREES_OF_FREEDOM * np.pi)
+        )
         of_part = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
-        return of_part - (_FREEDOM + size) / 2 * np.log1p(squares / _FREEDOM)
+        return of_part - (_DEGREES_OF_FREEDOM + size) / 2 * np.log1p(squares / _DEGREES_OF_FREEDOM)
 
-    def moved(self, rows: np.ndarray) -> "StudentMixture":
+    def refined(self, rows: np.ndarray) -> "StudentMixture":
         """The mixture that is likelier to have given draws, some steps of expectation and maximization away.
 
         Args:
             rows: Draws, one a row.
         """
-        found, of_all, (count, size) = self, covariance(rows), rows.shape
+        mixture, of_all, (count, size) = self, regularized_covariance(rows), rows.shape
         for _ in range(_STEPS):
-            squares = found._squares(rows)
-            logs = found._of_parts(squares)
+            squares = mixture._squared_distances(rows)
+            logs = mixture._log_components(squares)
             of_part = np.exp(logs - _log_sum(logs)[:, None]) / count
-            pulled = of_part * (_FREEDOM + size) / (_FREEDOM + squares)
+            pulled = of_part * (_DEGREES_OF_FREEDOM + size) / (_DEGREES_OF_FREEDOM + squares)
             share = np.maximum(of_part.sum(axis=0), np.finfo(float).tiny)
             near = share > _LEAST_SHARE
             middle = pulled.T @ rows / np.maximum(pulled.sum(axis=0), np.finfo(float).tiny)[:, None]
-            center = np.where(near[:, None], middle, found.center)
+            center = np.where(near[:, None], middle, mixture.center)
             few = size / (share**2 / np.maximum(np.sum(of_part**2, axis=0), np.finfo(float).tiny) + size)
             few = np.where(near, few, 1.0)[:, None, None]
             apart = [rows - at for at in center]
-            scale = np.stack([(each * pull[:, None]).T @ each for each, pull in zip(apart, pulled.T, strict=True)])
-            scale = (1 - few) * scale / share[:, None, None] + few * _OF_ALL * of_all
+            scale = np.stack(
+                [(deviation * pull[:, None]).T @ deviation for deviation, pull in zip(apart, pulled.T, strict=True)]
+            )
+            scale = (1 - few) * scale / share[:, None, None] + few * _SHRINKAGE * of_all
             share = np.maximum(share, _LEAST_SHARE)
-            found = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum())
-        return found
+            mixture = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum())
+        return mixture
 
-    def with_wide(self, rows: np.ndarray, times: float, share: float) -> "StudentMixture":
+    def with_wide_component(self, rows: np.ndarray, times: float, share: float) -> "StudentMixture":
         """The same with one more part, about all of many draws.
 
         Args:
@@ -97,7 +103,7 @@ class StudentMixture:
             times: How much wider than they.
             share: Of the draws.
         """
-        root = times * np.linalg.cholesky(covariance(rows))
+        root = times * np.linalg.cholesky(regularized_covariance(rows))
         return StudentMixture(
             np.concatenate([self.center, rows.mean(axis=0, keepdims=True)]),
             np.concatenate([self.root, root[None]]),
@@ -105,7 +111,7 @@ class StudentMixture:
         )
 
 
-def mixture_among(rows: np.ndarray, parts: int) -> StudentMixture:
+def start_mixture(rows: np.ndarray, parts: int) -> StudentMixture:
     """Student-t's about some of many draws, to be moved.
 
     Args:
@@ -113,14 +119,16 @@ def mixture_among(rows: np.ndarray, parts: int) -> StudentMixture:
         parts: How many.
     """
     some = ((np.arange(parts) + 0.5) / parts * len(rows)).astype(int)
-    root = np.linalg.cholesky(_OF_ALL * covariance(rows))
+    root = np.linalg.cholesky(_SHRINKAGE * regularized_covariance(rows))
     return StudentMixture(rows[some], np.stack([root] * parts), np.full(parts, 1 / parts))
 
 
-def covariance(rows: np.ndarray) -> np.ndarray:
+def regularized_covariance(rows: np.ndarray) -> np.ndarray:
     """Of draws, with a little more in each direction, so that it always has a root."""
-    found = np.cov(rows.T).reshape(rows.shape[1], -1)
-    return found + (1e-9 * np.trace(found) / len(found) + np.finfo(float).tiny) * np.eye(len(found))
+    sample_covariance = np.cov(rows.T).reshape(rows.shape[1], -1)
+    return sample_covariance + (
+        1e-9 * np.trace(sample_covariance) / len(sample_covariance) + np.finfo(float).tiny
+    ) * np.eye(len(sample_covariance))
 
 
 def _log_sum(logs: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from bowdenfit.inference.draws import derived_units, shown_values
 from bowdenfit.inference.versions import refuse_other_versions
 
 DRAWS = 2048  # of each data set, of equal weight
-_ORDER = 3  # stream of random numbers that puts draws in no order
+_SHUFFLE_STREAM = 3  # stream of random numbers that puts draws in no order
 
 
 @dataclass(frozen=True)
@@ -90,32 +90,32 @@ def fit_piece(piece: Piece) -> list[PieceFit]:
     """
     refuse_other_versions(piece.versions)
     with jax.enable_x64(True):
-        programs, values_of = _compiled(piece.example, piece.settings)
+        programs, values_of = _compile(piece.example, piece.settings)
         fits = fit_batch(programs.posterior, piece.data, piece.seeds, programs=programs)
         every = zip(piece.names, piece.data, piece.seeds, fits, strict=True)
-        return [_as_values(name, data, seed, fit, values_of) for name, data, seed, fit in every]
+        return [_make_piece_fit(name, data, seed, fit, values_of) for name, data, seed, fit in every]
 
 
 @lru_cache(maxsize=8)
-def _compiled(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, Callable[..., Any]]:
+def _compile(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, Callable[..., Any]]:
     """What serves all pieces of one shape."""
     posterior = shape_dataset(example.dataset).posterior
     model = posterior.model
 
     def shown(z: Array, data: Any) -> Array:
-        found = shown_values(model, posterior.values(z, data))
+        values = shown_values(model, posterior.values(z, data))
         names = [*(p.name for p in model.space.free), *derived_units(model)]
-        return jnp.stack([found[name] for name in names])
+        return jnp.stack([values[name] for name in names])
 
     rows = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
     return BatchPrograms(posterior, settings), compile_program(jax.vmap(shown, (0, None), 1), rows, posterior.data)
 
 
-def _as_values(name: str, data: Any, seed: int, fit: BatchFit, values_of: Callable[..., Any]) -> PieceFit:
+def _make_piece_fit(name: str, data: Any, seed: int, fit: BatchFit, values_of: Callable[..., Any]) -> PieceFit:
     """A fit as the named values of as many draws as every data set has."""
     known = min((min(d.ess_bulk, d.ess_tail) for d in fit.diagnostics.values()), default=0.0)
     if not len(fit.z):
         return PieceFit(name, np.zeros((0, 0)), fit.engine, fit.pareto_k, known, fit.reasons)
-    order = np.random.default_rng([seed, _ORDER]).permutation(len(fit.z))
+    order = np.random.default_rng([seed, _SHUFFLE_STREAM]).permutation(len(fit.z))
     z = fit.z[np.resize(order, DRAWS)]
     return PieceFit(name, np.asarray(values_of(z, data)), fit.engine, fit.pareto_k, float(known), fit.reasons)

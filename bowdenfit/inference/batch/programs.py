@@ -14,8 +14,8 @@ from jax import Array
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import WALKERS_PER_PARAMETER
-from bowdenfit.inference.batch.ensembles import make_round
-from bowdenfit.inference.batch.laplace import points_of_climb
+from bowdenfit.inference.batch.ensembles import compile_round
+from bowdenfit.inference.batch.laplace import count_climb_points
 from bowdenfit.inference.batch.proposals import ProposedPoints
 from bowdenfit.inference.batch.weights import BLOCK
 from bowdenfit.inference.compilation import compile_program
@@ -78,17 +78,17 @@ class BatchPrograms:
     def gradients(self) -> Callable[..., Any]:
         """Log density and gradient, for climbing."""
         size, gradient = self.posterior.model.space.size, jax.value_and_grad(self.posterior.log_density)
-        shape = jax.ShapeDtypeStruct((CHUNK, points_of_climb(size), size), np.dtype(float))
+        shape = jax.ShapeDtypeStruct((CHUNK, count_climb_points(size), size), np.dtype(float))
         return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack_data([self.posterior.data], CHUNK))
 
     @cached_property
-    def places(self) -> Callable[..., Any]:
+    def evaluate_points(self) -> Callable[..., Any]:
         """`ProposedPoints` of a block of points of one data set, of each of which it is said whether it is a z."""
         conditional, posterior = Conditional(self.posterior), self.posterior
-        straight = conditional.at if conditional.has_coefficients else identity
+        coordinate_map = conditional.map_point if conditional.has_coefficients else identity
 
-        def places(given: Array, is_z: Array, data: Any) -> ProposedPoints:
-            w, z, log_volume = straight(given, is_z, data)
+        def evaluate(point: Array, is_z: Array, data: Any) -> ProposedPoints:
+            w, z, log_volume = coordinate_map(point, is_z, data)
             log_density, has_z = posterior.log_density(z, data), jnp.isfinite(z).all()
             has_w, known = jnp.isfinite(w).all() & jnp.isfinite(log_volume), has_z & jnp.isfinite(log_density)
             z, w = jnp.where(has_z, z, 0.0), jnp.where(has_w, w, 0.0)
@@ -96,12 +96,12 @@ class BatchPrograms:
 
         rows = jax.ShapeDtypeStruct((BLOCK, posterior.model.space.size), np.dtype(float))
         is_z = jax.ShapeDtypeStruct((BLOCK,), np.dtype(bool))
-        return compile_program(jax.vmap(places, (0, 0, None)), rows, is_z, posterior.data)
+        return compile_program(jax.vmap(evaluate, (0, 0, None)), rows, is_z, posterior.data)
 
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
         """A round of all walkers."""
-        return make_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers)
+        return compile_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers)
 
     @property
     def threads(self) -> int:
@@ -119,9 +119,9 @@ class BatchPrograms:
     @cached_property
     def nuts(self) -> Callable[..., Any]:
         """NUTS of one data set."""
-        from bowdenfit.inference.nuts import make_program
+        from bowdenfit.inference.nuts import compile_nuts
 
-        return make_program(self.posterior, self.settings.sampler)
+        return compile_nuts(self.posterior, self.settings.sampler)
 
     @cached_property
     def noise(self) -> np.ndarray:

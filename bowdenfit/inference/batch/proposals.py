@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from bowdenfit.inference.batch.mixture import StudentMixture, mixture_among
+from bowdenfit.inference.batch.mixture import StudentMixture, start_mixture
 
 _PRIOR_SHARE = 0.05  # of the draws about the maxima that the prior has
-_FIRST_SHARE = 0.1  # of learnt ones that these have
+_MAXIMA_SHARE = 0.1  # of learnt ones that these have
 _PARTS, _FRICTION_PARTS = 6, 2
 _WIDE, _WIDE_SHARE = 2.5, 0.2  # of one more part: by how much wider than the draws, and its share
 
@@ -72,7 +72,7 @@ class LearntProposal:
 
     def draw(self, generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
         """See `MaximaProposal`."""
-        z, is_z = self.first.draw(generator, round(_FIRST_SHARE * count))
+        z, is_z = self.first.draw(generator, round(_MAXIMA_SHARE * count))
         w = np.zeros((count - len(z), z.shape[1]))
         for which, students in self.groups:
             w[:, which] = generator.permutation(students.draw(generator, len(w)))  # else the same parts would always meet
@@ -83,13 +83,13 @@ class LearntProposal:
         learnt = -at.log_volume
         for which, students in self.groups:
             learnt = learnt + students.log_density(at.w[:, which])
-        return np.logaddexp(learnt + np.log1p(-_FIRST_SHARE), self.first.log_density(at) + np.log(_FIRST_SHARE))
+        return np.logaddexp(learnt + np.log1p(-_MAXIMA_SHARE), self.first.log_density(at) + np.log(_MAXIMA_SHARE))
 
 
 Proposal: TypeAlias = MaximaProposal | LearntProposal
 
 
-def learn_proposal(before: Proposal, w: np.ndarray, friction: np.ndarray) -> LearntProposal:
+def learn_proposal(previous: Proposal, w: np.ndarray, friction: np.ndarray) -> LearntProposal:
     """A proposal nearer to a posterior.
 
     Args:
@@ -97,10 +97,10 @@ def learn_proposal(before: Proposal, w: np.ndarray, friction: np.ndarray) -> Lea
         w: Draws of the posterior, about, one a row.
         friction: Which parameters are friction coefficients.
     """
-    first = before.first if isinstance(before, LearntProposal) else before
+    first = previous.first if isinstance(previous, LearntProposal) else previous
     groups = []
     for which, parts in ((np.flatnonzero(friction), _FRICTION_PARTS), (np.flatnonzero(~friction), _PARTS)):
         if len(which):
             rows = w[:, which]
-            groups.append((which, mixture_among(rows, parts).moved(rows).with_wide(rows, _WIDE, _WIDE_SHARE)))
+            groups.append((which, start_mixture(rows, parts).refined(rows).with_wide_component(rows, _WIDE, _WIDE_SHARE)))
     return LearntProposal(first, tuple(groups))

@@ -21,8 +21,8 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
-_ABOUT = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
-_OF_TABLE = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
+_IRRELEVANT_KEYS = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
+_DATA_FIELDS = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ScaledDensity(LogDensity):
     def values(self, z: Array, data: Any) -> dict[str, Array]:
         """See `LogDensity.values`."""
         unit = super().values(z, data)
-        return unit | {name: unit[name] * data[-1][i] for i, name in enumerate(_scaled(self.model.space))}
+        return unit | {name: unit[name] * data[-1][i] for i, name in enumerate(_scaled_names(self.model.space))}
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,13 @@ def shape_dataset(dataset: Dataset) -> ShapedDataset:
         dataset: What was measured.
     """
     model = build_model(dataset)
-    units = [_unit(parameter) for parameter in model.space.parameters]
+    units = [_to_unit_scale(parameter) for parameter in model.space.parameters]
     space = ParameterSpace(tuple(parameter for parameter, _ in units))
     scales = np.array([scale for parameter, scale in units if parameter.fixed is None and scale is not None], dtype=float)
     data = (*LogDensity(model).padded, scales)
     cable = replace(model.cable, nominal=dict.fromkeys(model.cable.nominal, 1.0)) if _has_angles(model) else model.cable
-    posterior = ScaledDensity(_of(cable, space, model.terms), data)
-    return ShapedDataset(posterior, data, _key(posterior))
+    posterior = ScaledDensity(_with_cable(cable, space, model.terms), data)
+    return ShapedDataset(posterior, data, _program_key(posterior))
 
 
 def _has_angles(model: Model) -> bool:
@@ -72,19 +72,19 @@ def _has_angles(model: Model) -> bool:
     return all("is_own" in term.data and np.all(term.data["is_own"][..., nominal]) for term in model.terms)
 
 
-def _of(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
+def _with_cable(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
     """The model of the same terms with another cable."""
     return Model(cable, space, tuple(replace(term, cable=cable) for term in terms))  # type: ignore[type-var]
 
 
-def _scaled(space: ParameterSpace) -> list[str]:
+def _scaled_names(space: ParameterSpace) -> list[str]:
     """Parameters whose priors the data scale."""
-    return [p.name for p in space.free if p.scaled_by and _scale(p.prior) is not None]
+    return [p.name for p in space.free if p.scaled_by and _scale_of(p.prior) is not None]
 
 
-def _unit(parameter: Parameter) -> tuple[Parameter, float | None]:
+def _to_unit_scale(parameter: Parameter) -> tuple[Parameter, float | None]:
     """A parameter with the prior of a unit scale, and the scale; None where it is not scaled by measurements."""
-    scale = _scale(parameter.prior) if parameter.scaled_by else None
+    scale = _scale_of(parameter.prior) if parameter.scaled_by else None
     if scale is None:
         return parameter, None
     prior = parameter.prior
@@ -92,7 +92,7 @@ def _unit(parameter: Parameter) -> tuple[Parameter, float | None]:
     return replace(parameter, prior=replace(prior, **unit), prior_words="", scaled_by="measurements"), scale  # type: ignore[type-var]
 
 
-def _scale(prior: Prior) -> float | None:
+def _scale_of(prior: Prior) -> float | None:
     """The factor between a prior and that of unit scale; None where it is more than a factor."""
     match prior:
         case HalfCauchy(scale=scale):
@@ -106,13 +106,13 @@ def _scale(prior: Prior) -> float | None:
     return None
 
 
-def _key(posterior: ScaledDensity) -> str:
+def _program_key(posterior: ScaledDensity) -> str:
     """What its program depends on: shapes, parameters, description, and conditions where they matter."""
     shapes = jax.tree.map(lambda array: (np.shape(array), str(np.asarray(array).dtype)), posterior.data)
-    terms = [_about(term) for term in posterior.model.terms]
-    said = _said(posterior.model.description.to_json())
+    terms = [_describe_term(term) for term in posterior.model.terms]
+    description = _relevant_parts(posterior.model.description.to_json())
     cable = posterior.model.cable
-    key = f"{shapes} {posterior.model.space.parameters} {said} {terms} {dict(cable.nominal)}"
+    key = f"{shapes} {posterior.model.space.parameters} {description} {terms} {dict(cable.nominal)}"
     return _digest(f"{key} {cable.friction.conditions}" if _conditions_matter(posterior.model) else key)
 
 
@@ -128,23 +128,23 @@ def input_hash(dataset: Dataset) -> str:
         dataset: Read from files.
     """
     read = [checksum for name, checksum in dataset.sha256.items() if name != DESCRIPTION_FILE]
-    return _digest(f"{_said(dataset.description.to_json())} {read}")
+    return _digest(f"{_relevant_parts(dataset.description.to_json())} {read}")
 
 
-def _said(page: Any) -> Any:
+def _relevant_parts(page: Any) -> Any:
     """A description without what no fit depends on."""
     if isinstance(page, Mapping):
-        return {key: _said(value) for key, value in page.items() if key not in _ABOUT}
-    return [_said(each) for each in page] if isinstance(page, list | tuple) else page
+        return {key: _relevant_parts(value) for key, value in page.items() if key not in _IRRELEVANT_KEYS}
+    return [_relevant_parts(item) for item in page] if isinstance(page, list | tuple) else page
 
 
-def _about(term: Term) -> str:
+def _describe_term(term: Term) -> str:
     """What a term is beside its data; arrays by what is in them."""
     parts = [f"{type(term).__name__} {len(term.labels)}"]
-    for each in fields(term):  # type: ignore[arg-type]
-        if each.name not in _OF_TABLE:
-            leaves, tree = jax.tree.flatten(getattr(term, each.name))
-            parts.append(f"{each.name} {tree} {[_leaf(leaf) for leaf in leaves]}")
+    for term_field in fields(term):  # type: ignore[arg-type]
+        if term_field.name not in _DATA_FIELDS:
+            leaves, tree = jax.tree.flatten(getattr(term, term_field.name))
+            parts.append(f"{term_field.name} {tree} {[_leaf(leaf) for leaf in leaves]}")
     return " ".join(parts)
 
 

@@ -18,10 +18,10 @@ from bowdenfit.inference.diagnostics import Diagnostics, describe_low_ess
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
 BLOCK = 2048  # draws at once
-_LEARNT = 2  # proposals, one after the other
-_MOST = 16  # blocks, where draws are good and not yet enough
-_WORTH = 0.1  # effective draws a draw; of fewer, no more are drawn
-_LEARN_FROM = 60  # effective draws at the least that say where to draw next; weights are made as even as that takes
+_LEARNING_STEPS = 2  # proposals, one after the other
+_MOST_BLOCKS = 16  # blocks, where draws are good and not yet enough
+_LEAST_EFFICIENCY = 0.1  # effective draws a draw; of fewer, no more are drawn
+_LEAST_TO_LEARN_FROM = 60  # effective draws at the least that say where to draw next; weights are made as even as that takes
 _TAILS = (0.05, 0.95)
 
 
@@ -59,7 +59,7 @@ class WeightedDraws:
         """Whether the weights can be trusted."""
         return self.pareto_k <= reliable_k(len(self.z))
 
-    def with_more(self, other: "WeightedDraws") -> "WeightedDraws":
+    def joined_with(self, other: "WeightedDraws") -> "WeightedDraws":
         """These and more from the same proposal."""
         both = zip(*map(_fields, (self, other)), strict=True)
         return WeightedDraws(*(np.concatenate([own, more]) for own, more in both))
@@ -79,7 +79,7 @@ class WeightedDraws:
             for i, name in enumerate(names)
         }
 
-    def sd_errors(self, names: tuple[str, ...]) -> dict[str, float]:
+    def estimate_sd_errors(self, names: tuple[str, ...]) -> dict[str, float]:
         """Monte Carlo error of each standard deviation as a share of it (section 3.2.3, of the square deviations)."""
         weights = np.exp(self.log_weights)
         squares = (self.z - weights @ self.z) ** 2
@@ -87,7 +87,7 @@ class WeightedDraws:
         errors = np.sqrt(weights**2 @ (squares - variance) ** 2) / (2 * np.maximum(variance, np.finfo(float).tiny))
         return dict(zip(names, errors.tolist(), strict=True))
 
-    def shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
+    def describe_shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
         """What keeps the draws from being trusted, in words; empty if nothing does."""
         reasons = []
         if not self.is_reliable:
@@ -107,7 +107,7 @@ def _fields(of: WeightedDraws) -> tuple[np.ndarray, ...]:
 
 
 @dataclass(frozen=True)
-class Target:
+class ImportanceSampler:
     """What is to be drawn.
 
     Args:
@@ -120,43 +120,43 @@ class Target:
     friction: np.ndarray
     enough: Callable[[WeightedDraws], bool]
 
-    def weighted(self, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
+    def draw_enough(self, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
         """Draws that are enough, or as many as promise to be.
 
         Args:
             first: What they are drawn from.
             generator: Of everything random here.
         """
-        found = self._drawn(first, generator, 1)
-        while _promises(found) and not self.enough(found):
-            found = found.with_more(self._drawn(first, generator, len(found.z) // BLOCK))
-        return found
+        draws = self._draw_blocks(first, generator, 1)
+        while _is_promising(draws) and not self.enough(draws):
+            draws = draws.joined_with(self._draw_blocks(first, generator, len(draws.z) // BLOCK))
+        return draws
 
-    def nearer(self, found: WeightedDraws, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
+    def draw_nearer(self, draws: WeightedDraws, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
         """Draws nearer to the posterior than those found, for walkers to start at."""
         proposal: Proposal = first
-        for _ in range(_LEARNT):
-            chosen = resample(np.exp(even_weights(found.log_weights, _LEARN_FROM)), BLOCK, 0.5)
-            proposal = learn_proposal(proposal, found.w[chosen], self.friction)
-            found = self._drawn(proposal, generator, 1)
-        return found
+        for _ in range(_LEARNING_STEPS):
+            chosen = resample(np.exp(even_weights(draws.log_weights, _LEAST_TO_LEARN_FROM)), BLOCK, 0.5)
+            proposal = learn_proposal(proposal, draws.w[chosen], self.friction)
+            draws = self._draw_blocks(proposal, generator, 1)
+        return draws
 
-    def _drawn(self, proposal: Proposal, generator: np.random.Generator, blocks: int) -> WeightedDraws:
-        drawn = []
+    def _draw_blocks(self, proposal: Proposal, generator: np.random.Generator, blocks: int) -> WeightedDraws:
+        parts = []
         for _ in range(blocks):
             at = self.evaluate(*proposal.draw(generator, BLOCK))
             log_proposed = proposal.log_density(at)
             known = np.isfinite(at.log_density) & np.isfinite(log_proposed)
-            drawn.append((at.w, at.z, np.where(known, at.log_density, -np.inf), np.where(known, log_proposed, 0.0)))
-        return WeightedDraws(*(np.concatenate(each) for each in zip(*drawn, strict=True)))
+            parts.append((at.w, at.z, np.where(known, at.log_density, -np.inf), np.where(known, log_proposed, 0.0)))
+        return WeightedDraws(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _promises(found: WeightedDraws) -> bool:
+def _is_promising(draws: WeightedDraws) -> bool:
     """Whether more draws from the same proposal may be enough."""
-    return len(found.z) < _MOST * BLOCK and effective_draws(found.log_weights) >= _WORTH * len(found.z)
+    return len(draws.z) < _MOST_BLOCKS * BLOCK and effective_sample_size(draws.log_weights) >= _LEAST_EFFICIENCY * len(draws.z)
 
 
-def effective_draws(log_weights: np.ndarray) -> float:
+def effective_sample_size(log_weights: np.ndarray) -> float:
     """How many draws of equal weight weighted ones are worth."""
     weights = np.exp(log_weights - log_weights.max())
     return float(weights.sum() ** 2 / np.sum(weights**2))
@@ -165,14 +165,14 @@ def effective_draws(log_weights: np.ndarray) -> float:
 def even_weights(log_weights: np.ndarray, wanted: float) -> np.ndarray:
     """Log weights of sum 1, to a power at which the draws are worth so many, where they are worth fewer."""
     power = 1.0
-    while effective_draws(power * log_weights) < min(wanted, 0.5 * np.isfinite(log_weights).sum()):
+    while effective_sample_size(power * log_weights) < min(wanted, 0.5 * np.isfinite(log_weights).sum()):
         power *= 0.9
     weights = np.exp(power * (log_weights - log_weights.max()))
     with np.errstate(divide="ignore"):
         return np.log(weights / weights.sum())
 
 
-def resample(weights: np.ndarray, count: int, begin: float) -> np.ndarray:
+def resample(weights: np.ndarray, count: int, offset: float) -> np.ndarray:
     """Systematic, from a place between 0 and 1: every draw as often as its weight says, to less than one."""
-    places = (np.arange(count) + begin) / count
-    return np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
+    positions = (np.arange(count) + offset) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import UsageError
-from bowdenfit.inference.engines.engine import Engine, EngineError, InThisProcess, in_threads
+from bowdenfit.inference.engines.engine import Engine, EngineError, InThisProcess, make_waiting_executor
 from bowdenfit.inference.engines.processes import available_cores, start_worker
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
 ENGINES = "local, dask://HOST:PORT or slurm"
-OF_A_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
-JOBS = "jobs"  # folder in which Slurm's jobs write
-_AT_A_TIME = 16  # jobs of Slurm, if nothing else is said
-_ANSWERS_WITHIN, _WORKERS_WITHIN = 10, 60  # seconds
-_MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
+DATASETS_PER_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
+JOBS_FOLDER = "jobs"  # folder in which Slurm's jobs write
+_DEFAULT_JOBS = 16  # jobs of Slurm, if nothing else is said
+_CONNECT_SECONDS, _WORKER_SECONDS = 10, 60  # seconds
+_JOB_MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
 
 
 @contextmanager
@@ -46,9 +46,13 @@ def open_engine(
     if isinstance(engine, Executor):
         yield Engine(lambda: engine, workers or available_cores(), "the executor")
         return
-    found: Engine[Any, Any]
+    opened: Engine[Any, Any]
     if engine == "local":
-        found = InThisProcess() if processes == 1 else Engine(partial(_processes, processes), processes, "this machine")
+        opened = (
+            InThisProcess()
+            if processes == 1
+            else Engine(partial(_make_process_pool, processes), processes, "this machine")
+        )
     elif engine.startswith("dask://"):
         address = engine.removeprefix("dask://")
         with _dask_client(address) as (client, count):
@@ -59,17 +63,22 @@ def open_engine(
         if folder is None:
             raise UsageError("--engine slurm needs a folder that all its nodes see; name it with --output.")
         if shutil.which("srun") is None:
-            raise _no_slurm()
-        found = Engine(partial(slurm, folder, workers or _AT_A_TIME), workers or _AT_A_TIME, "slurm", OF_A_JOB)
+            raise _slurm_missing_error()
+        opened = Engine(
+            partial(make_slurm_executor, folder, workers or _DEFAULT_JOBS),
+            workers or _DEFAULT_JOBS,
+            "slurm",
+            DATASETS_PER_JOB,
+        )
     else:
         raise UsageError(f"there is no engine {shown(engine)}; known here: {ENGINES}.")
     try:
-        yield found
+        yield opened
     finally:
-        found.close()
+        opened.close()
 
 
-def _processes(count: int) -> Executor:
+def _make_process_pool(count: int) -> Executor:
     return ProcessPoolExecutor(count, get_context("spawn"), start_worker)
 
 
@@ -79,9 +88,9 @@ def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
     try:
         from distributed import Client
     except ImportError:
-        raise _not_installed("distributed") from None
+        raise _library_missing_error("distributed") from None
     try:
-        client = Client(f"tcp://{address}", timeout=_ANSWERS_WITHIN, set_as_default=False)
+        client = Client(f"tcp://{address}", timeout=_CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
         raise EngineError(
             f"the scheduler at {shown(address)} does not answer ({type(error).__name__}); start it with `dask scheduler`, and "
@@ -101,7 +110,7 @@ def _refuse_no_workers(client: Any, address: str) -> None:
         EngineError: There is none, or the scheduler is gone.
     """
     try:
-        client.wait_for_workers(1, timeout=_WORKERS_WITHIN)
+        client.wait_for_workers(1, timeout=_WORKER_SECONDS)
     except TimeoutError:
         raise EngineError(
             f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`. What is done is "
@@ -114,7 +123,7 @@ def _refuse_no_workers(client: Any, address: str) -> None:
         ) from None
 
 
-def slurm(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
+def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
     """An executor of Slurm's jobs, or of processes here that stand for them.
 
     Args:
@@ -128,27 +137,25 @@ def slurm(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
     try:
         import submitit
     except ImportError:
-        raise _not_installed("submitit") from None
+        raise _library_missing_error("submitit") from None
     refuse_special(folder)
     try:
         inner = submitit.AutoExecutor(folder.resolve(), cluster=cluster)
     except RuntimeError:
-        raise _no_slurm() from None
-    inner.update_parameters(timeout_min=_MINUTES, name="bowdenfit")
+        raise _slurm_missing_error() from None
+    inner.update_parameters(timeout_min=_JOB_MINUTES, name="bowdenfit")
 
     def submit(function: Callable[..., Any], *arguments: Any) -> Any:
         return inner.submit(function, *arguments).result()
 
-    return in_threads(submit, jobs)
+    return make_waiting_executor(submit, jobs)
 
 
-def _no_slurm() -> UsageError:
+def _slurm_missing_error() -> UsageError:
     return UsageError(
         "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
     )
 
 
-def _not_installed(library: str) -> UsageError:
+def _library_missing_error(library: str) -> UsageError:
     return UsageError(f"this engine needs {library}, which is not installed; install bowdenfit[cluster].")
-
-

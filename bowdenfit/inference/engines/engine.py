@@ -22,9 +22,9 @@ from bowdenfit.errors import BowdenfitError
 Work = TypeVar("Work")
 Result = TypeVar("Result")
 Outcome: TypeAlias = tuple[Exception | None, Any]
-_AHEAD = 2  # pieces that a worker is given at once, so that it need not wait for the next
+_PIECES_PER_WORKER = 2  # pieces that a worker is given at once, so that it need not wait for the next
 _PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
-_TIMES = 3  # that a piece is tried when workers die of it
+_MOST_ATTEMPTS = 3  # that a piece is tried when workers die of it
 
 
 class EngineError(BowdenfitError):
@@ -47,9 +47,9 @@ class Engine(Generic[Work, Result]):
     executor: Callable[[], Executor]
     workers: int
     name: str
-    most: int = 128
+    max_datasets: int = 128
     check: Callable[[], None] = lambda: None
-    begun: Executor | None = field(default=None, init=False)
+    running: Executor | None = field(default=None, init=False)
 
     def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
         """What a function gives of every piece, in the order in which they are done.
@@ -63,69 +63,69 @@ class Engine(Generic[Work, Result]):
             EngineError: Workers die of the same piece again and again, or are lost.
         """
         left = [(piece, 1) for piece in reversed(pieces)]
-        running: dict[Future[Outcome], tuple[Work, int]] = {}
+        in_flight: dict[Future[Outcome], tuple[Work, int]] = {}
         try:
-            while left or running:
-                while left and len(running) < _AHEAD * self.workers:
-                    running[self._submit(function, left[-1][0])] = left[-1]
+            while left or in_flight:
+                while left and len(in_flight) < _PIECES_PER_WORKER * self.workers:
+                    in_flight[self._submit(function, left[-1][0])] = left[-1]
                     left.pop()
-                done, _ = wait(running, _PATIENCE, FIRST_COMPLETED)
+                done, _ = wait(in_flight, _PATIENCE, FIRST_COMPLETED)
                 if not done:
                     self.check()
                 for future in done:
-                    piece, tried = running.pop(future)
+                    piece, attempts = in_flight.pop(future)
                     try:
                         refused, result = future.result()
                     except (Exception, CancelledError) as error:  # of the engine: what the function raises is in the outcome
                         self.check()
-                        left.append((piece, self._counted(tried, error)))
+                        left.append((piece, self._count_attempt(attempts, error)))
                         continue
                     if refused is not None:
                         raise refused
                     yield result
         except EngineError:
-            running.clear()  # nobody is left who could be told to stop
+            in_flight.clear()  # nobody is left who could be told to stop
             raise
         finally:
-            for future in running:
+            for future in in_flight:
                 future.cancel()
 
     def _submit(self, function: Callable[[Work], Result], piece: Work) -> "Future[Outcome]":
-        if self.begun is None:
-            self.begun = self.executor()
+        if self.running is None:
+            self.running = self.executor()
         try:
-            return self.begun.submit(attempt, function, piece)
+            return self.running.submit(run_piece, function, piece)
         except BrokenExecutor:
             self.close()
-            self.begun = self.executor()
-            return self.begun.submit(attempt, function, piece)
+            self.running = self.executor()
+            return self.running.submit(run_piece, function, piece)
         except Exception as error:
             self.check()
             why = f"{type(error).__name__}: {error}"
             raise EngineError(f"{self.name} takes no more work ({why}); start it again, and go on with --resume.") from None
 
-    def _counted(self, tried: int, error: Exception) -> int:
+    def _count_attempt(self, attempts: int, error: Exception) -> int:
         """How often a piece will have been tried, if it may be tried again."""
         why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         if isinstance(error, ImportError | AttributeError):
             raise EngineError(
                 f"a worker of {self.name} cannot load what it is to do ({why}); install the same bowdenfit there as here."
             ) from None
-        if tried >= _TIMES:
+        if attempts >= _MOST_ATTEMPTS:
             raise EngineError(
-                f"workers of {self.name} were lost {tried} times at the same work ({why}); the usual cause is too little "
+                f"workers of {self.name} were lost {attempts} times at the same work ({why}); the usual cause is too little "
                 "memory: give each worker more, or have fewer of them."
             ) from None
-        return tried + 1
+        return attempts + 1
 
     def close(self) -> None:
         """End what was begun."""
-        if self.begun is not None:
-            self.begun.shutdown(wait=False, cancel_futures=True)
-            self.begun = None
+        if self.running is not None:
+            self.running.shutdown(wait=False, cancel_futures=True)
+            self.running = None
 
 
-def attempt(function: Callable[[Any], Any], piece: Any) -> Outcome:
+def run_piece(function: Callable[[Any], Any], piece: Any) -> Outcome:
     """What a function gives, or what it raises, so that no engine can take it for a fault of its own.
 
     Args:
@@ -150,7 +150,7 @@ class InThisProcess(Engine[Work, Result]):
         return map(function, pieces)
 
 
-def in_threads(submit: Callable[..., Any], most: int) -> Executor:
+def make_waiting_executor(submit: Callable[..., Any], most: int) -> Executor:
     """An executor of something that waits for its own answer.
 
     Args:

@@ -6,14 +6,14 @@ from functools import cache
 from bowdenfit.errors import MemoryShortageError
 from bowdenfit.inference.engines.processes import available_cores
 
-AT_ONCE = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
+COMPILATION_BYTES = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
 ENSEMBLES_AT_ONCE = 4  # threads at most that move ensembles of walkers
 _NEEDED = 768 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then
 _BUFFER = 32 << 20  # bytes; OpenBLAS, behind NumPy, SciPy and XLA, takes one for each thread that calls it
 _ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
 
 
-def refuse_shortage(size: int = AT_ONCE, addresses: bool = False) -> None:
+def refuse_shortage(size: int = COMPILATION_BYTES, addresses: bool = False) -> None:
     """Stop where memory cannot be had.
 
     Args:
@@ -36,7 +36,7 @@ def refuse_shortage(size: int = AT_ONCE, addresses: bool = False) -> None:
 
 
 @cache
-def refuse_too_little() -> None:
+def refuse_low_memory() -> None:
     """Stop before a process begins to compute for long, where a small fit would run out of memory.
 
     Raises:

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-_ASKED = "OPENBLAS_NUM_THREADS"
+_THREADS_VARIABLE = "OPENBLAS_NUM_THREADS"
 _changing = Lock()
-_wanted: list[Any] = []  # the limit that is set, once for each that wants it
+_limits: list[Any] = []  # the limit that is set, once for each that wants it
 
 
 @contextmanager
@@ -21,18 +21,18 @@ def linear_algebra_in_one_thread() -> Iterator[None]:
 
     Afterwards it is as before; of several at a time the first sets the limit and the last takes it away.
     """
-    if os.environ.get(_ASKED) == "1":  # as the command line has it, from the start
+    if os.environ.get(_THREADS_VARIABLE) == "1":  # as the command line has it, from the start
         yield
         return
     import scipy.linalg.cython_lapack  # noqa: F401  (what compiled programs call, which has to be there to be told)
     from threadpoolctl import threadpool_limits
 
     with _changing:
-        _wanted.append(_wanted[0] if _wanted else threadpool_limits(1, user_api="blas"))
+        _limits.append(_limits[0] if _limits else threadpool_limits(1, user_api="blas"))
     try:
         yield
     finally:
         with _changing:
-            limit = _wanted.pop()
-            if not _wanted:
+            limit = _limits.pop()
+            if not _limits:
                 limit.restore_original_limits()

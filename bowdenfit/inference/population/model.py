@@ -61,20 +61,20 @@ class Inspections:
         return int(self.known.shape[1])
 
     @cached_property
-    def places(self) -> np.ndarray:
+    def positions(self) -> np.ndarray:
         """Number of the cable, and place among its inspections, of every inspection, (inspection, 2)."""
         return np.array([(i, np.sum(self.cable[:j] == i)) for j, i in enumerate(self.cable)])
 
     @cached_property
     def data(self) -> dict[str, Any]:
         """Arrays that the density is computed from, (cable, inspection, ...)."""
-        place = self.places[:, 1]
-        shape = self.cables, int(place.max()) + 1
+        position = self.positions[:, 1]
+        shape = self.cables, int(position.max()) + 1
 
         def spread(values: np.ndarray, empty: float = 0.0) -> np.ndarray:
-            found = np.full((*shape, *values.shape[1:]), empty)
-            found[self.cable, place] = values
-            return found
+            arranged = np.full((*shape, *values.shape[1:]), empty)
+            arranged[self.cable, position] = values
+            return arranged
 
         s, counts = self.summaries, self.known.sum(axis=1)
         root = whitening_roots(s.scale, self.known)
@@ -99,17 +99,17 @@ class Inspections:
         """
         root = self.data["root"].copy()
         for part in readings:
-            root[tuple(self.places[list(part.rows)].T)] = 0.0
-        return self.data | {"root": root, "readings": tuple(part.given(self.places) for part in readings)}
+            root[tuple(self.positions[list(part.rows)].T)] = 0.0
+        return self.data | {"root": root, "readings": tuple(part.stack(self.positions) for part in readings)}
 
     @property
     def design(self) -> np.ndarray:
         """Derivatives of log coefficients by those of the new cable and its wear, (inspection, coefficient, ...)."""
-        found = np.broadcast_to(np.eye(self.coefficients), (len(self.cable), self.coefficients, self.coefficients))
+        coefficients = np.broadcast_to(np.eye(self.coefficients), (len(self.cable), self.coefficients, self.coefficients))
         if self.cycles is None:
-            return found
+            return coefficients
         worn = np.broadcast_to(self.cycles[:, None, None], (len(self.cable), self.coefficients, 1))
-        return np.concatenate([found, worn], axis=2)
+        return np.concatenate([coefficients, worn], axis=2)
 
 
 def whitening_roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -119,11 +119,11 @@ def whitening_roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
         scale: Scale matrices, (inspection, coefficient, coefficient).
         known: Whether an inspection has a coefficient, (inspection, coefficient).
     """
-    found = np.zeros_like(scale)
-    for j, mine in enumerate(known):
-        inside = np.ix_(mine, mine)
-        found[j][inside] = np.linalg.inv(np.linalg.cholesky(scale[j][inside]))
-    return found
+    roots = np.zeros_like(scale)
+    for j, known_here in enumerate(known):
+        inside = np.ix_(known_here, known_here)
+        roots[j][inside] = np.linalg.inv(np.linalg.cholesky(scale[j][inside]))
+    return roots
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class PopulationDensity:
     readings: tuple[JointReadings, ...] = ()
 
     @property
-    def each(self) -> int:
+    def numbers_per_cable(self) -> int:
         """Numbers of a cable: its log coefficients when new, and its wear."""
         return self.coefficients + self.wears
 
@@ -156,47 +156,47 @@ class PopulationDensity:
         wear = ("wear", "wear_spread") if self.wears else ()
         return (*(f"mean_{i}" for i in k), *(f"spread_{i}" for i in k), *wear, *self.effects)
 
-    def in_words(self, called: Sequence[str]) -> tuple[str, ...]:
+    def describe_parameters(self, coefficient_names: Sequence[str]) -> tuple[str, ...]:
         """What describes the population in words, in the order of z.
 
         Args:
             called: Names of the coefficients; their numbers, from 1, where there are none.
         """
-        every = called or [f"coefficient {i + 1}" for i in range(self.coefficients)]
+        every = coefficient_names or [f"coefficient {i + 1}" for i in range(self.coefficients)]
         wear = ("the wear", "the difference of wear between cables") if self.wears else ()
         effects = {"lubrication": "the effect of lubrication", "per_degree": "the effect of temperature"}
         middles, spreads = ([f"{what} of {name}" for name in every] for what in ("the typical value", "the spread"))
         return (*middles, *spreads, *wear, *(effects[name] for name in self.effects))
 
     @property
-    def _of_fleet(self) -> int:
+    def _fleet_size(self) -> int:
         """Numbers of the population and of all cables, which come first in z."""
-        return len(self.names) + self.cables * self.each
+        return len(self.names) + self.cables * self.numbers_per_cable
 
     @property
     def size(self) -> int:
         """Of z."""
-        return self._of_fleet + sum(part.size for part in self.readings)
+        return self._fleet_size + sum(part.size for part in self.readings)
 
-    def population(self, z: Float[Array, " size"], data: dict[str, Any]) -> dict[str, Array]:
+    def population_at(self, z: Float[Array, " size"], data: dict[str, Any]) -> dict[str, Array]:
         """What describes the population: means, spreads and effects, (cable's number,) and (effect,)."""
         k = self.coefficients
         mean = data["prior_mean"] + data["prior_sd"] * z[:k]
-        spread, rest = SPREAD.constrain(z[k : 2 * k]), z[2 * k :]
+        spread, remaining = SPREAD.constrain(z[k : 2 * k]), z[2 * k :]
         if self.wears:
-            mean = jnp.append(mean, WEAR.constrain(rest[0]))
-            spread, rest = jnp.append(spread, WEAR_SPREAD.constrain(rest[1])), rest[2:]
+            mean = jnp.append(mean, WEAR.constrain(remaining[0]))
+            spread, remaining = jnp.append(spread, WEAR_SPREAD.constrain(remaining[1])), remaining[2:]
         priors: dict[str, Prior] = {"lubrication": LUBRICATION, "per_degree": PER_DEGREE}
-        effects = [priors[name].constrain(rest[i]) for i, name in enumerate(self.effects)]
+        effects = [priors[name].constrain(remaining[i]) for i, name in enumerate(self.effects)]
         return {"mean": mean, "spread": spread, "effects": jnp.stack([*effects, jnp.zeros(())])}
 
-    def cables_of(
-        self, z: Float[Array, " size"], data: dict[str, Any], found: dict[str, Array]
+    def cables_at(
+        self, z: Float[Array, " size"], data: dict[str, Any], population: dict[str, Array]
     ) -> tuple[Float[Array, "cable each"], Float[Array, " cable"]]:
         """Log coefficients when new and wear of every cable, and the log of the volume that z is stretched by."""
-        inner = z[len(self.names) : self._of_fleet].reshape(self.cables, self.each)
-        weight = found["spread"] ** -2
-        toward = data["toward"] - data["by_effect"] @ found["effects"] + weight * found["mean"]
+        inner = z[len(self.names) : self._fleet_size].reshape(self.cables, self.numbers_per_cable)
+        weight = population["spread"] ** -2
+        toward = data["toward"] - data["by_effect"] @ population["effects"] + weight * population["mean"]
         root = jnp.linalg.cholesky(data["precision"] + jnp.diag(weight))
         forward = solve_triangular(root, toward[..., None], lower=True)
         values = solve_triangular(root, forward + inner[..., None], trans="T", lower=True)[..., 0]
@@ -204,24 +204,24 @@ class PopulationDensity:
 
     def log_density(self, z: Float[Array, " size"], data: dict[str, Any]) -> Float[Array, ""]:
         """Log posterior density in z, up to a constant."""
-        found = self.population(z, data)
-        values, volume = self.cables_of(z, data, found)
-        away = (values - found["mean"]) / found["spread"]
-        of_cables = jnp.sum(volume) - jnp.sum(away**2) / 2 - self.cables * jnp.sum(jnp.log(found["spread"]))
+        population = self.population_at(z, data)
+        values, volume = self.cables_at(z, data, population)
+        away = (values - population["mean"]) / population["spread"]
+        of_cables = jnp.sum(volume) - jnp.sum(away**2) / 2 - self.cables * jnp.sum(jnp.log(population["spread"]))
         before = -jnp.sum(z[: len(self.names)] ** 2) / 2
-        at, begin = self.log_coefficients(values, found, data), self._of_fleet
+        at, begin = self.log_coefficients(values, population, data), self._fleet_size
         total = before + of_cables + jnp.sum(log_likelihood(at, data))
-        for part, given in zip(self.readings, data.get("readings", ()), strict=True):
-            total = total + part.log_density(at, z[begin : begin + part.size], given)
+        for part, stacked in zip(self.readings, data.get("readings", ()), strict=True):
+            total = total + part.log_density(at, z[begin : begin + part.size], stacked)
             begin += part.size
         return total
 
     def log_coefficients(
-        self, values: Float[Array, "cable each"], found: dict[str, Array], data: dict[str, Any]
+        self, values: Float[Array, "cable each"], population: dict[str, Array], data: dict[str, Any]
     ) -> Float[Array, "cable inspection coefficient"]:
         """At every inspection."""
         k = self.coefficients
-        shift = data["effects"] @ found["effects"]
+        shift = data["effects"] @ population["effects"]
         if self.wears:
             shift = shift + data["cycles"] * values[:, k:]
         return values[:, None, :k] + shift[:, :, None]

@@ -43,7 +43,7 @@ class JointReadings:
         """Numbers that are drawn of all of them beside their coefficients."""
         return len(self.rows) * len(self.others)
 
-    def given(self, where: np.ndarray) -> dict[str, Any]:
+    def stack(self, where: np.ndarray) -> dict[str, Any]:
         """Their data as one.
 
         Args:
@@ -53,7 +53,10 @@ class JointReadings:
         return {"where": where[list(self.rows)], "counts": np.ones(len(self.rows)), "readings": stacked}
 
     def log_density(
-        self, at: Float[Array, "cable inspection coefficient"], rest: Float[Array, " size"], given: Mapping[str, Any]
+        self,
+        at: Float[Array, "cable inspection coefficient"],
+        other_z: Float[Array, " size"],
+        stacked: Mapping[str, Any],
     ) -> Float[Array, ""]:
         """Log likelihood of all readings, and log prior of what is not pooled, up to a constant.
 
@@ -62,13 +65,15 @@ class JointReadings:
             rest: z of what is not pooled.
             given: See `given`.
         """
-        here = at[given["where"][:, 0], given["where"][:, 1]]
-        every = jax.vmap(self._of_one)(here, rest.reshape(len(self.rows), -1), given["readings"])
-        return jnp.sum(jnp.where(given["counts"] > 0, every, 0.0)) - jnp.sum(rest**2) / 2
+        here = at[stacked["where"][:, 0], stacked["where"][:, 1]]
+        every = jax.vmap(self._log_density_of_one)(here, other_z.reshape(len(self.rows), -1), stacked["readings"])
+        return jnp.sum(jnp.where(stacked["counts"] > 0, every, 0.0)) - jnp.sum(other_z**2) / 2
 
-    def _of_one(self, logs: Float[Array, " coefficient"], rest: Float[Array, " other"], data: Any) -> Float[Array, ""]:
+    def _log_density_of_one(
+        self, logs: Float[Array, " coefficient"], other_z: Float[Array, " other"], data: Any
+    ) -> Float[Array, ""]:
         free = self.posterior.model.space.free
-        z = jnp.zeros(len(free)).at[np.array(self.others, dtype=int)].set(rest)
+        z = jnp.zeros(len(free)).at[np.array(self.others, dtype=int)].set(other_z)
         for i, p in enumerate(free):
             if p.name in self.names:
                 z = z.at[i].set(p.prior.unconstrain(jnp.exp(logs[self.names[p.name]]) / p.shown_scale))
@@ -76,11 +81,11 @@ class JointReadings:
         return jnp.where(jnp.isnan(total), -jnp.inf, total)
 
 
-def without_cables(given: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
+def without_cables(stacked: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
     """Data of inspections without those of some cables.
 
     Args:
         given: See `JointReadings.given`.
         cables: By number.
     """
-    return dict(given) | {"counts": given["counts"] * ~np.isin(given["where"][:, 0], cables)}
+    return dict(stacked) | {"counts": stacked["counts"] * ~np.isin(stacked["where"][:, 0], cables)}

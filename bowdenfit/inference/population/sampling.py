@@ -12,19 +12,25 @@ from scipy.optimize import minimize
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.diagnostics import convergence_shortfalls, diagnose
-from bowdenfit.inference.nuts import BLOCK, WARM_UP, block_program, next_block_state
+from bowdenfit.inference.diagnostics import describe_convergence_shortfalls, diagnose
+from bowdenfit.inference.nuts import BLOCK, WARM_UP, compile_block, next_block_state
 from bowdenfit.inference.population.model import Inspections, PopulationDensity
 from bowdenfit.inference.population.readings import JointReadings, without_cables
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
-_FEW, _CAREFUL = 5, 0.99  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
+_FEW_CABLES, _CAREFUL_ACCEPTANCE = (
+    5,
+    0.99,
+)  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
 _MOST_DENSE = 60  # numbers of whose covariance the first 200 draws of warm-up tell enough
 _FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
 _AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
-_STEP, _DISPERSED = 1e-4, 5.0  # of derivatives; by how much more the starts of the population scatter than those of cables
-_FAR = 1e100  # minus the log density where it cannot be computed
+_STEP, _DISPERSED = (
+    1e-4,
+    5.0,
+)  # of derivatives; by how much more the starts of the population scatter than those of cables
+_UNCOMPUTABLE = 1e100  # minus the log density where it cannot be computed
 _MOST_DIVERGENT = 0.001  # share of trajectories
 
 
@@ -52,7 +58,7 @@ def draw_population(
     inspected: Inspections,
     seed: int,
     without: Collection[int] = (),
-    called: Sequence[str] = (),
+    coefficient_names: Sequence[str] = (),
     readings: tuple[JointReadings, ...] = (),
 ) -> PopulationDraws:
     """Draw a population and its cables.
@@ -66,9 +72,9 @@ def draw_population(
     """
     wears = inspected.cycles is not None
     density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables, readings)
-    about = _about(replace(density, readings=()), _blind(inspected.data_with(()), without))
-    data = _blind(inspected.data_with(readings), without) | {"about": about}
-    program, values_of = _compiled(density, *_shapes(data))
+    about = _locate_population(replace(density, readings=()), _blank_cables(inspected.data_with(()), without))
+    data = _blank_cables(inspected.data_with(readings), without) | {"about": about}
+    program, values_of = _compile(density, *_tree_and_shapes(data))
     generator = np.random.default_rng([seed, 5])
     start = 0.3 * generator.standard_normal((_SETTINGS.n_chains, density.size))
     start[:, : len(density.names)] *= _DISPERSED
@@ -83,14 +89,16 @@ def draw_population(
         z = np.concatenate([block["z"] for block in blocks[WARM_UP:]]).transpose(1, 0, 2)
         divergent = np.mean([block["diverging"] for block in blocks[WARM_UP:]])
         population = about[0] + z[:, :, : len(density.names)] @ about[1].T
-        reasons, worth = _shortfalls(population, density.in_words(called), float(divergent))
+        reasons, n_effective = _describe_shortfalls(
+            population, density.describe_parameters(coefficient_names), float(divergent)
+        )
         if not reasons or target >= WARM_UP + _MOST:
             break
         target += _MORE
     parts = z.reshape(-1, _AT_ONCE, density.size)
     every = zip(*(values_of(part, data) for part in parts), strict=True)
-    mean, spread, effects, cables = (np.concatenate([np.asarray(part) for part in each]) for each in every)
-    return PopulationDraws(mean, spread, effects[:, :-1], cables, reasons, worth)
+    mean, spread, effects, cables = (np.concatenate([np.asarray(part) for part in columns]) for columns in every)
+    return PopulationDraws(mean, spread, effects[:, :-1], cables, reasons, n_effective)
 
 
 def _first_mass(density: PopulationDensity) -> np.ndarray:
@@ -99,42 +107,44 @@ def _first_mass(density: PopulationDensity) -> np.ndarray:
     Inspections of a few cables leave wear, lubrication and temperature to be told apart by hardly anything but their priors:
     what is known of them together is known well, and of each alone badly.
     """
-    dense = density.cables < _FEW and density.size <= _MOST_DENSE
+    dense = density.cables < _FEW_CABLES and density.size <= _MOST_DENSE
     return np.eye(density.size) if dense else np.ones(density.size)
 
 
-def _blind(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
+def _blank_cables(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
     """The data without those of some cables."""
-    found = dict(data)
+    blanked = dict(data)
     for name in ("root", "precision", "toward", "by_effect") if cables else ():
-        found[name] = data[name].copy()
-        found[name][list(cables)] = 0.0
-    found["readings"] = tuple(without_cables(each, list(cables)) for each in data["readings"])
-    return found
+        blanked[name] = data[name].copy()
+        blanked[name][list(cables)] = 0.0
+    blanked["readings"] = tuple(without_cables(stacked, list(cables)) for stacked in data["readings"])
+    return blanked
 
 
-def _shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tuple[tuple[str, ...], float]:
+def _describe_shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tuple[tuple[str, ...], float]:
     """What keeps the draws from being trusted, in words, and the effective number of the worst."""
-    found = {name: diagnose(np.ascontiguousarray(z[:, :, i]), len(z)) for i, name in enumerate(names)}
-    reasons = convergence_shortfalls(found, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
+    diagnostics = {name: diagnose(np.ascontiguousarray(z[:, :, i]), len(z)) for i, name in enumerate(names)}
+    reasons = describe_convergence_shortfalls(diagnostics, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
     if divergent > _MOST_DIVERGENT:
         reasons = (*reasons, f"{percent(divergent)} of the trajectories diverged")
-    return reasons, min(min(d.ess_bulk, d.ess_tail) for d in found.values())
+    return reasons, min(min(d.ess_bulk, d.ess_tail) for d in diagnostics.values())
 
 
-def _about(density: PopulationDensity, data: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+def _locate_population(density: PopulationDensity, data: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Where the population is in z, and the root of its covariance, as far as it is normal: units in which it is drawn.
 
     Effects of lubrication and temperature are known together with wear and the middle of all cables, and a hundred times better
     than their priors say. Coordinates of cables at 0 are their most likely values, so that the density there is that of the
     population alone, as far as single fits are normal.
     """
-    size, slopes_of = len(density.names), _slopes(density, *_shapes(data))
+    size, slopes_of = len(density.names), _compile_gradient(density, *_tree_and_shapes(data))
 
     def minus(inner: np.ndarray) -> tuple[float, np.ndarray]:
         value, slopes = slopes_of(np.append(inner, np.zeros(density.size - size)), data)
-        found = -float(value), -np.asarray(slopes)[:size]
-        return found if np.isfinite(np.append(*found)).all() else (_FAR, np.zeros(size))  # a spread that is none
+        negated = -float(value), -np.asarray(slopes)[:size]
+        return (
+            negated if np.isfinite(np.append(*negated)).all() else (_UNCOMPUTABLE, np.zeros(size))
+        )  # a spread that is none
 
     center = minimize(minus, np.zeros(size), jac=True, method="BFGS").x
     steps = _STEP * np.eye(size)
@@ -143,44 +153,53 @@ def _about(density: PopulationDensity, data: dict[str, Any]) -> tuple[np.ndarray
     return center, ways / np.sqrt(np.maximum(sizes, 1.0))  # the prior alone has precision 1
 
 
-def _in_z(units: Any, density: PopulationDensity, data: dict[str, Any]) -> Any:
+def _to_z(units: Any, density: PopulationDensity, data: dict[str, Any]) -> Any:
     """Where a point in units of the population is in z."""
     (center, root), size = data["about"], len(density.names)
     return jnp.concatenate([center + root @ units[:size], units[size:]])
 
 
-def _shapes(data: dict[str, Any]) -> tuple[Any, tuple[tuple[tuple[int, ...], Any], ...]]:
+def _tree_and_shapes(data: dict[str, Any]) -> tuple[Any, tuple[tuple[tuple[int, ...], Any], ...]]:
     """Tree, and shapes and kinds of its leaves."""
     leaves, tree = jax.tree.flatten(data)
     return tree, tuple((np.shape(leaf), np.asarray(leaf).dtype) for leaf in leaves)
 
 
-def _like(tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
+def _shape_tree(tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
     return jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(shape, kind) for shape, kind in shapes])
 
 
 @lru_cache(maxsize=16)
-def _slopes(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
+def _compile_gradient(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
     """Log density and its derivatives."""
     z = jax.ShapeDtypeStruct((density.size,), np.float64)
-    return compile_program(jax.value_and_grad(density.log_density), z, _like(tree, shapes), run_once=True)
+    return compile_program(jax.value_and_grad(density.log_density), z, _shape_tree(tree, shapes), run_once=True)
 
 
 @lru_cache(maxsize=16)
-def _compiled(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> tuple[Any, Any]:
+def _compile(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> tuple[Any, Any]:
     """What draws, and what gives the values of draws; the same for all fleets of one shape."""
-    data = _like(tree, shapes)
-    settings = _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL}) if density.cables < _FEW else _SETTINGS
+    data = _shape_tree(tree, shapes)
+    settings = (
+        _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL_ACCEPTANCE})
+        if density.cables < _FEW_CABLES
+        else _SETTINGS
+    )
 
     def log_density(units: jax.Array, data: dict[str, Any]) -> jax.Array:
-        return density.log_density(_in_z(units, density, data), data)
+        return density.log_density(_to_z(units, density, data), data)
 
-    program = block_program(log_density, _first_mass(density).shape, data, settings, fine=False)
+    program = compile_block(log_density, _first_mass(density).shape, data, settings, fine=False)
 
     def values(units: jax.Array, data: dict[str, Any]) -> tuple[jax.Array, ...]:
-        z = _in_z(units, density, data)
-        found = density.population(z, data)
-        return found["mean"], found["spread"], found["effects"], density.cables_of(z, data, found)[0]
+        z = _to_z(units, density, data)
+        population = density.population_at(z, data)
+        return (
+            population["mean"],
+            population["spread"],
+            population["effects"],
+            density.cables_at(z, data, population)[0],
+        )
 
     rows = jax.ShapeDtypeStruct((_AT_ONCE, density.size), np.float64)
     many = compile_program(jax.vmap(values, (0, None)), rows, data, run_once=True)

@@ -51,7 +51,7 @@ def summarize_likelihoods(values: np.ndarray, prior_mean: np.ndarray, prior_sd: 
         values: Draws of log coefficients of equal weight, (inspection, draw, coefficient).
         prior_mean, prior_sd: Of the log coefficients in the single fits, (coefficient,); an infinite sd where it was flat.
     """
-    weights = _without_prior(values, prior_mean, prior_sd)
+    weights = _remove_prior(values, prior_mean, prior_sd)
     dimensions = values.shape[2]
     center = np.median(values, axis=1)
     scale, freedom = _covariances(values, center, weights), np.full(len(values), 5.0)
@@ -67,7 +67,7 @@ def summarize_likelihoods(values: np.ndarray, prior_mean: np.ndarray, prior_sd: 
     return Summaries(center, scale, freedom)
 
 
-def _without_prior(values: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.ndarray:
+def _remove_prior(values: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """Weights of sum 1 under which draws are those of a flat prior, (inspection, draw)."""
     log = np.sum(((values - mean) / sd) ** 2, axis=2) / 2
     weights = np.exp(log - log.max(axis=1, keepdims=True))
@@ -77,9 +77,9 @@ def _without_prior(values: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.n
 
 def _covariances(values: np.ndarray, center: np.ndarray, weights: np.ndarray) -> np.ndarray:
     away = values - center[:, None]
-    found = np.einsum("js,jsk,jsl->jkl", weights, away, away, optimize=True)
-    tiny = np.finfo(float).eps * (1 + np.trace(found, axis1=1, axis2=2))
-    return found + tiny[:, None, None] * np.eye(values.shape[2])
+    covariances = np.einsum("js,jsk,jsl->jkl", weights, away, away, optimize=True)
+    tiny = np.finfo(float).eps * (1 + np.trace(covariances, axis1=1, axis2=2))
+    return covariances + tiny[:, None, None] * np.eye(values.shape[2])
 
 
 def _distances(values: np.ndarray, center: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -38,8 +38,8 @@ def draw_unpooled(inspected: Inspections, population: PopulationDraws, cable: in
     seen = (root @ inspected.summaries.center[rows, :, None])[..., 0] - shift[:, :, None] * root.sum(axis=2)
     information = np.einsum("jkd,jke->jde", design, design)
     has = np.atleast_1d(inspected.known[rows].any(axis=0))
-    told = _tells_wear(information.sum(axis=0), has) if inspected.cycles is not None else False
-    own = np.append(has, [told] * (inspected.cycles is not None))
+    is_wear_known = _is_wear_known(information.sum(axis=0), has) if inspected.cycles is not None else False
+    own = np.append(has, [is_wear_known] * (inspected.cycles is not None))
     sd = np.append(inspected.prior_sd, [WEAR.sd] * (inspected.cycles is not None))
     mean = np.append(inspected.prior_mean, [0.0] * (inspected.cycles is not None))
     before = np.where(own, 1 / sd**2, 1 / population.spread**2)
@@ -52,10 +52,10 @@ def draw_unpooled(inspected: Inspections, population: PopulationDraws, cable: in
         values: np.ndarray = np.linalg.solve(precision, toward[:, :, None] + noise)[..., 0]
         away = np.sum((seen - np.einsum("jkd,hd->hjk", design, values)) ** 2, axis=2)
         stretch = generator.standard_gamma((freedom + counts) / 2, stretch.shape) / ((freedom + away) / 2)
-    return values, told
+    return values, is_wear_known
 
 
-def _tells_wear(information: np.ndarray, has: np.ndarray) -> bool:
+def _is_wear_known(information: np.ndarray, has: np.ndarray) -> bool:
     """Whether inspections tell more of wear than its prior does, whatever the coefficients are.
 
     Args:

@@ -103,12 +103,12 @@ class DisplacementTerm:
         known = Turn(travel, *tendon(first["run"]).sliding(travel, first["stroke"]))
         for turns in later:
             travel = turns["at"] - zero[turns["run"]]
-            force, mean = tendon(turns["run"]).since(_taken(known, turns["after"]), travel, turns["stroke"])
+            force, mean = tendon(turns["run"]).sliding_after_turn(_taken(known, turns["after"]), travel, turns["stroke"])
             parts = ((known.travel, travel), (known.force, force), (known.mean, mean))
             known = Turn(*(jnp.concatenate(part) for part in parts))
         travel, at = data["displacement"] + beside - zero[data["run"]], tendon(data["run"])
         sliding = at.sliding(travel, data["stroke"])[0]
-        since = at.since(_taken(known, data["after"]), travel, data["stroke"])[0]
+        since = at.sliding_after_turn(_taken(known, data["after"]), travel, data["stroke"])[0]
         return LoadCells.of(values).shown_input(jnp.where(data["slides"], sliding, since))
 
     def _readings(self, values: Values, data: Data, weights: Values) -> "_Readings":
@@ -241,7 +241,7 @@ def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
         of_run = f", run {table.run_names[run]}" if len(table.run_names) > 1 else ""
         prior, symbol = Normal(float(x.min()), share * span.value), f"$x_{{0{run + 1 if of_run else ''}}}$"
         meaning = f"displacement without force{of_run}"
-        found.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.share(share)))
+        found.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.describe_share(share)))
     return found
 
 
@@ -277,7 +277,7 @@ def _offset(table: DisplacementTable, at: Circumstances) -> Parameter:
     by = Scale(float(np.ptp(table.force)) or 1.0, "range of forces", "N")
     prior = Normal(0.0, part * by.value)
     meaning = "offset of the load cell at the motor"
-    return Parameter(INPUT_OFFSET, "$b$ input", meaning, "sensor", prior, "N", scaled_by=by.share(part))
+    return Parameter(INPUT_OFFSET, "$b$ input", meaning, "sensor", prior, "N", scaled_by=by.describe_share(part))
 
 
 class DisplacementTerms(TermKind[DisplacementTable]):
@@ -297,7 +297,7 @@ class DisplacementTerms(TermKind[DisplacementTable]):
         part = at.defaults.displacement_noise_share
         jitter = Parameter(
             DISPLACEMENT_NOISE, r"$\sigma_x$", at.noise.meaning("standard deviation of a displacement"), "noise",
-            HalfCauchy(part * range_x.value), "mm", scaled_by=range_x.share(part),
+            HalfCauchy(part * range_x.value), "mm", scaled_by=range_x.describe_share(part),
         )  # fmt: skip
         return [
             *_stiffness(table, at),

@@ -144,7 +144,7 @@ class PreloadTerms(TermKind[PreloadTable]):
         part, by = at.defaults.preload_noise_share, preload_scale(at)
         noise = Parameter(
             PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
-            HalfCauchy(part * by.value), "N", scaled_by=by.share(part),
+            HalfCauchy(part * by.value), "N", scaled_by=by.describe_share(part),
         )  # fmt: skip
         return [*preload(at), noise]
 

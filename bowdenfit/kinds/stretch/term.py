@@ -122,12 +122,12 @@ class StretchTerms(TermKind[StretchTable]):
             *rope(at),
             Parameter(
                 STRETCH_ZERO, r"$\Delta L_0$", "stretch that the reading calls zero", "elastic",
-                Normal(0.0, zero * largest.value), "mm", scaled_by=largest.share(zero),
+                Normal(0.0, zero * largest.value), "mm", scaled_by=largest.describe_share(zero),
             ),
             *([own_friction] if at.description.stretch.friction is None else []),
             Parameter(
                 STRETCH_NOISE, r"$\sigma_L$", at.noise.meaning("standard deviation of a stretch reading"), "noise",
-                HalfCauchy(noise * spread.value), "mm", scaled_by=spread.share(noise),
+                HalfCauchy(noise * spread.value), "mm", scaled_by=spread.describe_share(noise),
             ),
         ]  # fmt: skip
 

@@ -42,7 +42,7 @@ class Laboratory:
         found: dict[int, BatchFit] = {}
         for kind, members in kinds.items():
             first = posteriors[members[0]]
-            default = BatchPrograms(replace(first, given=first.padded), self.settings)
+            default = BatchPrograms(replace(first, data_override=first.padded), self.settings)
             programs = self.programs.setdefault(kind, default)
             data, own = [posteriors[i].padded for i in members], [seeds[i] for i in members]
             found |= zip(members, fit_batch(programs.posterior, data, own, programs=programs), strict=True)

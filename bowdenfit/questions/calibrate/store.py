@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.engines.choice import JOBS
+from bowdenfit.inference.engines.choice import JOBS_FOLDER
 from bowdenfit.inputs import or_damaged
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (
@@ -25,7 +25,8 @@ from bowdenfit.results.folder import (
 from bowdenfit.results.plain import rebuilt, stored
 
 CALIBRATION = "calibration.json"
-_FILES, _FOLDERS = (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS), (FIGURES, JOBS)  # all that is written
+# Everything that a calibration writes.
+_FILES, _FOLDERS = (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS), (FIGURES, JOBS_FOLDER)
 _WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
 _WHAT |= {"truths": "what is stated of the truth"}
 
@@ -66,7 +67,7 @@ def open_replications(
 def _is_unused(folder: Path) -> bool:
     """Whether a calibration was begun in a folder that failed before its first replication, so that nobody loses anything."""
     path = folder / REPLICATIONS
-    return is_left_of(folder, (REPLICATIONS, JOBS)) and path.is_file() and path.read_bytes().count(b"\n") == 1
+    return is_left_of(folder, (REPLICATIONS, JOBS_FOLDER)) and path.is_file() and path.read_bytes().count(b"\n") == 1
 
 
 def seed_of(folder: Path) -> int:

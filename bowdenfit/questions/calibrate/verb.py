@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PLACE, TEXTS, Output, Seed, checked, whole_number
-from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.inference.engines.memory import refuse_low_memory
 from bowdenfit.notebook import watched
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
@@ -70,7 +70,7 @@ def calibrate(
     Raises:
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
-    refuse_too_little()
+    refuse_low_memory()
     folder = _folder(output, resume)
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
 
@@ -153,13 +153,13 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.inference.engines.choice import JOBS, open_engine
+    from bowdenfit.inference.engines.choice import JOBS_FOLDER, open_engine
     from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
     from bowdenfit.questions.calibrate.store import keep
 
     asked = Asked(plan, (workers or 0) if engine == "local" else 0)
     missing = [number for number in range(replications) if number not in done]
-    with open_engine(engine, workers, folder and folder / JOBS) as opened:
+    with open_engine(engine, workers, folder and folder / JOBS_FOLDER) as opened:
         for piece in opened.results(replicated, pieces_of(asked, missing, opened.workers)):
             for each in piece:
                 done[each.number] = each
@@ -168,7 +168,7 @@ def _replicate(
                 if progress is not None:
                     progress(len(done), max(replications, len(done)))
     if folder is not None:
-        shutil.rmtree(folder / JOBS, ignore_errors=True)
+        shutil.rmtree(folder / JOBS_FOLDER, ignore_errors=True)
 
 
 def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:

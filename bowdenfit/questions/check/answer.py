@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Display, Rows, Several
-from bowdenfit.inference.prior_sensitivity import PriorConflict, Sensitivity, prior_conflicts, rescale_prior
+from bowdenfit.inference.prior_sensitivity import PriorConflict, Sensitivity, find_prior_conflicts, rescale_prior
 from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
@@ -72,7 +72,7 @@ def checks_of(fit: Record) -> Checks | None:
     tables = refit_suspects(fit, [_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True)])
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
-    return Checks(tables, found.sensitivities, prior_conflicts(z, parameters), _told_by_few(fit))
+    return Checks(tables, found.sensitivities, find_prior_conflicts(z, parameters), _told_by_few(fit))
 
 
 @once

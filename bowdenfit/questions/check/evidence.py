@@ -9,10 +9,10 @@ from bowdenfit.inference.predictive_checks import (
     LooPredictive,
     Uniformity,
     check_uniformity,
-    loo_predictive,
-    randomized_pit,
+    draw_randomized_pit,
+    predict_left_out,
 )
-from bowdenfit.inference.prior_sensitivity import RescaledPrior, Sensitivity, sensitivities
+from bowdenfit.inference.prior_sensitivity import RescaledPrior, Sensitivity, compute_sensitivities
 
 _LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
 _STREAM = 5  # of the fit's random numbers
@@ -94,13 +94,13 @@ def work_out(evidence: Evidence) -> Findings:
     varying = {
         name: draws for name, draws in evidence.quantities.items() if np.ptp(draws) > 0
     }  # or an end in all of them
-    found = sensitivities(varying, evidence.z, evidence.total, evidence.priors) if varying else ()
+    found = compute_sensitivities(varying, evidence.z, evidence.total, evidence.priors) if varying else ()
     return Findings(tables, found)
 
 
 def _without_each(table: TableDraws, evidence: Evidence, generator: np.random.Generator) -> TableWithoutEach:
     drawn, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
-    predicted = loo_predictive(*drawn, *readings, evidence.n_effective)
-    placed = randomized_pit(predicted, generator)
+    predicted = predict_left_out(*drawn, *readings, evidence.n_effective)
+    placed = draw_randomized_pit(predicted, generator)
     judged = len(table.reading) >= _LEAST_READINGS
     return TableWithoutEach(predicted, placed, check_uniformity(placed, evidence.probability) if judged else None)

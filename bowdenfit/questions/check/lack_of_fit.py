@@ -23,7 +23,7 @@ _FAR_LATE = 6.0  # standard errors of a delay, which are right to a third
 @once
 def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
     """Sentences about readings that the model does not describe, the clearest first; none where all is chance."""
-    clear = [each for each in fit.least_squares.departures if each.worth_saying]
+    clear = [each for each in fit.least_squares.departures if each.is_noticeable]
     told: dict[tuple[str, str], Departure] = {}
     for each in clear:  # the same place may have been asked about in two ways, and inside runs as well as between them
         told.setdefault((each.table, each.group or each.against), each)
@@ -82,7 +82,7 @@ def _sentence(fit: Record, found: Departure) -> str:
     where = _ends(found, fit.model.cable.friction.conditions.groups)
     return (
         f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; chance "
-        f"does as much in {_odds(found.chance)}. {_remedy(fit, found)}"
+        f"does as much in {_odds(found.p_value)}. {_remedy(fit, found)}"
     )
 
 
@@ -93,8 +93,8 @@ def _drift(found: Departure) -> str:
         f"The model does not describe {readings_called(found.table).words}: the zero of the output drifts, by about "
         f"{significant(abs(found.high - found.low), 2)} N from the start of a recording to its end (or that of the input, the "
         f"other way), which moves a coefficient by {far} of the half width of its interval; chance "
-        f"does as much in {_odds(found.chance)}. Let the load cells warm up and tare before each recording; leave out the part "
-        "in which the zero moves."
+        f"does as much in {_odds(found.p_value)}. Let the load cells warm up and tare before each recording; leave out the "
+        "part in which the zero moves."
     )
 
 

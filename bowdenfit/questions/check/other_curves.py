@@ -5,7 +5,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.departure import FALSE_ALARM
-from bowdenfit.inference.least_squares import least_squares
+from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.angles.table import AngleTable
@@ -29,6 +29,6 @@ def follows(dataset: Dataset, number: int, family: str) -> bool:
     table = dataset.measurements.table(AngleTable)
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
-        found = least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
+        found = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
     mine = [each for each in found.departures if each.group == angle.column]
-    return bool(mine) and all(each.chance >= FALSE_ALARM for each in mine)
+    return bool(mine) and all(each.p_value >= FALSE_ALARM for each in mine)

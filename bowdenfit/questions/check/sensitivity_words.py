@@ -60,7 +60,7 @@ def _widths(found: Checks) -> list[str]:
     said = [_follows(name, held[name], found) for name in names[:1]]
     if names[1:]:
         said.append(f"Widths also follow the prior{'s' if len(names) > 2 else ''} of {listed(names[1:])}.")
-    untold = list(dict.fromkeys(name for s in found.sensitivities for name in s.untold))
+    untold = list(dict.fromkeys(name for s in found.sensitivities for name in s.undetermined))
     if untold:
         said.append(f"The draws cannot tell how widths follow the prior of {listed(untold)} (k above 0.7).")
     return said

@@ -64,7 +64,7 @@ def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:
 
 def _refitted(leaving_out: LooRefits, implied: DrawFunction, table: TableChecks, place: int) -> TableChecks:
     """The table with one of its readings predicted by a fit without it."""
-    chain = leaving_out.chain_without(leaving_out.readings.names.index((table.table, table.labels[0])) + place)
+    chain = leaving_out.chain_without(leaving_out.density.names.index((table.table, table.labels[0])) + place)
     if chain.reasons:
         return table
     replicated = implied(chain.z.reshape(-1, chain.z.shape[-1]))["replicated"][table.table][:, place]

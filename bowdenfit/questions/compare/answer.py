@@ -140,7 +140,7 @@ class Comparison(Display):
     def predicted_readings(self) -> Several[dict[str, Any]]:
         """What each fit says of each reading."""
         return Several(
-            {"table": table, "label": label, "fits": {name: p.of_reading(i) for name, p in self.predictions.items()}}
+            {"table": table, "label": label, "fits": {name: p.describe_reading(i) for name, p in self.predictions.items()}}
             for i, (table, label) in enumerate(self.readings)
         )
 

@@ -204,7 +204,7 @@ def speed_sentences(found: Comparison) -> list[str]:
     for name in found.rate_effects:
         for plain in without:
             better = found.differences[plain].elpd - found.differences[name].elpd
-            if better <= 0 or not found.differences[plain].is_seen:
+            if better <= 0 or not found.differences[plain].is_distinguishable:
                 lines.append(f"Letting friction depend on speed ({name}) predicts no better than not ({plain}).")
             else:
                 lines.append(f"Letting friction depend on speed ({name}) predicts better than not ({plain}).")

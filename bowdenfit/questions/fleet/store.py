@@ -12,7 +12,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
-from bowdenfit.inference.engines.choice import JOBS
+from bowdenfit.inference.engines.choice import JOBS_FOLDER
 from bowdenfit.inputs import or_damaged
 from bowdenfit.results.arrays import read_arrays, write_arrays
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
@@ -28,7 +28,7 @@ from bowdenfit.results.folder import (
 from bowdenfit.words import few, shown
 
 KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for
-_FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (KEPT, JOBS)  # all that is written
+_FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (KEPT, JOBS_FOLDER)  # all that is written
 _FITS = "fits"
 _WHAT = {"seed": "the seed", "versions": "a version of bowdenfit or of a library"}
 SEPARATOR = "\n"  # between reasons in fleet.nc
@@ -140,7 +140,7 @@ class FleetStore:
         self._remove_pieces()
 
     def _remove_pieces(self) -> None:
-        for name in (KEPT, JOBS):
+        for name in (KEPT, JOBS_FOLDER):
             if (self.folder / name).is_dir():
                 shutil.rmtree(self.folder / name, ignore_errors=True)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import HIDDEN, LARGEST_SEED, PLACE, Output, Seed, checked, whole_number
-from bowdenfit.inference.engines.memory import refuse_too_little
+from bowdenfit.inference.engines.memory import refuse_low_memory
 from bowdenfit.inference.engines.processes import keep_compiled_programs
 from bowdenfit.reading import Reading
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
@@ -66,20 +66,20 @@ def fleet(
     from bowdenfit.questions.fleet.inspections import read_inspections
     from bowdenfit.results.folder import reserved
 
-    refuse_too_little()
+    refuse_low_memory()
     place = Path(output) if output is not None else None
     inspections = read_inspections(Path(folder))
     with reserved(place), watched(WATCH, progress) as show:
         import jax
 
-        from bowdenfit.inference.engines.choice import JOBS, open_engine
+        from bowdenfit.inference.engines.choice import JOBS_FOLDER, open_engine
         from bowdenfit.questions.fleet.fitting import gathered
 
         store, seed = _store(place, seed, resume)
         keep_compiled_programs()
         with jax.enable_x64(True):
             cases, broken = _read(Path(folder), inspections, reading)
-            with open_engine(engine, workers, place and place / JOBS, workers or 1) as opened:
+            with open_engine(engine, workers, place and place / JOBS_FOLDER, workers or 1) as opened:
                 fits = store.open(resume, force) if store else {}
                 _fit(opened, cases, seed, store, fits, show)
             answer, drawn = gathered(Path(folder).resolve().name, cases, fits, broken, seed)
@@ -128,7 +128,7 @@ def _fit(
     todo = [case for case in cases if case.hash not in fits]
     begin, before, total = time.monotonic(), len(cases) - len(todo), len(cases)
     done = before
-    pieces = pieces_of(todo, seed, SETTINGS, opened.workers, opened.most)
+    pieces = pieces_of(todo, seed, SETTINGS, opened.workers, opened.max_datasets)
     for piece_fits in opened.results(fit_piece, pieces):
         if store is not None:
             store.keep(piece_fits)

@@ -78,10 +78,10 @@ def say_what_is_determined(found: CovarianceAnalysis, measured: bool, opening: s
         opening: How the sentence begins.
     """
     opening = opening or ("These measurements determine" if measured else "Measurements by this plan would determine")
-    parts = [f"{p.name} {how_well(p)}" for p in found.by_themselves]
+    parts = [f"{p.name} {how_well(p)}" for p in found.identified]
     parts += [f"{c.words} {how_well(c)}" for c in found.determined]
     said = f"{opening} {listed(parts)}" if parts else f"{opening} no coefficient by itself"
-    resting, half = found.resting, found.partly
+    resting, half = found.resting, found.partly_identified
     if half:
         verb = "owes" if len(half) == 1 else "owe"
         said += f"; {listed([p.name for p in half])} {verb} about as much to the prior as to them"

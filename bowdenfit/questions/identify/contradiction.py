@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from typing import Any
 
-from bowdenfit.inference.disagreement import WORTH_SAYING, Disagreement
+from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import readings_called
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals
@@ -20,9 +20,9 @@ def agreement_page(fit: Record) -> list[dict[str, Any]]:
 def contradiction(fit: Record) -> str:
     """The table that is the odd one out, in a sentence; empty where all agree."""
     worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
-    if worst is None or worst.sds < WORTH_SAYING:
+    if worst is None or worst.sds < NOTICEABLE_SDS:
         return ""
-    unit, digits = _unit(fit, worst), decimals(worst.rest_sd)
+    unit, digits = _unit(fit, worst), decimals(worst.others_sd)
     name, *others = (
         readings_called(d.table).table
         for d in (worst, *(d for d in fit.least_squares.disagreements if d is not worst))
@@ -32,8 +32,8 @@ def contradiction(fit: Record) -> str:
     together = f"{worst.together:z.{digits}f}{unit}"
     return (
         f"The table of {name}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
-        f"without it {worst.parameter} would be {worst.rest:z.{digits}f} ± {worst.rest_sd:z.{digits}f}{unit}, with it the fit "
-        f"is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
+        f"without it {worst.parameter} would be {worst.others:z.{digits}f} ± {worst.others_sd:z.{digits}f}{unit}, with it the "
+        f"fit is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
         "are a compromise between readings that cannot all be right."
     )
 

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.draws import DrawFunction, for_each_draw, value_function
-from bowdenfit.inference.identifiability import RESTS_ON_PRIOR, Combination, CovarianceAnalysis, analyze_covariance
+from bowdenfit.inference.identifiability import PRIOR_DOMINATED, Combination, CovarianceAnalysis, analyze_covariance
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
@@ -115,9 +115,9 @@ def say_what_is_not_determined(fit: Record) -> str:
     lost = [
         n
         for n in names
-        if share[n] > RESTS_ON_PRIOR or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.tangled)
+        if share[n] > PRIOR_DOMINATED or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.unidentified)
     ]
-    if not lost and not friction.by_themselves and not friction.determined:
+    if not lost and not friction.identified and not friction.determined:
         return _in_words(names, None, " in good part")
     known = next((c for c in friction.determined if set(c.weights) & set(lost)), None)
     return _in_words(lost, known)
@@ -125,7 +125,7 @@ def say_what_is_not_determined(fit: Record) -> str:
 
 def _as_wide_as_prior(fit: Record, name: str) -> bool:
     """Whether a coefficient's draws are as wide as its prior in the sampler's coordinates."""
-    return float(np.var(fit.draws().z[..., fit.model.space.index[name]])) > RESTS_ON_PRIOR
+    return float(np.var(fit.draws().z[..., fit.model.space.index[name]])) > PRIOR_DOMINATED
 
 
 def _undetermined(fit: Record, name: str) -> bool:

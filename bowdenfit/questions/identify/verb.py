@@ -86,7 +86,7 @@ def _is_plan(path: Path) -> bool:
 
 
 def _of_fit(found: "Record") -> "Identifiability":
-    from bowdenfit.inference.least_squares import maximum_posterior
+    from bowdenfit.inference.least_squares import find_maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.objective import make_objective
     from bowdenfit.questions.identify.judgment import identifiability
@@ -94,24 +94,24 @@ def _of_fit(found: "Record") -> "Identifiability":
     known = identifiability(found)
     posterior = LogDensity(found.model)
     objective = make_objective(posterior)
-    return replace(known, profiles=_profiles(posterior, objective, maximum_posterior(posterior, objective)))
+    return replace(known, profiles=_profiles(posterior, objective, find_maximum_posterior(posterior, objective)))
 
 
 def _profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:
     """Profiles of the friction coefficients, over four standard deviations on both sides."""
     import numpy as np
 
-    from bowdenfit.inference.profiles import profile
+    from bowdenfit.inference.profiles import compute_profile
 
     space, sd = posterior.model.space, np.sqrt(np.diag(best.covariance))
     which = [i for i, p in enumerate(space.free) if p.role == "friction"]
     steps = np.linspace(-_REACH, _REACH, _PINS)
-    return tuple(profile(posterior, objective, space.free[i].name, best.z, z=best.z[i] + sd[i] * steps) for i in which)
+    return tuple(compute_profile(posterior, objective, space.free[i].name, best.z, z=best.z[i] + sd[i] * steps) for i in which)
 
 
 def _of_tables(data: "Dataset") -> "Identifiability":
     from bowdenfit.dataset import DESCRIPTION_FILE
-    from bowdenfit.inference.least_squares import maximum_posterior
+    from bowdenfit.inference.least_squares import find_maximum_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.objective import make_objective
     from bowdenfit.model import build_model
@@ -119,7 +119,7 @@ def _of_tables(data: "Dataset") -> "Identifiability":
 
     posterior = LogDensity(build_model(data))
     objective = make_objective(posterior)
-    best = maximum_posterior(posterior, objective)
+    best = find_maximum_posterior(posterior, objective)
     basis = f"the best fit to the tables, with readings that scatter as {DESCRIPTION_FILE} expects"
     return of_maximum(posterior.model, best, basis, True, _profiles(posterior, objective, best))
 
@@ -130,7 +130,7 @@ def _of_plan(path: Path) -> "Identifiability":
 
     from bowdenfit.dataset import Dataset
     from bowdenfit.inference.compilation import compile_program
-    from bowdenfit.inference.information import noise_free_posterior
+    from bowdenfit.inference.information import predict_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.scalar_priors import value_at
     from bowdenfit.model import build_model
@@ -148,7 +148,7 @@ def _of_plan(path: Path) -> "Identifiability":
     assumed = "[truth]" if plan.truth else "the medians of the priors"
     basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"
     z = compile_program(posterior.model.space.unconstrain, values, run_once=True)(values)
-    at = noise_free_posterior(posterior, np.asarray(z))
+    at = predict_posterior(posterior, np.asarray(z))
     return of_maximum(posterior.model, at, basis, False)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from bowdenfit.display import text_of
 from bowdenfit.inference.identifiability import (
     IDENTIFIABLE,
-    RESTS_ON_PRIOR,
+    PRIOR_DOMINATED,
     Combination,
     CovarianceAnalysis,
     ParameterContraction,
@@ -47,7 +47,7 @@ def _parameters(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) 
     if set(unit.values()) <= {"1"}:
         heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
     said = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "told by"))
-    alike = [sorted((p.name, p.most_alike)) for p in group.parameters if abs(p.correlation) > _ALIKE]
+    alike = [sorted((p.name, p.most_correlated)) for p in group.parameters if abs(p.correlation) > _ALIKE]
     pairs = [f"{first} and {second}" for first, second in dict.fromkeys(map(tuple, alike))]
     if len(group.parameters) > 1 and not group.collinearity < _HARD:
         pairs = [*pairs, "all of them together"]
@@ -63,7 +63,7 @@ def _informed(share: float) -> str:
     """What settles it: measurements, or what was assumed before."""
     if share < IDENTIFIABLE:
         return f"measurements ({percent(1 - share, 0)})"
-    return f"assumption ({percent(share, 0)})" if share > RESTS_ON_PRIOR else f"both (assumption {percent(share, 0)})"
+    return f"assumption ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (assumption {percent(share, 0)})"
 
 
 def _directions(group: CovarianceAnalysis) -> str:

@@ -98,7 +98,7 @@ def _looked(known: Given, seed: int, measurements: Path | None) -> _Looked:
     inspected, rows = known.inspected, tuple[int, ...]()
     while True:
         readings = readings_of(known, rows, measurements) if measurements is not None and rows else ()
-        draw = partial(draw_population, inspected, seed, called=known.coefficients, readings=readings)
+        draw = partial(draw_population, inspected, seed, coefficient_names=known.coefficients, readings=readings)
         every = draw()
         core, chance = (every, np.ones(1)) if inspected.cables == 1 else judged(inspected, every, draw, seed)
         named = [int(i) for i in np.flatnonzero(chance < FALSE_ALARM)]

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.diagnostics import convergence_shortfalls
+from bowdenfit.inference.diagnostics import describe_convergence_shortfalls
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.sampler_agreement import recommendation
+from bowdenfit.inference.sampler_agreement import recommend_sampler
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.recordings.words import preparation_pages
 from bowdenfit.kinds.term import Term
@@ -109,14 +109,14 @@ def summarize(fit: Record) -> dict[str, Any]:
 def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
     """How the draws came about, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
-    short = convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
+    short = describe_convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
     page = {
         "method": posterior.sampler,
         "ensembles": posterior.n_ensembles,
         "walkers": len(posterior.z) // posterior.n_ensembles,
         "steps": posterior.steps,
         "acceptance": posterior.acceptance,
-        "recommendation": recommendation(posterior.sampler, fit.model.space.size, bool(short)),
+        "recommendation": recommend_sampler(posterior.sampler, fit.model.space.size, bool(short)),
     }
     if posterior.trajectories is not None:
         page |= {k: v for k, v in posterior.trajectories.__dict__.items() if k != "statistics"}

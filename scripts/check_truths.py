@@ -27,7 +27,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.batch.stages import BatchFit
+from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.designs import design_of

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.parameters.scale import Scale
+from bowdenfit.parameters.space import Scale
 from bowdenfit.units import speed_dimension
 
 LEAST_SHARE = 1e-5  # of the loads; an offset cannot take more of a rope's reading than this leaves

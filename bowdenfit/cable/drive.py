@@ -19,7 +19,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.load_cells import LoadCells
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it

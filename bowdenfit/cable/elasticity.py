@@ -11,8 +11,7 @@ from jaxtyping import Float
 from bowdenfit.cable.laws import ContactLaw
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal
-from bowdenfit.parameters.scale import Scale
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.stretch import (
     compliance,
     extension,

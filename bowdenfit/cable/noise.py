@@ -11,8 +11,13 @@ from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.description import Description
-from bowdenfit.physics.normal_tail import log_normal_cdf
-from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
+from bowdenfit.physics.distributions import (
+    log_normal_cdf,
+    log_student_cdf,
+    log_student_density,
+    student_bound_residual,
+    student_residual,
+)
 
 
 @runtime_checkable

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from bowdenfit.cli.interrupts import keeping, refuse_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
-from bowdenfit.inference.engines.memory import refuse_low_memory
+from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.verb import Watch
 
 Report: TypeAlias = Callable[..., None]

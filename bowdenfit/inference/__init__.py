@@ -1,1 +1,1 @@
-"""From a model and its data to estimates: least squares, ensembles of walkers, and whether to trust them."""
+"""Estimation: least squares, samplers and their diagnostics, model checks, and whether to trust the result."""

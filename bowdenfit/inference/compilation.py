@@ -6,7 +6,7 @@ from typing import Any
 
 import jax
 
-from bowdenfit.inference.engines.memory import refuse_shortage
+from bowdenfit.inference.resources import refuse_shortage
 
 # Without XLA's newer fusion emitters the walkers of the on-body cable compile in 0.65 of the time (3.3 s instead of 5.0 s, with
 # jaxlib 0.10); with them programs run in 0.65 to 1 of the time, which pays where running costs far more.

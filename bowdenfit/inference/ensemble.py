@@ -23,12 +23,9 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
 from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, describe_stuck_walkers, worst_diagnostics
 from bowdenfit.inference.checkpoint import append_record, damaged_checkpoint_error, read_records
-from bowdenfit.inference.engines.memory import ENSEMBLES_AT_ONCE
-from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
-from bowdenfit.inference.engines.processes import available_cores
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.inference.sweep import SweepChoices
-from bowdenfit.inference.walkers import WalkerPrograms
+from bowdenfit.inference.resources import ENSEMBLES_AT_ONCE, available_cores, linear_algebra_in_one_thread
+from bowdenfit.inference.walkers import SweepChoices, WalkerPrograms
 
 _BLOCK = 10  # stored states between two reports
 _FIRST_CHECK = 60  # stored states before the first look; of five data sets the slowest is there after half of that

@@ -8,20 +8,23 @@ posterior at the noise scales' prior medians.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import ClassVar
+from typing import Any, ClassVar
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
+from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, find_disagreements
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.lack_of_fit import find_departures
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.minimum import LocalMinimum, find_lowest_minimum
-from bowdenfit.inference.objective import Objective, Problem, Solution, sum_of_squares, total_squares
-from bowdenfit.inference.other_minima import PINS, find_rivals, range_of_minima
+from bowdenfit.inference.minimum import PINS, LocalMinimum, find_lowest_minimum, find_rivals, range_of_minima
+from bowdenfit.inference.objective import Objective, Problem, Solution, noise_scales, sum_of_squares, total_squares
 from bowdenfit.inference.profiles import UNKNOWN_LIMITS, ProfileIntervals
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.inference.solver import ROUGH
@@ -249,3 +252,16 @@ def _describe_bound(value: float, limit: tuple[float, float], at_upper_end: bool
         "" if np.isnan(upper) else "; nothing limits it above" if np.isinf(upper) else f"; at most {significant(upper)}"
     )
     return f"no finite minimum: runs to its lower end, {significant(value)}{most}"
+
+
+def predict_posterior(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
+    """True values z, and the covariance that readings without noise would leave there, at the noise scales of that point."""
+
+    def residuals(at: Array, data: Any) -> Array:
+        return jnp.concatenate(list(posterior.residuals(at, data).values()))
+
+    jacobian = compile_program(
+        jax.jacfwd(residuals), jax.ShapeDtypeStruct(z.shape, jnp.float64), posterior.data, run_once=True
+    )
+    slopes = np.where(noise_scales(posterior), 0.0, np.asarray(jacobian(z, posterior.data)))
+    return MaximumPosterior(z, np.linalg.inv(slopes.T @ slopes + np.eye(len(z))))

@@ -21,8 +21,7 @@ from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import run_in_batches
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moment_matching import match_moments
-from bowdenfit.inference.psis import reliable_k, smooth_weights
+from bowdenfit.inference.psis import match_moments, reliable_k, smooth_weights
 from bowdenfit.inference.walkers import WalkerPrograms, compile_density_walkers
 from bowdenfit.kinds.run_parts import RunParts
 

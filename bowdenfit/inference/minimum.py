@@ -1,16 +1,21 @@
-"""The minimum of least squares without priors: what has run to an end of its range, how tables weigh, and where kinks lie.
+"""The minimum of least squares without priors: parameters at an end of their range, weights of tables, kinks and rival minima.
 
-Where the regime of a reading changes, as where a side of a loop goes slack, residuals have kinks. There the solver may end
-where the tangent plane says that the sum of squares would yet fall, and a kink may keep it from a lower minimum.
+Where the regime of a reading changes, as where a side of a loop goes slack, residuals have kinks. There the solver may stop
+although the tangent plane says that the sum of squares would still fall, and a kink may keep it from a lower minimum.
+
+A standard error is the curvature at the minimum. Where the sum of squares has a flat floor instead (preload of a loop whose
+return side is always slack, stiffness of a rope read at one load), curvature does not say how far the floor reaches. So each
+parameter in question is pinned at values that its prior considers possible, and the others are fitted again.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.linearized import Linearized, estimate_scatter, linearize
-from bowdenfit.inference.objective import LOWER_END, Problem, has_lower_end, sum_of_squares, total_squares
+from bowdenfit.inference.objective import LOWER_END, Problem, Solution, has_lower_end, sum_of_squares, total_squares
 from bowdenfit.inference.profiles import Basin, ProfileIntervals, compute_profile_intervals, is_stuck
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
@@ -21,6 +26,10 @@ _FAR = 50.0  # standard error in units of the prior's sd beyond which data say n
 _MOST_FOLLOWED = 3  # times that a profile is followed to a lower minimum
 _RESTARTS = 12  # from which the solver starts again where it is stuck
 _FARTHEST_RESTART = 1.0  # of each from there [z]
+PINS = (-2.5, 2.5)  # z at which a parameter is pinned
+_AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
+_EXACT = 1e-6  # scatter of readings that fit without any
+_APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
 
 
 @dataclass(frozen=True)
@@ -148,3 +157,34 @@ def _may_be_at_end(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarr
     """Which parameters may be on their way to an end of their range."""
     limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
     return (has_lower_end(parameters) & (z < _NEAR_END)) | (limited & (z > -_NEAR_END))
+
+
+def find_rivals(solution: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:
+    """Those of the trials that fit about as well as what was found.
+
+    Args:
+        found: The minimum; its residuals by table.
+        trials: Solutions with a parameter pinned elsewhere.
+        scale: Scatter of each standardized residual about the minimum [1].
+        n_informed: Number of directions that the residuals determine; scatter about few spare readings is known badly.
+    """
+    from scipy.special import stdtrit
+
+    # Readings without any scatter fit nothing else, whatever their weight.
+    exact = np.concatenate([np.full(len(r), not np.any(r)) for r in solution["residuals"].values()])
+    scale = np.where(exact, _EXACT, scale)
+    spare = max(sum(np.count_nonzero(r) for r in solution["residuals"].values()) - n_informed, 1)
+    limit = _scaled_squares(solution, scale) + float(stdtrit(spare, _AS_WELL)) ** 2
+    return [trial for trial in trials if _scaled_squares(trial, scale) <= limit]
+
+
+def range_of_minima(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
+    """Lowest and highest value that fit about as well, where one lies further off than the error allows; else None."""
+    if all(abs(rival - value) <= _APART * error for rival in rivals):
+        return None
+    return min(value, *rivals), max(value, *rivals)
+
+
+def _scaled_squares(solution: Solution, scale: np.ndarray) -> float:
+    total = float(np.sum((np.concatenate(list(solution["residuals"].values())) / scale) ** 2))
+    return total if np.isfinite(total) else float("inf")

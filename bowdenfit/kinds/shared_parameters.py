@@ -12,8 +12,7 @@ from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import Circumstances
 from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal
-from bowdenfit.parameters.scale import Scale
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.space import Parameter, Scale
 
 
 def run_scatter(at: Circumstances) -> Parameter:

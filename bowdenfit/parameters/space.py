@@ -1,4 +1,4 @@
-"""The parameters of one model: which are free, which fixed, and the way between z and named values."""
+"""The parameters of a model: which are free, which fixed, the map between z and named values, and scales of default priors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -12,8 +12,32 @@ from jaxtyping import Float
 
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.priors import Prior
+from bowdenfit.words import significant
 
 Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor", "elastic"]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Size of what was measured: whatever its unit, and however large a bench is, priors stand to it in one proportion.
+
+    Args:
+        value: Size in internal units, above 0.
+        name: What it is, such as "median load".
+        unit: Unit in which it is said.
+    """
+
+    value: float
+    name: str
+    unit: str
+
+    def __str__(self) -> str:
+        """Such as "the median load, 39.1 N"."""
+        return f"the {self.name}, {significant(self.value)} {self.unit}"
+
+    def describe_share(self, part: float) -> str:
+        """Such as "5 % of the median load, 39.1 N"."""
+        return f"{significant(100 * part)} % of {self}"
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ import jax
 from bowdenfit.dataset import Dataset
 from bowdenfit.front_desk import Fit
 from bowdenfit.inference.chain import SamplingRequest
-from bowdenfit.inference.engines.memory import refuse_shortage
+from bowdenfit.inference.engines import versions
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.versions import versions
+from bowdenfit.inference.resources import refuse_shortage
 from bowdenfit.model import build_model
 from bowdenfit.results.record import Provenance
 from bowdenfit.run.sampling import Stopwatch, compile_programs, draw_posterior

@@ -9,8 +9,7 @@ from warnings import warn
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, PLACE, Output, Seed, checked
-from bowdenfit.inference.engines.memory import refuse_low_memory
-from bowdenfit.inference.engines.processes import keep_compiled_programs
+from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN

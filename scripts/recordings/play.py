@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from benchmark_tables import Table, say
 
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import play_operator
 from bowdenfit.recordings.preparation.play import play
 from recordings.simulated import SEED, Simulated
 from recordings.timing import milliseconds

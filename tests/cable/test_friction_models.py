@@ -16,8 +16,7 @@ from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
-from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, play_operator, rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 
 REFERENCE = 50.0

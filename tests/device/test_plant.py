@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bowdenfit.device.plant import Motion, Plant, advance, energy, rope_torques, settle, slowed
 from bowdenfit.device.transmission import Transmission
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 
 LOOP = Transmission(jnp.asarray(20.0), jnp.asarray(0.35), jnp.asarray(0.2))

@@ -20,10 +20,9 @@ from test_proposals import (
 )
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.inference.batch.ensembles import walker_round
+from bowdenfit.inference.batch.programs import walker_round
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import value_map
+from bowdenfit.inference.coordinates import Conditional, value_map
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import fitted_t
 from bowdenfit.model import build_model

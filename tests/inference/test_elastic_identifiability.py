@@ -8,8 +8,8 @@ from slow_cases import some_slow
 import bowdenfit as bf
 from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.inference.other_minima import find_rivals, range_of_minima
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import build_model

@@ -16,8 +16,7 @@ from test_proposals import LEVELS, PROPOSALS, run_side_by_side, without_its_volu
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.chain import SamplingRequest
-from bowdenfit.inference.conditional import Conditional
-from bowdenfit.inference.coordinates import ridge_map
+from bowdenfit.inference.coordinates import Conditional, ridge_map
 from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity

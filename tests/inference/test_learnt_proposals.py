@@ -9,10 +9,9 @@ from rows import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.inference.batch.mixture import StudentMixture, start_mixture
+from bowdenfit.inference.batch.laplace import StudentMixture, start_mixture
 from bowdenfit.inference.batch.programs import BatchPrograms
-from bowdenfit.inference.batch.proposals import LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
-from bowdenfit.inference.batch.weights import BLOCK
+from bowdenfit.inference.batch.weights import BLOCK, LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import RANKS, _kind

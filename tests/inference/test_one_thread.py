@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import bowdenfit as bf
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchSettings
-from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread
 from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.resources import linear_algebra_in_one_thread
 from bowdenfit.model import build_model
 
 FEW = ("sampler.n_ensembles=2", "sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
@@ -74,7 +74,7 @@ def test_whichever_library_is_loaded_by_then():
     """The one that compiled programs call is loaded late."""
     code = (
         "from threadpoolctl import threadpool_info\n"
-        "from bowdenfit.inference.engines.one_thread import linear_algebra_in_one_thread\n"
+        "from bowdenfit.inference.resources import linear_algebra_in_one_thread\n"
         "with linear_algebra_in_one_thread():\n"
         "    import jax, scipy.linalg\n"
         "    print(*(one['num_threads'] for one in threadpool_info() if one['user_api'] == 'blas'))"

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.inference.prior_grid import NODES, PriorGrid, make_prior_grid
+from bowdenfit.inference.coordinates import NODES, PriorGrid, make_prior_grid
 from bowdenfit.model import build_model
 
 DIMENSIONS = 5

@@ -15,8 +15,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
-from bowdenfit.inference.profile_limits import find_crossing, find_interval_ends
-from bowdenfit.inference.profiles import compute_profile, satterthwaite_freedom
+from bowdenfit.inference.profiles import compute_profile, find_crossing, find_interval_ends, satterthwaite_freedom
 from bowdenfit.inference.solver import minimize, orthogonalize
 from bowdenfit.model import build_model
 

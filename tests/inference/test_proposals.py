@@ -13,7 +13,7 @@ from snooker import snooker
 
 from bowdenfit.description import SamplerSettings
 from bowdenfit.description.defaults import THIN
-from bowdenfit.inference.coordinates import CoordinateMap, value_map, z_map
+from bowdenfit.inference.coordinates import NODES, CoordinateMap, PriorGrid, value_map, z_map
 from bowdenfit.inference.ensemble import EnsembleMove, make_initial_state
 from bowdenfit.inference.moves import (
     count_move_numbers,
@@ -23,7 +23,6 @@ from bowdenfit.inference.moves import (
     random_numbers,
     stretch,
 )
-from bowdenfit.inference.prior_grid import NODES, PriorGrid
 from bowdenfit.inference.walkers import compile_density_walkers
 
 DEGREES_OF_FREEDOM, DIMENSIONS = 4, 5

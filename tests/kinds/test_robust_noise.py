@@ -24,7 +24,12 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.model import Model, build_model
-from bowdenfit.physics.student import log_student_cdf, log_student_density, student_bound_residual, student_residual
+from bowdenfit.physics.distributions import (
+    log_student_cdf,
+    log_student_density,
+    student_bound_residual,
+    student_residual,
+)
 
 pytestmark = pytest.mark.extended
 

@@ -8,7 +8,7 @@ from raw_recordings import to_raw
 from scipy.optimize import minimize_scalar
 
 from bowdenfit.description import Preparation
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import play_operator
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play

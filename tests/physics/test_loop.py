@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from bowdenfit.physics.friction import capstan_output_force
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import capstan_output_force, play_operator
 from bowdenfit.physics.loop import free_motion_loss, loop_band, loop_output_force, side_tensions, slack_load
 
 PRELOADS = (1.0, 7.0, 30.0, 100.0)

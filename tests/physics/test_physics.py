@@ -132,7 +132,7 @@ def test_gradients_agree_with_finite_differences(name):
 def test_the_normal_tail_has_the_right_value_and_slope_at_any_distance():
     import scipy.stats
 
-    from bowdenfit.physics.normal_tail import log_normal_cdf
+    from bowdenfit.physics.distributions import log_normal_cdf
 
     far, near = (-1e12, -1e8, -1e4, -40.0, -30.001, -29.999), (-3.0, -1e-9, 0.0, 1e-9, 2.999, 3.001, 8.0, 30.0)
     x = jnp.array([*far, *near])

@@ -21,8 +21,7 @@ from bowdenfit.inference.comparison import (
 )
 from bowdenfit.inference.leave_one_out import REFIT, LooDensity, LooRefits, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.inference.moment_matching import Affine, find_best_map, match_moments
-from bowdenfit.inference.psis import reliable_k
+from bowdenfit.inference.psis import Affine, find_best_map, match_moments, reliable_k
 from bowdenfit.kinds.designs import design_of
 from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.model import build_model

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.inference.engines.choice import make_slurm_executor
+from bowdenfit.inference.engines import make_slurm_executor
 from bowdenfit.questions.fleet.store import KEPT
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import FLEET_DRAWS

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.inference.engines import choice, engine
-from bowdenfit.inference.engines.engine import Engine, EngineError
-from bowdenfit.inference.versions import versions
+from bowdenfit.inference import engines
+from bowdenfit.inference.engines import Engine, EngineError, versions
 from bowdenfit.questions.fleet.cases import read_cases
 from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.fleet.store import KEPT, FleetStore
@@ -61,7 +60,7 @@ def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path
 )
 def test_an_engine_that_cannot_be_had_leaves_nothing_behind(run, fleet, tmp_path, monkeypatch, engine, code, said):
     monkeypatch.setenv("PATH", str(tmp_path))  # no Slurm on any machine
-    monkeypatch.setattr(choice, "_ANSWERS_WITHIN", 1.0)
+    monkeypatch.setattr(engines, "_CONNECT_SECONDS", 1.0)
     results = tmp_path / "results"
     found, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)
     assert found == code and said in " ".join(error.split()) and "Traceback" not in error
@@ -133,7 +132,7 @@ def refuse_nobody():
 
 
 def test_a_cluster_in_which_nobody_is_left_is_not_waited_for(monkeypatch):
-    monkeypatch.setattr(engine, "_PATIENCE", 0.01)
+    monkeypatch.setattr(engines, "_PATIENCE", 0.01)
     with Waiting(1) as executor, pytest.raises(EngineError, match="nobody is left"):
         list(Engine(lambda: executor, 1, "here", check=refuse_nobody).results(abs, [-1, -2]))
 
@@ -147,10 +146,10 @@ def test_a_cluster_that_takes_no_more_work_is_a_sentence():
 def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
     from distributed import LocalCluster
 
-    monkeypatch.setattr(choice, "_WORKERS_WITHIN", 1)
+    monkeypatch.setattr(engines, "_WORKER_SECONDS", 1)
     with LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as cluster:
         address = cluster.scheduler_address.replace("tcp://", "dask://")
-        with pytest.raises(EngineError, match=r"has no worker; start some"), choice.open_engine(address):
+        with pytest.raises(EngineError, match=r"has no worker; start some"), engines.open_engine(address):
             pass
 
 

@@ -14,9 +14,9 @@ from scipy import stats
 from scipy.linalg import block_diag
 
 import bowdenfit as bf
+from bowdenfit.inference.population.likelihoods import Summaries
 from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
-from bowdenfit.inference.population.summaries import Summaries
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.pool import pooling
 from bowdenfit.questions.pool.answer import Asked

@@ -9,9 +9,9 @@ import pytest
 from populations import gibbs
 from scipy import stats
 
+from bowdenfit.inference.population.likelihoods import Summaries, summarize_likelihoods
 from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.inference.population.summaries import Summaries, summarize_likelihoods
 from bowdenfit.questions.pool import unlike
 
 pytestmark = pytest.mark.extended

@@ -12,6 +12,7 @@ from scipy import stats
 
 import bowdenfit as bf
 from bowdenfit.inference.diagnostics import diagnose
+from bowdenfit.inference.population.likelihoods import summarize_likelihoods
 from bowdenfit.inference.population.model import (
     LUBRICATION,
     SPREAD,
@@ -22,7 +23,6 @@ from bowdenfit.inference.population.model import (
     log_likelihood,
 )
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.inference.population.summaries import summarize_likelihoods
 from bowdenfit.questions.pool.inspected import given
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import read_fleet_draws

@@ -9,7 +9,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import MemoryShortageError
-from bowdenfit.inference.engines import memory
+from bowdenfit.inference import resources
 
 pytestmark = pytest.mark.extended
 
@@ -52,7 +52,7 @@ def test_a_fit_that_runs_out_of_memory_while_it_samples_is_kept(tmp_path, monkey
 
     def starve(progress):
         if progress.steps >= 200:
-            monkeypatch.setattr(memory, "mmap", SimpleNamespace(mmap=refuse))
+            monkeypatch.setattr(resources, "mmap", SimpleNamespace(mmap=refuse))
 
     with pytest.raises(MemoryShortageError, match="MiB of memory"):
         bf.fit(cable, output=tmp_path / "fit", progress=starve, **asked)

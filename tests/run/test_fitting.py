@@ -41,7 +41,7 @@ def test_a_question_is_worked_out_once_for_each_record(quick_fit, on_body_square
     assert [question(quick_fit), question(quick_fit), question(on_body_squares), question(quick_fit)] == [1, 1, 2, 1]
 
 
-KEEPS = "from bowdenfit.inference.engines.processes import keep_compiled_programs as keep; keep(); import jax; "
+KEEPS = "from bowdenfit.inference.resources import keep_compiled_programs as keep; keep(); import jax; "
 SHOWS = KEEPS + "print(jax.config.jax_compilation_cache_dir)"
 
 

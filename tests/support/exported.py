@@ -7,8 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.physics.friction import force_from_scale, force_scale, rate_factor
-from bowdenfit.physics.hysteresis import play_operator
+from bowdenfit.physics.friction import force_from_scale, force_scale, play_operator, rate_factor
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
 from bowdenfit.questions.export.transmission import DRAW, LEVELS, About, Level, Places, Transmission
 

@@ -20,8 +20,8 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append_record, read_records
+from bowdenfit.inference.engines import versions
 from bowdenfit.inference.ensemble import CheckpointedBackend
-from bowdenfit.inference.versions import versions
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, begun_before

@@ -9,7 +9,7 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
-from bowdenfit.inference.batch.diagnostics import diagnose_few_draws
+from bowdenfit.inference.batch.fitting import diagnose_few_draws
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.chain import SamplingRequest
 from bowdenfit.inference.ensemble import sample

@@ -1,1 +1,1 @@
-"""Many data sets of one shape fitted in one program."""
+"""Fits of many data sets of one shape with programs compiled once."""

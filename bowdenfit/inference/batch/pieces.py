@@ -1,7 +1,12 @@
-"""A piece of a fleet's work: some data sets of one shape with their seeds, whoever fits them and wherever."""
+"""Pieces of a fleet's work: which data sets one program serves, and what a worker does with some of them.
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+Default priors of quantities with a unit are proportional to the size of the measurements, so every data set has priors of its
+own. Here the priors have unit scale, and the scale is one more array of the data: z, and the density in z, are the same.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -10,17 +15,156 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.dataset import Dataset
-from bowdenfit.inference.batch.fitting import fit_batch
+from bowdenfit.cable.cable import Cable
+from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
+from bowdenfit.inference.batch.fitting import BatchFit, fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
-from bowdenfit.inference.batch.shapes import shape_dataset
-from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import derived_units, shown_values
-from bowdenfit.inference.versions import refuse_other_versions
+from bowdenfit.inference.engines import refuse_other_versions
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds.term import Term
+from bowdenfit.model import Model, build_model
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
+from bowdenfit.parameters.space import Parameter, ParameterSpace
 
+_IRRELEVANT_KEYS = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
+_DATA_FIELDS = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
 DRAWS = 2048  # of each data set, of equal weight
 _SHUFFLE_STREAM = 3  # stream of random numbers that puts draws in no order
+
+
+@dataclass(frozen=True)
+class ScaledDensity(LogDensity):
+    """The posterior of data whose last array has the scales of the priors that are in proportion to measurements."""
+
+    def values(self, z: Array, data: Any) -> dict[str, Array]:
+        """See `LogDensity.values`."""
+        unit = super().values(z, data)
+        return unit | {name: unit[name] * data[-1][i] for i, name in enumerate(_scaled_names(self.model.space))}
+
+
+@dataclass(frozen=True)
+class ShapedDataset:
+    """A data set as one of many that a program serves.
+
+    Args:
+        posterior: Of unit scale, the same program for all of one key.
+        data: Its own data.
+        key: What the program depends on; the same for all that it serves.
+    """
+
+    posterior: ScaledDensity
+    data: Any
+    key: str
+
+
+def shape_dataset(dataset: Dataset) -> ShapedDataset:
+    """A data set with its scales as data.
+
+    Args:
+        dataset: What was measured.
+    """
+    model = build_model(dataset)
+    units = [_to_unit_scale(parameter) for parameter in model.space.parameters]
+    space = ParameterSpace(tuple(parameter for parameter, _ in units))
+    scales = np.array(
+        [scale for parameter, scale in units if parameter.fixed is None and scale is not None], dtype=float
+    )
+    data = (*LogDensity(model).padded, scales)
+    cable = replace(model.cable, nominal=dict.fromkeys(model.cable.nominal, 1.0)) if _has_angles(model) else model.cable
+    posterior = ScaledDensity(_with_cable(cable, space, model.terms), data)
+    return ShapedDataset(posterior, data, _program_key(posterior))
+
+
+def _has_angles(model: Model) -> bool:
+    """Whether every row has its own angle wherever else the mean angle of all rows would serve."""
+    nominal = [c.name in model.cable.nominal for c in model.description.contact]
+    return all("is_own" in term.data and np.all(term.data["is_own"][..., nominal]) for term in model.terms)
+
+
+def _with_cable(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
+    """The model of the same terms with another cable."""
+    return Model(cable, space, tuple(replace(term, cable=cable) for term in terms))  # type: ignore[type-var]
+
+
+def _scaled_names(space: ParameterSpace) -> list[str]:
+    """Parameters whose priors the data scale."""
+    return [p.name for p in space.free if p.scaled_by and _scale_of(p.prior) is not None]
+
+
+def _to_unit_scale(parameter: Parameter) -> tuple[Parameter, float | None]:
+    """A parameter with the prior of a unit scale, and the scale; None where it is not scaled by measurements."""
+    scale = _scale_of(parameter.prior) if parameter.scaled_by else None
+    if scale is None:
+        return parameter, None
+    prior = parameter.prior
+    unit = {field: 1.0 for field in ("scale", "sd", "median") if hasattr(prior, field)}
+    return replace(parameter, prior=replace(prior, **unit), prior_words="", scaled_by="measurements"), scale  # type: ignore[type-var]
+
+
+def _scale_of(prior: Prior) -> float | None:
+    """The factor between a prior and that of unit scale; None where it is more than a factor."""
+    match prior:
+        case HalfCauchy(scale=scale):
+            return float(scale)
+        case HalfNormal(sd=sd):
+            return float(sd)
+        case Normal(mean=mean, sd=sd) if mean == 0:
+            return float(sd)
+        case LogNormal(median=median):
+            return float(median)
+    return None
+
+
+def _program_key(posterior: ScaledDensity) -> str:
+    """What its program depends on: shapes, parameters, description, and conditions where they matter."""
+    shapes = jax.tree.map(lambda array: (np.shape(array), str(np.asarray(array).dtype)), posterior.data)
+    terms = [_describe_term(term) for term in posterior.model.terms]
+    description = _relevant_parts(posterior.model.description.to_json())
+    cable = posterior.model.cable
+    key = f"{shapes} {posterior.model.space.parameters} {description} {terms} {dict(cable.nominal)}"
+    return _digest(f"{key} {cable.friction.conditions}" if _conditions_matter(posterior.model) else key)
+
+
+def _conditions_matter(model: Model) -> bool:
+    """Whether the density depends on the loads and speeds measured at; it does unless every term says that it does not."""
+    return any(getattr(term, "depends_on_conditions", True) for term in model.terms)
+
+
+def input_hash(dataset: Dataset) -> str:
+    """What was measured and how it is described, whatever it is called and wherever it lies.
+
+    Args:
+        dataset: Read from files.
+    """
+    read = [checksum for name, checksum in dataset.sha256.items() if name != DESCRIPTION_FILE]
+    return _digest(f"{_relevant_parts(dataset.description.to_json())} {read}")
+
+
+def _relevant_parts(page: Any) -> Any:
+    """A description without what no fit depends on."""
+    if isinstance(page, Mapping):
+        return {key: _relevant_parts(value) for key, value in page.items() if key not in _IRRELEVANT_KEYS}
+    return [_relevant_parts(item) for item in page] if isinstance(page, list | tuple) else page
+
+
+def _describe_term(term: Term) -> str:
+    """What a term is beside its data; arrays by what is in them."""
+    parts = [f"{type(term).__name__} {len(term.labels)}"]
+    for term_field in fields(term):  # type: ignore[arg-type]
+        if term_field.name not in _DATA_FIELDS:
+            leaves, tree = jax.tree.flatten(getattr(term, term_field.name))
+            parts.append(f"{term_field.name} {tree} {[_leaf(leaf) for leaf in leaves]}")
+    return " ".join(parts)
+
+
+def _leaf(leaf: Any) -> str:
+    return _digest(leaf.tobytes().hex()) if isinstance(leaf, np.ndarray) else repr(leaf)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 @dataclass(frozen=True)

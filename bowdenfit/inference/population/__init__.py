@@ -1,1 +1,1 @@
-"""Populations of cables: from the draws of single fits to what all have in common, how much they differ, and how they wear."""
+"""Populations of cables: what cables have in common, how much they differ, and how they wear, from draws of single fits."""

@@ -20,8 +20,7 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Float
 
-from bowdenfit.inference.population.readings import JointReadings
-from bowdenfit.inference.population.summaries import Summaries
+from bowdenfit.inference.population.likelihoods import JointReadings, Summaries
 from bowdenfit.parameters.priors import HalfNormal, Normal, Prior
 
 SPREAD, WEAR, WEAR_SPREAD = HalfNormal(0.5), Normal(0.0, 1.0), HalfNormal(0.3)

@@ -1,4 +1,17 @@
-"""Drawing a population and its cables together, with NUTS, until the population is known well enough."""
+"""Sampling a population and its cables together with NUTS, and one cable by itself by Gibbs sampling.
+
+`draw_unpooled` uses only the inspections of one cable. Its log coefficients when new have the prior of its single fits, and its
+wear the prior of the mean wear of a population. Where its inspections say less about its wear than that prior, its wear comes
+from the population, and so do coefficients that it does not have. Effects of lubrication and temperature are those of the other
+cables.
+
+Errors of an inspection follow a multivariate t distribution: a normal whose precision is multiplied by a gamma variable. Given
+these variables the cable is normal, and given the cable they are independent. Each draw of the population has a chain of its
+own, so no thinning is needed.
+
+References:
+    Geweke 1993, "Bayesian treatment of the independent Student-t linear model" (Journal of Applied Econometrics 8).
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -14,8 +27,8 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import describe_convergence_shortfalls, diagnose
 from bowdenfit.inference.nuts import BLOCK, WARM_UP, compile_block, next_block_state
-from bowdenfit.inference.population.model import Inspections, PopulationDensity
-from bowdenfit.inference.population.readings import JointReadings, without_cables
+from bowdenfit.inference.population.likelihoods import JointReadings, without_cables
+from bowdenfit.inference.population.model import WEAR, Inspections, PopulationDensity, whitening_roots
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
@@ -32,6 +45,7 @@ _STEP, _DISPERSED = (
 )  # of derivatives; by how much more the starts of the population scatter than those of cables
 _UNCOMPUTABLE = 1e100  # minus the log density where it cannot be computed
 _MOST_DIVERGENT = 0.001  # share of trajectories
+_SWEEPS = 60
 
 
 @dataclass(frozen=True)
@@ -204,3 +218,54 @@ def _compile(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[in
     rows = jax.ShapeDtypeStruct((_AT_ONCE, density.size), np.float64)
     many = compile_program(jax.vmap(values, (0, None)), rows, data, run_once=True)
     return program, many
+
+
+def draw_unpooled(
+    inspected: Inspections, population: PopulationDraws, cable: int, seed: int
+) -> tuple[np.ndarray, bool]:
+    """Log coefficients of a cable when new and its wear, (draw, number), and whether its own inspections tell its wear.
+
+    Args:
+        inspected: What is known.
+        population: That the cable is unlike, for what its inspections do not tell; as many draws come back.
+        cable: Its number.
+        seed: Of everything random.
+    """
+    generator, rows = np.random.default_rng([seed, 19, cable]), np.flatnonzero(inspected.cable == cable)
+    freedom, counts = inspected.summaries.freedom[rows], inspected.known[rows].sum(axis=1)
+    root = whitening_roots(inspected.summaries.scale[rows], inspected.known[rows])
+    design = root @ inspected.design[rows]  # of errors of unit precision, as all that follows
+    columns = np.stack([*inspected.effects.values(), np.zeros(len(inspected.cable))], axis=1)[
+        rows, : len(inspected.effects)
+    ]
+    shift = np.einsum("hf,jf->hj", population.effects, columns)
+    seen = (root @ inspected.summaries.center[rows, :, None])[..., 0] - shift[:, :, None] * root.sum(axis=2)
+    information = np.einsum("jkd,jke->jde", design, design)
+    has = np.atleast_1d(inspected.known[rows].any(axis=0))
+    is_wear_known = _is_wear_known(information.sum(axis=0), has) if inspected.cycles is not None else False
+    own = np.append(has, [is_wear_known] * (inspected.cycles is not None))
+    sd = np.append(inspected.prior_sd, [WEAR.sd] * (inspected.cycles is not None))
+    mean = np.append(inspected.prior_mean, [0.0] * (inspected.cycles is not None))
+    before = np.where(own, 1 / sd**2, 1 / population.spread**2)
+    pulled = before * np.where(own, mean, population.mean)
+    stretch = np.ones(seen.shape[:2])
+    for _ in range(_SWEEPS):
+        precision = np.einsum("hj,jde->hde", stretch, information) + before[:, :, None] * np.eye(len(own))
+        toward = np.einsum("hj,jkd,hjk->hd", stretch, design, seen, optimize=True) + pulled
+        noise = np.linalg.cholesky(precision) @ generator.standard_normal((*toward.shape, 1))
+        values: np.ndarray = np.linalg.solve(precision, toward[:, :, None] + noise)[..., 0]
+        away = np.sum((seen - np.einsum("jkd,hd->hjk", design, values)) ** 2, axis=2)
+        stretch = generator.standard_gamma((freedom + counts) / 2, stretch.shape) / ((freedom + away) / 2)
+    return values, is_wear_known
+
+
+def _is_wear_known(information: np.ndarray, has: np.ndarray) -> bool:
+    """Whether inspections tell more of wear than its prior does, whatever the coefficients are.
+
+    Args:
+        information: Precision of log coefficients and wear, (number, number).
+        has: Which coefficients they have.
+    """
+    inside = information[:-1, :-1][np.ix_(has, has)]
+    beside = information[:-1, -1][has]
+    return bool(information[-1, -1] - beside @ np.linalg.solve(inside, beside) > 1 / WEAR.sd**2)

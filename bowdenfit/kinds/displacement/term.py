@@ -24,8 +24,7 @@ from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_sc
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
-from bowdenfit.parameters.scale import Scale
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 
 END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "rope_give", "sigma_x"

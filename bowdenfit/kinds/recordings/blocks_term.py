@@ -23,7 +23,7 @@ from bowdenfit.kinds.padding import rounded_up
 from bowdenfit.kinds.recordings.side_by_side import WITHOUT_WEIGHT
 from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
-from bowdenfit.physics.normal_tail import log_normal_cdf
+from bowdenfit.physics.distributions import log_normal_cdf
 
 _LEAST_TOTAL = 1e-20
 

@@ -28,8 +28,7 @@ from bowdenfit.kinds.shared_parameters import rope
 from bowdenfit.kinds.stretch.table import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
-from bowdenfit.parameters.scale import Scale
-from bowdenfit.parameters.space import Parameter
+from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.words import significant
 
 STRETCH_NOISE = "sigma_L"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from bowdenfit.inference.versions import refuse_other_versions, versions
+from bowdenfit.inference.engines import refuse_other_versions, versions
 from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.questions.calibrate.workbench import TOGETHER, Plan, Workbench

@@ -7,9 +7,8 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
-from bowdenfit.inference.batch.fitting import fit_batch
+from bowdenfit.inference.batch.fitting import BatchFit, fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
-from bowdenfit.inference.batch.stages import BatchFit
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 

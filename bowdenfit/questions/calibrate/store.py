@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.engines.choice import JOBS_FOLDER
+from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import or_damaged
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (

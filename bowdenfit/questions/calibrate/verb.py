@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PLACE, TEXTS, Output, Seed, checked, whole_number
-from bowdenfit.inference.engines.memory import refuse_low_memory
+from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.notebook import watched
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
@@ -153,7 +153,7 @@ def _replicate(
     progress: Report | None,
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.inference.engines.choice import JOBS_FOLDER, open_engine
+    from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
     from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
     from bowdenfit.questions.calibrate.store import keep
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DatasetError, UsageError
-from bowdenfit.inference.batch.stages import BatchFit
+from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity

@@ -12,7 +12,7 @@ from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError, DescriptionError, StoreError
 from bowdenfit.files.naming import parse_sources
-from bowdenfit.inference.batch.shapes import ShapedDataset, input_hash, shape_dataset
+from bowdenfit.inference.batch.pieces import ShapedDataset, input_hash, shape_dataset
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.settings import load_description
 from bowdenfit.questions.fleet.answer import Broken

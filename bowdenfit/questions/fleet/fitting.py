@@ -13,8 +13,8 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit
 from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
 from bowdenfit.inference.draws import derived_units
+from bowdenfit.inference.engines import versions
 from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.versions import versions
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.fleet.answer import Broken, Fitted, Fleet
 from bowdenfit.questions.fleet.cases import Case

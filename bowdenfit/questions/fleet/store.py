@@ -12,7 +12,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
-from bowdenfit.inference.engines.choice import JOBS_FOLDER
+from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import or_damaged
 from bowdenfit.results.arrays import read_arrays, write_arrays
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws

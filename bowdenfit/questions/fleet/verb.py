@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import HIDDEN, LARGEST_SEED, PLACE, Output, Seed, checked, whole_number
-from bowdenfit.inference.engines.memory import refuse_low_memory
-from bowdenfit.inference.engines.processes import keep_compiled_programs
+from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.reading import Reading
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 
 if TYPE_CHECKING:
     from bowdenfit.inference.batch.pieces import PieceFit
-    from bowdenfit.inference.engines.engine import Engine
+    from bowdenfit.inference.engines import Engine
     from bowdenfit.questions.fleet.answer import Broken, Fleet
     from bowdenfit.questions.fleet.cases import Case
     from bowdenfit.questions.fleet.inspections import Inspection
@@ -72,7 +71,7 @@ def fleet(
     with reserved(place), watched(WATCH, progress) as show:
         import jax
 
-        from bowdenfit.inference.engines.choice import JOBS_FOLDER, open_engine
+        from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
         from bowdenfit.questions.fleet.fitting import gathered
 
         store, seed = _store(place, seed, resume)
@@ -103,7 +102,7 @@ def _read(folder: Path, inspections: "list[Inspection]", reading: Reading) -> "t
 def _store(place: Path | None, seed: int | None, resume: bool) -> "tuple[FleetStore | None, int]":
     """The results folder, and the seed: as stated, else that of the fleet to go on with, else a new one."""
     from bowdenfit.errors import UsageError
-    from bowdenfit.inference.versions import versions
+    from bowdenfit.inference.engines import versions
     from bowdenfit.questions.fleet.store import FleetStore, begun_before
 
     if resume and place is None:

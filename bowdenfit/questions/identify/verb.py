@@ -130,7 +130,7 @@ def _of_plan(path: Path) -> "Identifiability":
 
     from bowdenfit.dataset import Dataset
     from bowdenfit.inference.compilation import compile_program
-    from bowdenfit.inference.information import predict_posterior
+    from bowdenfit.inference.least_squares import predict_posterior
     from bowdenfit.inference.log_density import LogDensity
     from bowdenfit.inference.scalar_priors import value_at
     from bowdenfit.model import build_model

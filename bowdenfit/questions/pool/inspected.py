@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import StoreError
+from bowdenfit.inference.population.likelihoods import Summaries, summarize_likelihoods
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
-from bowdenfit.inference.population.summaries import Summaries, summarize_likelihoods
 from bowdenfit.questions.pool.answer import LeftOut
 from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import counted, few, listed

@@ -8,8 +8,7 @@ import numpy as np
 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
-from bowdenfit.inference.population.unpooled import draw_unpooled
+from bowdenfit.inference.population.sampling import PopulationDraws, draw_population, draw_unpooled
 from bowdenfit.questions.pool.answer import Asked, Effect, Life, Pool, PooledCable
 from bowdenfit.questions.pool.curves import curves_of
 from bowdenfit.questions.pool.inspected import Given, given

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.population.readings import JointReadings
+from bowdenfit.inference.population.likelihoods import JointReadings
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.questions.pool.inspected import Given
 from bowdenfit.reading import Reading

@@ -1,17 +1,29 @@
-"""What single fits say, as distributions: of each inspection the likelihood of its log coefficients as a multivariate t.
+"""What an inspection contributes to a population: a multivariate t fitted to the draws of its fit, or its readings themselves.
 
-Scatter between mountings that is known from few of them makes the draws of single fits heavy-tailed; a normal distribution of
-the same covariance would give their middle too little weight, and their tails too much.
+`Summaries` approximate the likelihood of log coefficients. Scatter between mountings that is known from few of them makes the
+draws of single fits heavy-tailed; a normal distribution of the same covariance would give their center too little weight and
+their tails too much.
+
+`JointReadings` put the likelihood of the readings themselves into the density of the population. They are for inspections that
+the population moves to where their own fit has hardly any draws, so that a distribution fitted to the draws would be a guess.
 
 References:
     Lange, Little and Taylor 1989, "Robust statistical modeling using the t distribution" (Journal of the American
     Statistical Association 84); Liu and Rubin 1995, "ML estimation of the t distribution using EM" (Statistica Sinica 5).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
+from jaxtyping import Float
 from scipy.special import gammaln
+
+from bowdenfit.inference.log_density import LogDensity
 
 _LEAST_FREEDOM, _MOST_FREEDOM = 1.5, 200.0
 # Factors that degrees of freedom are tried with in each round. Small ones are among them: scale and freedom are found in turn,
@@ -92,3 +104,77 @@ def _log_t(distances: np.ndarray, scale: np.ndarray, freedom: np.ndarray) -> np.
     dimensions, nu = scale.shape[-1], freedom[:, None]
     constant = gammaln((nu + dimensions) / 2) - gammaln(nu / 2) - dimensions / 2 * np.log(nu * np.pi)
     return constant - np.linalg.slogdet(scale)[1][:, None] / 2 - (nu + dimensions) / 2 * np.log1p(distances / nu)
+
+
+@dataclass(frozen=True, eq=False)
+class JointReadings:
+    """Inspections that one program serves; what else their fits drew, such as noise, is drawn with the population.
+
+    Args:
+        posterior: Of a single fit of them.
+        names: Of its parameters those that are pooled, each with its place among the coefficients.
+        rows: Which inspections they are, by number.
+        data: Of each, what `posterior.data` is.
+    """
+
+    posterior: LogDensity
+    names: Mapping[str, int]
+    rows: tuple[int, ...]
+    data: tuple[Any, ...]
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Places of the parameters that are not pooled, among all that are free."""
+        return tuple(i for i, p in enumerate(self.posterior.model.space.free) if p.name not in self.names)
+
+    @property
+    def size(self) -> int:
+        """Numbers that are drawn of all of them beside their coefficients."""
+        return len(self.rows) * len(self.others)
+
+    def stack(self, where: np.ndarray) -> dict[str, Any]:
+        """Their data as one.
+
+        Args:
+            where: Number of the cable and place among its inspections, of every inspection.
+        """
+        stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *self.data)
+        return {"where": where[list(self.rows)], "counts": np.ones(len(self.rows)), "readings": stacked}
+
+    def log_density(
+        self,
+        at: Float[Array, "cable inspection coefficient"],
+        other_z: Float[Array, " size"],
+        stacked: Mapping[str, Any],
+    ) -> Float[Array, ""]:
+        """Log likelihood of all readings, and log prior of what is not pooled, up to a constant.
+
+        Args:
+            at: Log coefficients at every inspection.
+            rest: z of what is not pooled.
+            given: See `given`.
+        """
+        here = at[stacked["where"][:, 0], stacked["where"][:, 1]]
+        every = jax.vmap(self._log_density_of_one)(here, other_z.reshape(len(self.rows), -1), stacked["readings"])
+        return jnp.sum(jnp.where(stacked["counts"] > 0, every, 0.0)) - jnp.sum(other_z**2) / 2
+
+    def _log_density_of_one(
+        self, logs: Float[Array, " coefficient"], other_z: Float[Array, " other"], data: Any
+    ) -> Float[Array, ""]:
+        free = self.posterior.model.space.free
+        z = jnp.zeros(len(free)).at[np.array(self.others, dtype=int)].set(other_z)
+        for i, p in enumerate(free):
+            if p.name in self.names:
+                z = z.at[i].set(p.prior.unconstrain(jnp.exp(logs[self.names[p.name]]) / p.shown_scale))
+        total = sum((jnp.sum(term) for term in self.posterior.log_likelihoods(z, data).values()), jnp.zeros(()))
+        return jnp.where(jnp.isnan(total), -jnp.inf, total)
+
+
+def without_cables(stacked: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
+    """Data of inspections without those of some cables.
+
+    Args:
+        given: See `JointReadings.given`.
+        cables: By number.
+    """
+    return dict(stacked) | {"counts": stacked["counts"] * ~np.isin(stacked["where"][:, 0], cables)}

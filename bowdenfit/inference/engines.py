@@ -1,0 +1,367 @@
+"""Engines: where many independent pieces of work are done (this machine, a Dask cluster, Slurm, or any executor).
+
+The result of a piece depends on the piece alone, never on the engine, so every engine gives the same results. Client and
+workers must run the same versions of the libraries that compute.
+"""
+
+import platform
+import re
+import shutil
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache, partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.inference.resources import available_cores, start_worker
+from bowdenfit.inputs import refuse_special
+from bowdenfit.words import listed, shown
+
+Work = TypeVar("Work")
+Result = TypeVar("Result")
+Outcome: TypeAlias = tuple[Exception | None, Any]
+_PIECES_PER_WORKER = 2  # pieces that a worker is given at once, so that it need not wait for the next
+_PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
+_MOST_ATTEMPTS = 3  # that a piece is tried when workers die of it
+ENGINES = "local, dask://HOST:PORT or slurm"
+DATASETS_PER_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
+JOBS_FOLDER = "jobs"  # folder in which Slurm's jobs write
+_DEFAULT_JOBS = 16  # jobs of Slurm, if nothing else is said
+_CONNECT_SECONDS, _WORKER_SECONDS = 10, 60  # seconds
+_JOB_MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
+VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
+
+
+class EngineError(BowdenfitError):
+    """Workers died, or a cluster cannot be reached, though the request was good."""
+
+
+@dataclass
+class Engine(Generic[Work, Result]):
+    """An executor, and how it is used.
+
+    Args:
+        executor: Makes the executor; called again when it is broken.
+        workers: How many pieces are done at a time.
+        name: In words.
+        most: Data sets of a piece; few, so that little is lost when it is interrupted, or many where starting costs much.
+        check: Called where nothing was done for a while; raises if nothing can be.
+        begun: The executor in use.
+    """
+
+    executor: Callable[[], Executor]
+    workers: int
+    name: str
+    max_datasets: int = 128
+    check: Callable[[], None] = lambda: None
+    running: Executor | None = field(default=None, init=False)
+
+    def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
+        """What a function gives of every piece, in the order in which they are done.
+
+        Args:
+            function: Of one piece; known to workers by its name.
+            pieces: The work.
+
+        Raises:
+            BowdenfitError: What the function refuses.
+            EngineError: Workers die of the same piece again and again, or are lost.
+        """
+        left = [(piece, 1) for piece in reversed(pieces)]
+        in_flight: dict[Future[Outcome], tuple[Work, int]] = {}
+        try:
+            while left or in_flight:
+                while left and len(in_flight) < _PIECES_PER_WORKER * self.workers:
+                    in_flight[self._submit(function, left[-1][0])] = left[-1]
+                    left.pop()
+                done, _ = wait(in_flight, _PATIENCE, FIRST_COMPLETED)
+                if not done:
+                    self.check()
+                for future in done:
+                    piece, attempts = in_flight.pop(future)
+                    try:
+                        refused, result = future.result()
+                    except (
+                        Exception,
+                        CancelledError,
+                    ) as error:  # of the engine: what the function raises is in the outcome
+                        self.check()
+                        left.append((piece, self._count_attempt(attempts, error)))
+                        continue
+                    if refused is not None:
+                        raise refused
+                    yield result
+        except EngineError:
+            in_flight.clear()  # nobody is left who could be told to stop
+            raise
+        finally:
+            for future in in_flight:
+                future.cancel()
+
+    def _submit(self, function: Callable[[Work], Result], piece: Work) -> "Future[Outcome]":
+        if self.running is None:
+            self.running = self.executor()
+        try:
+            return self.running.submit(run_piece, function, piece)
+        except BrokenExecutor:
+            self.close()
+            self.running = self.executor()
+            return self.running.submit(run_piece, function, piece)
+        except Exception as error:
+            self.check()
+            why = f"{type(error).__name__}: {error}"
+            raise EngineError(
+                f"{self.name} takes no more work ({why}); start it again, and go on with --resume."
+            ) from None
+
+    def _count_attempt(self, attempts: int, error: Exception) -> int:
+        """How often a piece will have been tried, if it may be tried again."""
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        if isinstance(error, ImportError | AttributeError):
+            raise EngineError(
+                f"a worker of {self.name} cannot load what it is to do ({why}); install the same bowdenfit there as here."
+            ) from None
+        if attempts >= _MOST_ATTEMPTS:
+            raise EngineError(
+                f"workers of {self.name} were lost {attempts} times at the same work ({why}); the usual cause is too little "
+                "memory: give each worker more, or have fewer of them."
+            ) from None
+        return attempts + 1
+
+    def close(self) -> None:
+        """End what was begun."""
+        if self.running is not None:
+            self.running.shutdown(wait=False, cancel_futures=True)
+            self.running = None
+
+
+def run_piece(function: Callable[[Any], Any], piece: Any) -> Outcome:
+    """What a function gives, or what it raises, so that no engine can take it for a fault of its own.
+
+    Args:
+        function: Of one piece.
+        piece: The work.
+    """
+    try:
+        return None, function(piece)
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return error, None
+
+
+class InThisProcess(Engine[Work, Result]):
+    """One piece after the other, here."""
+
+    def __init__(self) -> None:
+        super().__init__(lambda: ThreadPoolExecutor(1), 1, "this process")
+
+    def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
+        """See `Engine`."""
+        return map(function, pieces)
+
+
+def make_waiting_executor(submit: Callable[..., Any], most: int) -> Executor:
+    """An executor of something that waits for its own answer.
+
+    Args:
+        submit: Does a piece somewhere else, and waits.
+        most: Pieces at once.
+    """
+
+    class Waiting(ThreadPoolExecutor):
+        def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
+            return super().submit(submit, function, *arguments, **named)
+
+    return Waiting(most)
+
+
+@contextmanager
+def open_engine(
+    engine: str | Executor,
+    workers: int | None = None,
+    folder: Path | None = None,
+    processes: int = 1,
+) -> Iterator[Engine[Any, Any]]:
+    """An engine, which ends with what is done inside.
+
+    Args:
+        engine: Its name, or an executor of one's own, which is left open.
+        workers: Processes here, or jobs at a time.
+        folder: Where Slurm's jobs write; asked for by that alone.
+        processes: Processes of this machine that "local" uses; with more than one, programs begin with
+            `if __name__ == "__main__"`, as with everything that starts processes.
+
+    Raises:
+        UsageError: There is no such engine, or it is not installed.
+        EngineError: It does not answer.
+    """
+    if isinstance(engine, Executor):
+        yield Engine(lambda: engine, workers or available_cores(), "the executor")
+        return
+    opened: Engine[Any, Any]
+    if engine == "local":
+        opened = (
+            InThisProcess()
+            if processes == 1
+            else Engine(partial(_make_process_pool, processes), processes, "this machine")
+        )
+    elif engine.startswith("dask://"):
+        address = engine.removeprefix("dask://")
+        with _dask_client(address) as (client, count):
+            check = partial(_refuse_no_workers, client, address)
+            yield Engine(lambda: client.get_executor(pure=False), count, engine, check=check)
+        return
+    elif engine == "slurm":
+        if folder is None:
+            raise UsageError("--engine slurm needs a folder that all its nodes see; name it with --output.")
+        if shutil.which("srun") is None:
+            raise _slurm_missing_error()
+        opened = Engine(
+            partial(make_slurm_executor, folder, workers or _DEFAULT_JOBS),
+            workers or _DEFAULT_JOBS,
+            "slurm",
+            DATASETS_PER_JOB,
+        )
+    else:
+        raise UsageError(f"there is no engine {shown(engine)}; known here: {ENGINES}.")
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def _make_process_pool(count: int) -> Executor:
+    return ProcessPoolExecutor(count, get_context("spawn"), start_worker)
+
+
+@contextmanager
+def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
+    """A client of a Dask cluster that answers, and how many pieces its workers do at once."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise _library_missing_error("distributed") from None
+    try:
+        client = Client(f"tcp://{address}", timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
+        raise EngineError(
+            f"the scheduler at {shown(address)} does not answer ({type(error).__name__}); start it with `dask scheduler`, and "
+            "write the address that it prints behind tcp:// as --engine dask://HOST:PORT."
+        ) from None
+    try:
+        _refuse_no_workers(client, address)
+        yield client, max(sum(client.nthreads().values()), 1)
+    finally:
+        client.close()
+
+
+def _refuse_no_workers(client: Any, address: str) -> None:
+    """Wait for a worker, but not for ever.
+
+    Raises:
+        EngineError: There is none, or the scheduler is gone.
+    """
+    try:
+        client.wait_for_workers(1, timeout=_WORKER_SECONDS)
+    except TimeoutError:
+        raise EngineError(
+            f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`. What is done is "
+            "kept where there is a results folder, and goes on with --resume."
+        ) from None
+    except Exception as error:  # of whatever kind: a client whose scheduler is gone says so in several ways
+        raise EngineError(
+            f"the scheduler at {shown(address)} is gone ({type(error).__name__}); start it and its workers again. What is done "
+            "is kept where there is a results folder, and goes on with --resume."
+        ) from None
+
+
+def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
+    """An executor of Slurm's jobs, or of processes here that stand for them.
+
+    Args:
+        folder: Where they write; all nodes must see it.
+        jobs: At a time.
+        cluster: "slurm", or "local" for processes here.
+
+    Raises:
+        UsageError: submitit is not installed, or there is no Slurm here.
+    """
+    try:
+        import submitit
+    except ImportError:
+        raise _library_missing_error("submitit") from None
+    refuse_special(folder)
+    try:
+        inner = submitit.AutoExecutor(folder.resolve(), cluster=cluster)
+    except RuntimeError:
+        raise _slurm_missing_error() from None
+    inner.update_parameters(timeout_min=_JOB_MINUTES, name="bowdenfit")
+
+    def submit(function: Callable[..., Any], *arguments: Any) -> Any:
+        return inner.submit(function, *arguments).result()
+
+    return make_waiting_executor(submit, jobs)
+
+
+def _slurm_missing_error() -> UsageError:
+    return UsageError(
+        "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
+    )
+
+
+def _library_missing_error(library: str) -> UsageError:
+    return UsageError(f"this engine needs {library}, which is not installed; install bowdenfit[cluster].")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Of bowdenfit, Python and the libraries that computed."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    def version_of(package: str) -> str:
+        try:
+            installed = distribution(package)
+        except PackageNotFoundError:
+            return "(not installed)"
+        stated = re.search(
+            r"^Version: (.+)$", installed.read_text("METADATA") or "", re.MULTILINE
+        )  # parsing all takes longer
+        return stated[1] if stated else installed.version
+
+    return {package: version_of(package) for package in VERSIONED} | {"python": platform.python_version()}
+
+
+def refuse_other_versions(of_client: dict[str, str]) -> None:
+    """Refuse work of a program that is not the same as here, whose draws could be others.
+
+    Args:
+        of_client: Versions where the work comes from.
+
+    Raises:
+        UsageError: Some differ.
+    """
+    here = versions()
+    differing = [
+        f"{name} {here.get(name, '(not installed)')} (here {version})"
+        for name, version in of_client.items()
+        if here.get(name) != version
+    ]
+    if differing:
+        raise UsageError(
+            f"a worker has other versions: {listed(differing)}. Draws must not depend on who makes them: install the same "
+            "versions on all workers as here, such as from constraints.txt."
+        )

@@ -1,1 +1,0 @@
-"""Who works: this process, more processes here, or a cluster. The seam is `concurrent.futures.Executor`."""

@@ -26,7 +26,7 @@ from typing import Annotated, Any, ForwardRef, Literal, TypeAlias, TypeVar, cast
 
 from cyclopts import Parameter
 
-from bowdenfit.errors import UsageError, nearest
+from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.words import shown
 
 NumberWithUnit: TypeAlias = tuple[float, str]
@@ -51,7 +51,7 @@ class Reader:
     """
 
     read: Callable[[Any, str], Any]
-    written: Any = str
+    command_line_type: Any = str
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,10 @@ def parameters_of(function: Callable[..., Any]) -> dict[str, Declared]:
         (record,) = get_args(parameters.pop("reading").annotation)
         hints = get_type_hints(record, include_extras=True)
         parameters |= {name: Stated(name, Stated.KEYWORD_ONLY, annotation=hint, default=None) for name, hint in hints.items()}
-    return {name: _declared(each) for name, each in parameters.items()}
+    return {name: _read_declaration(declared) for name, declared in parameters.items()}
 
 
-def _declared(parameter: Stated) -> Declared:
+def _read_declaration(parameter: Stated) -> Declared:
     is_annotated = get_origin(parameter.annotation) is Annotated
     type_, *marks = get_args(parameter.annotation) if is_annotated else (parameter.annotation,)
     type_ = type_.__forward_arg__ if isinstance(type_, ForwardRef) else type_
@@ -99,7 +99,7 @@ def _declared(parameter: Stated) -> Declared:
     return Declared(parameter.replace(annotation=type_, default=default), reader, option)
 
 
-def checked(function: Function) -> Function:
+def read_first(function: Function) -> Function:
     """Return a function that reads its arguments first, as their annotations say.
 
     Its signature is the one that help and notebooks show: plain types, and each keyword of a record by name.
@@ -133,15 +133,15 @@ def read_arguments(function: Callable[..., Any], arguments: Mapping[str, Any], t
     parameters, values = parameters_of(function), dict(arguments)
     for name, value in arguments.items():
         if name not in parameters:
-            raise UsageError(f"there is no keyword {name!r}{nearest(name, list(parameters))}")
+            raise UsageError(f"there is no keyword {name!r}{suggest_name(name, list(parameters))}")
         declared = parameters[name]
         if value is not declared.plain.default:
             called = declared.written_name if typed else name
-            values[name] = declared.reader.read(value, called) if declared.reader else _validated(declared.type, value, called)
+            values[name] = declared.reader.read(value, called) if declared.reader else _validate(declared.type, value, called)
     return values
 
 
-def _validated(type_: Any, value: Any, name: str) -> Any:
+def _validate(type_: Any, value: Any, name: str) -> Any:
     """A value of a type, as pydantic has it."""
     from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -158,15 +158,15 @@ def _validated(type_: Any, value: Any, name: str) -> Any:
 def number_with_unit(example: str) -> Reader:
     """Return what reads a number with its unit, such as the example."""
 
-    def read(written: Any, name: str) -> NumberWithUnit:
-        if isinstance(written, str):
-            return read_quantity(written, name, example)
-        if _is_number_with_unit(written) and math.isfinite(written[0]):
-            return float(written[0]), written[1]
+    def read(value: Any, name: str) -> NumberWithUnit:
+        if isinstance(value, str):
+            return read_quantity(value, name, example)
+        if _is_number_with_unit(value) and math.isfinite(value[0]):
+            return float(value[0]), value[1]
         value, unit = read_quantity(example, name, example)
         example_pair = f"({value:g}, {unit!r})"
         raise UsageError(
-            f"{name} = {shown(written)} is not a number with its unit; write it as {example!r}, or as {example_pair}."
+            f"{name} = {shown(value)} is not a number with its unit; write it as {example!r}, or as {example_pair}."
         )
 
     return Reader(read)
@@ -175,7 +175,7 @@ def number_with_unit(example: str) -> Reader:
 def numbers_with_units(example: str) -> Reader:
     """Return what reads numbers with their units, or one by itself, such as the example."""
     read = number_with_unit(example).read
-    return Reader(lambda written, name: [read(each, name) for each in _several(written)], list[str])
+    return Reader(lambda value, name: [read(item, name) for item in _as_list(value)], list[str])
 
 
 def numbers_by_name(example: str) -> Reader:
@@ -188,8 +188,8 @@ def numbers_by_name(example: str) -> Reader:
         return key.strip(), float(number)
 
     return Reader(
-        lambda written, name: dict(
-            written if isinstance(written, Mapping) else [read(each, name) for each in _read_texts(written, name)]
+        lambda value, name: dict(
+            value if isinstance(value, Mapping) else [read(text, name) for text in _read_texts(value, name)]
         ),
         list[str],
     )
@@ -198,85 +198,86 @@ def numbers_by_name(example: str) -> Reader:
 def whole_number(least: int, most: float = math.inf) -> Reader:
     """Return what reads a whole number between limits."""
 
-    def read(written: Any, name: str) -> int:
-        is_whole = isinstance(written, Integral) and not isinstance(written, bool)
-        is_text = isinstance(written, str) and _WHOLE.fullmatch(written)
-        if (is_whole or is_text) and least <= int(written) <= most:
-            return int(written)
+    def read(value: Any, name: str) -> int:
+        is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+        is_text = isinstance(value, str) and _WHOLE.fullmatch(value)
+        if (is_whole or is_text) and least <= int(value) <= most:
+            return int(value)
         limits = f" from {least}" + (f" to {most}" if most < math.inf else "")
-        raise UsageError(f"{name} = {shown(written)} is no whole number{limits}; write one.")
+        raise UsageError(f"{name} = {shown(value)} is no whole number{limits}; write one.")
 
     return Reader(read)
 
 
-def _several(written: Any) -> list[Any]:
+def _as_list(value: Any) -> list[Any]:
     """What was written, one by one; a text and a number with its unit are one."""
-    is_one = isinstance(written, str) or _is_number_with_unit(written) or not isinstance(written, Iterable)
-    return [written] if is_one else list(written)
+    is_one = isinstance(value, str) or _is_number_with_unit(value) or not isinstance(value, Iterable)
+    return [value] if is_one else list(value)
 
 
-def _is_number_with_unit(written: Any) -> bool:
-    is_pair = isinstance(written, tuple | list) and len(written) == 2
-    return is_pair and isinstance(written[0], Real) and isinstance(written[1], str)
+def _is_number_with_unit(value: Any) -> bool:
+    is_pair = isinstance(value, tuple | list) and len(value) == 2
+    return is_pair and isinstance(value[0], Real) and isinstance(value[1], str)
 
 
-def _read_lengths(written: Any, name: str) -> list[float | NumberWithUnit]:
-    lengths = _several(written)
+def _read_lengths(value: Any, name: str) -> list[float | NumberWithUnit]:
+    lengths = _as_list(value)
     if not lengths:
-        raise UsageError(f"{name} = {shown(written)} names no length; name some, or leave it out where all are meant.")
-    if not all(isinstance(each, str | Real) or _is_number_with_unit(each) for each in lengths):
-        raise UsageError(f"{name} = {shown(written)} are no lengths; write them as [455, 470], or ['18 in'].")
-    if all(isinstance(each, str) for each in lengths):  # of which a unit may be one by itself
+        raise UsageError(f"{name} = {shown(value)} names no length; name some, or leave it out where all are meant.")
+    if not all(isinstance(item, str | Real) or _is_number_with_unit(item) for item in lengths):
+        raise UsageError(f"{name} = {shown(value)} are no lengths; write them as [455, 470], or ['18 in'].")
+    if all(isinstance(item, str) for item in lengths):  # of which a unit may be one by itself
         return read_lengths(lengths, name)
-    return [one for each in lengths for one in (read_lengths([each], name) if isinstance(each, str) else [_length(each)])]
+    read = [read_lengths([item], name) if isinstance(item, str) else [_number_or_pair(item)] for item in lengths]
+    return [length for some in read for length in some]
 
 
-def _length(written: Any) -> float | NumberWithUnit:
-    return float(written) if isinstance(written, Real) else (float(written[0]), written[1])
+def _number_or_pair(value: Any) -> float | NumberWithUnit:
+    return float(value) if isinstance(value, Real) else (float(value[0]), value[1])
 
 
-def _read_texts(written: Any, name: str) -> Sequence[str]:
-    texts = tuple(_several(written))
-    if isinstance(written, Mapping) or not all(isinstance(text, str) for text in texts):
-        raise UsageError(f"{name} = {shown(written)} is no list of texts; write it as ['name=value'].")
+def _read_texts(value: Any, name: str) -> Sequence[str]:
+    texts = tuple(_as_list(value))
+    if isinstance(value, Mapping) or not all(isinstance(text, str) for text in texts):
+        raise UsageError(f"{name} = {shown(value)} is no list of texts; write it as ['name=value'].")
     return texts
 
 
-def _read_place(written: Any, name: str) -> Any:
+def _read_path(value: Any, name: str) -> Any:
     """Return a path, or what was read from one, which is nothing that Python itself has."""
-    if isinstance(written, Number | bytes | list | tuple | dict | NoneType):
-        refusal = f"{name} = {shown(written)} is neither a path nor what bowdenfit has read; write it as 'my-cable'."
+    if isinstance(value, Number | bytes | list | tuple | dict | NoneType):
+        refusal = f"{name} = {shown(value)} is neither a path nor what bowdenfit has read; write it as 'my-cable'."
         raise UsageError(refusal)
-    return Path(written) if isinstance(written, str) else written
+    return Path(value) if isinstance(value, str) else value
 
 
-def _read_fit(written: Any, name: str) -> Any:
-    if isinstance(written, str | PathLike):
-        raise UsageError(f"{name} is the fit itself; write bowdenfit.load({str(written)!r}) instead of the folder's name.")
-    return _read_place(written, name)
+def _read_fit(value: Any, name: str) -> Any:
+    if isinstance(value, str | PathLike):
+        raise UsageError(f"{name} is the fit itself; write bowdenfit.load({str(value)!r}) instead of the folder's name.")
+    return _read_path(value, name)
 
 
-def _read_fits(written: Any, name: str) -> dict[str, Any]:
-    if not isinstance(written, Mapping):
+def _read_fits(value: Any, name: str) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
         raise UsageError(f"{name} are the fits by names of yours; write them as {{'one': fit, 'another': other}}.")
-    return {key: _read_fit(fit, f"{name}[{key!r}]") for key, fit in written.items()}
+    return {key: _read_fit(fit, f"{name}[{key!r}]") for key, fit in value.items()}
 
 
-def measured(quantity: Quantity | None) -> NumberWithUnit | None:
+def as_pair(quantity: Quantity | None) -> NumberWithUnit | None:
     """Return a quantity that `checked` has read, which is no text any more, as type checkers cannot know."""
     assert not isinstance(quantity, str)
     return quantity
 
 
 LENGTHS, TEXTS = Reader(_read_lengths, list[str]), Reader(_read_texts, list[str])
-PLACE = Reader(_read_place, Path)  # a path, or what was read from it
+PATH = Reader(_read_path, Path)  # a path, or what was read from it
 FIT, FITS = Reader(_read_fit, Path), Reader(_read_fits, list[Path])  # of which the command line names the results folders
 HIDDEN = Parameter(parse=False)  # for programs alone
 DATASET = Parameter(
     "DATASET", help="Such as my-cable, a folder with a cable.toml, which `bowdenfit init my-cable` begins."
 )
 RESULTS = Parameter("RESULTS", help="Such as fits/my-cable, which `bowdenfit fit my-cable` writes.")
-Output: TypeAlias = Annotated[str | Path | None, Parameter(alias="-o", metavar="FOLDER"), PLACE]
+Output: TypeAlias = Annotated[str | Path | None, Parameter(alias="-o", metavar="FOLDER"), PATH]
 Seed: TypeAlias = Annotated[int | None, Parameter(metavar="NUMBER"), whole_number(0, LARGEST_SEED)]
 Bends: TypeAlias = Annotated[
     str | tuple[NumberWithUnit, NumberWithUnit] | None,

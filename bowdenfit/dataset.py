@@ -153,7 +153,7 @@ def read_dataset(
         settings = description.tables.stated.get(kind.name)
         if settings is None:
             continue
-        with faults.noted():
+        with faults.collect():
             read = kind.read(Source(kind.name, settings, description, folder, channels or {}))
             remarks = (*(remark for account in read.accounts for remark in account.remarks), *read.remarks)
             measurements = Measurements((*measurements.tables, read.table), (*measurements.remarks, *remarks))
@@ -164,12 +164,12 @@ def read_dataset(
         raise DescriptionError(
             "--channel names channels of recordings, but the data set has none; a column of a table is named by --column."
         )
-    with faults.noted():
+    with faults.collect():
         check_names(description)
-    with faults.noted():
+    with faults.collect():
         measured_groups(description, measurements)
     for kind, table in each_table(measurements):
-        with faults.noted():
+        with faults.collect():
             kind.check(table, description, measurements)
     faults.refuse()
     return Dataset(description, measurements, checksums, accounts)

@@ -31,7 +31,7 @@ class Display:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not name.startswith("_"):
-                vars(self)[name] = several(value)
+                vars(self)[name] = make_displayable(value)
 
     def sentences(self) -> Sequence[str]:
         """What it says, the answer first."""
@@ -64,7 +64,7 @@ class Display:
         return text_of(self).strip()
 
     def __repr__(self) -> str:
-        return shortened(str(self))
+        return shorten_lines(str(self))
 
     def _repr_html_(self) -> str:
         return as_html(str(self))
@@ -78,7 +78,7 @@ class Part(Display):
         return [inspect.cleandoc(self.__doc__ or "").partition("\n")[0]]
 
     def _table(self) -> Rows:
-        return [{"field": name, "value": in_short(value)} for name, value in _public(self).items()], {}
+        return [{"field": name, "value": abbreviate(value)} for name, value in _public_fields(self).items()], {}
 
 
 class Several(Display, tuple[Item, ...]):
@@ -89,7 +89,7 @@ class Several(Display, tuple[Item, ...]):
         return [f"{len(self)} in all."]
 
     def _table(self) -> Rows:
-        return _alike([_public(each) for each in self]), {}
+        return _align_columns([_public_fields(item) for item in self]), {}
 
 
 class Named(Display, dict[str, Item]):
@@ -100,43 +100,43 @@ class Named(Display, dict[str, Item]):
         return [f"{len(self)} in all: {few(map(str, self))}."]
 
     def _table(self) -> Rows:
-        rows = _alike([_public(each) for each in self.values()])
+        rows = _align_columns([_public_fields(item) for item in self.values()])
         return [{"name": name} | row for name, row in zip(self, rows, strict=True)], {}
 
 
-def several(value: Any) -> Any:
+def make_displayable(value: Any) -> Any:
     """Tuples of more than a few and dictionaries as what shows itself; anything else as it is."""
     if type(value) is dict:
-        return Named({name: several(each) for name, each in value.items()})
-    if type(value) is tuple and (len(value) > _FEW or any(hasattr(each, "__dict__") for each in value)):
-        return Several(map(several, value))
+        return Named({name: make_displayable(item) for name, item in value.items()})
+    if type(value) is tuple and (len(value) > _FEW or any(hasattr(item, "__dict__") for item in value)):
+        return Several(map(make_displayable, value))
     return value
 
 
-def in_short(value: Any) -> str:
+def abbreviate(value: Any) -> str:
     """A value in a few words."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if hasattr(value, "shape") and not isinstance(value, str):  # a string of NumPy's has one
         return f"array of {' x '.join(map(str, value.shape)) or 'one number'}"
     if isinstance(value, Sequence | Mapping) and not isinstance(value, str):
-        return f"{len(value)} in all" if len(value) > _FEW else ", ".join(map(in_short, value))
+        return f"{len(value)} in all" if len(value) > _FEW else ", ".join(map(abbreviate, value))
     text = type(value).__name__ if hasattr(value, "__dict__") else "" if value is None else str(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
-def _public(value: Any) -> dict[str, Any]:
+def _public_fields(value: Any) -> dict[str, Any]:
     """Fields of a value, or itself."""
     if isinstance(value, Mapping):
-        return {str(name): each for name, each in value.items()}
+        return {str(name): item for name, item in value.items()}
     if isinstance(value, Sequence) or not hasattr(value, "__dict__"):
         return {"value": value}
-    return {name: each for name, each in vars(value).items() if not name.startswith("_")}
+    return {name: item for name, item in vars(value).items() if not name.startswith("_")}
 
 
-def _alike(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _align_columns(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows as they are where all have the same columns, else in short."""
-    return rows if len({tuple(row) for row in rows}) <= 1 else [{"value": in_short(row)} for row in rows]
+    return rows if len({tuple(row) for row in rows}) <= 1 else [{"value": abbreviate(row)} for row in rows]
 
 
 def _with_unit(name: str, units: Mapping[str, str]) -> str:
@@ -174,16 +174,16 @@ def _csv_cell(value: object) -> str:
 def text_of(result: Any) -> str:
     """All that a result says in words; its sentences and its table where nothing else is registered."""
     rows, units = result._table()
-    said = "\n".join(filled(sentence) for sentence in result.sentences())
-    if isinstance(rows, Mapping) or not (shown := list(rows)):
-        return said
-    heads = [f"{name} ({units[name]})" if units.get(name, "1") != "1" else name for name in shown[0]]
-    cells = [[in_short(value) for value in row.values()] for row in shown[:_SHOWN]]
-    more = f"\n... and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
-    return "\n\n".join(part for part in (said, table(heads, cells) + more) if part)
+    sentences = "\n".join(filled(sentence) for sentence in result.sentences())
+    if isinstance(rows, Mapping) or not (listed := list(rows)):
+        return sentences
+    heads = [f"{name} ({units[name]})" if units.get(name, "1") != "1" else name for name in listed[0]]
+    cells = [[abbreviate(value) for value in row.values()] for row in listed[:_SHOWN]]
+    more = f"\n... and {len(listed) - _SHOWN} more" if len(listed) > _SHOWN else ""
+    return "\n\n".join(part for part in (sentences, table(heads, cells) + more) if part)
 
 
-def shortened(text: str) -> str:
+def shorten_lines(text: str) -> str:
     """The first lines of a text; the last one says how to see the rest."""
     lines = [line if len(line) <= _WIDTH else f"{line[: _WIDTH - 4]} ..." for line in text.splitlines()]
     if len(lines) <= _LINES:

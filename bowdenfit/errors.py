@@ -11,7 +11,7 @@ from typing import TypeVar
 from bowdenfit.words import printable
 
 Value = TypeVar("Value")
-Given = TypeVar("Given")
+Item = TypeVar("Item")
 
 MEMORY_RAN_OUT = "memory ran out; close other programs, or run this where there is more of it."
 _LONGEST = 200  # characters of a file's name in a message
@@ -28,9 +28,9 @@ class BowdenfitError(Exception):
 
     exit_code = 1
     faults: "tuple[BowdenfitError, ...]" = ()
-    alike: Hashable = None
+    fault_key: Hashable = None
     row: int = 0
-    place: tuple[str | int, ...] = ()
+    key_path: tuple[str | int, ...] = ()
 
     def __str__(self) -> str:
         """What a library's user reads too: names of files in it steer no terminal, and break no line."""
@@ -88,26 +88,26 @@ class Faults:
         found: The faults.
     """
 
-    found: list[BowdenfitError] = field(default_factory=list)
+    faults: list[BowdenfitError] = field(default_factory=list)
 
     @contextmanager
-    def noted(self, place: tuple[str | int, ...] = ()) -> Iterator[None]:
+    def collect(self, key_path: tuple[str | int, ...] = ()) -> Iterator[None]:
         """Whatever is refused inside is noted, of a place in a description, and what comes behind it is done."""
         try:
             yield
         except (DatasetError, DescriptionError) as error:
             for fault in error.faults or (error,):
-                fault.place = fault.place or place
-                self.found.append(fault)
+                fault.key_path = fault.key_path or key_path
+                self.faults.append(fault)
 
-    def each(self, read: Callable[[Given], Value], given: Iterable[Given], otherwise: Value) -> list[Value]:
+    def read_all(self, read: Callable[[Item], Value], items: Iterable[Item], otherwise: Value) -> list[Value]:
         """All that is given, read one by one, with `otherwise` in place of what is refused."""
         values = []
-        for one in given:
+        for item in items:
             try:
-                values.append(read(one))
+                values.append(read(item))
             except (DatasetError, DescriptionError) as error:
-                self.found.append(error)
+                self.faults.append(error)
                 values.append(otherwise)
         return values
 
@@ -117,23 +117,23 @@ class Faults:
         Raises:
             BowdenfitError: Of the type of the first fault.
         """
-        if self.found:
-            raise together(self.found)
+        if self.faults:
+            raise combine_errors(self.faults)
 
 
-def together(found: Sequence[BowdenfitError]) -> BowdenfitError:
+def combine_errors(errors: Sequence[BowdenfitError]) -> BowdenfitError:
     """One error that says all faults, a sentence each; the same in several rows is said once, with the rows."""
-    every = tuple(fault for error in found for fault in error.faults or (error,))
+    faults = tuple(fault for error in errors for fault in error.faults or (error,))
     kinds: dict[Hashable, list[BowdenfitError]] = {}
-    for fault in every:
-        kinds.setdefault(fault.alike or str(fault), []).append(fault)
-    said = [_with_rows(faults) for faults in kinds.values()]
-    if len(every) == 1:
-        return every[0]
-    more = [f"- and {len(said) - _MOST_FAULTS} more."] if len(said) > _MOST_FAULTS else []
-    lines = [f"{len(said)} things are wrong:", *(f"- {sentence}" for sentence in said[:_MOST_FAULTS]), *more]
-    error = type(every[0])("\n".join(lines) if len(said) > 1 else said[0])
-    error.faults = every
+    for fault in faults:
+        kinds.setdefault(fault.fault_key or str(fault), []).append(fault)
+    sentences = [_with_rows(faults) for faults in kinds.values()]
+    if len(faults) == 1:
+        return faults[0]
+    more = [f"- and {len(sentences) - _MOST_FAULTS} more."] if len(sentences) > _MOST_FAULTS else []
+    lines = [f"{len(sentences)} things are wrong:", *(f"- {sentence}" for sentence in sentences[:_MOST_FAULTS]), *more]
+    error = type(faults[0])("\n".join(lines) if len(sentences) > 1 else sentences[0])
+    error.faults = faults
     return error
 
 
@@ -181,7 +181,7 @@ def system_error(error: BaseException) -> BowdenfitError | None:
     )
 
 
-def nearest(name: str, known: Sequence[str]) -> str:
+def suggest_name(name: str, known: Sequence[str]) -> str:
     """End of a sentence about an unknown name: the nearest known one as a question, or what there is."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}."

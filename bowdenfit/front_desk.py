@@ -88,10 +88,10 @@ class Fit(Record):
 
     def _table(self) -> Rows:
         """A row a parameter: draws beside least squares; priors and meanings are the model's."""
-        drawn, squares = drawn_intervals(self), self.least_squares.estimates
+        posterior, squares = drawn_intervals(self), self.least_squares.estimates
         rows = [
             {"parameter": p.name}
-            | (vars(drawn[p.name]) if p.name in drawn else {})
+            | (vars(posterior[p.name]) if p.name in posterior else {})
             | ({"least_squares": squares[p.name].value} if p.name in squares else {})
             for p in self.model.space.parameters
         ]

@@ -13,8 +13,8 @@ def as_html(text: str) -> str:
     title, _, body = text.strip().partition("\n")
     ruler, _, below = body.partition("\n")
     is_titled = bool(_TITLE.fullmatch(ruler))
-    first, rest = _first_sentence(below if is_titled else text.strip())
-    blocks = [_block(block.splitlines()) for block in rest.strip("\n").split("\n\n") if block]
+    first, body_text = _first_sentence(below if is_titled else text.strip())
+    blocks = [_block(block.splitlines()) for block in body_text.strip("\n").split("\n\n") if block]
     return f"{f'<h4>{escape(title)}</h4>' if is_titled else ''}<p><b>{escape(first)}</b></p>{''.join(blocks)}"
 
 
@@ -50,7 +50,7 @@ def _cells(lines: list[str]) -> list[list[str]]:
     """Cells of columns that two blanks or more divide in every line."""
     width = max(map(len, lines))
     covered = "".join(" " if all(line[i : i + 1].isspace() or i >= len(line) for line in lines) else "x" for i in range(width))
-    starts = [0, *(found.end() for found in _COLUMNS.finditer(covered) if found.start() and found.end() < width)]
+    starts = [0, *(gap.end() for gap in _COLUMNS.finditer(covered) if gap.start() and gap.end() < width)]
     return [[line[a:b].strip() for a, b in zip(starts, [*starts[1:], width], strict=True)] for line in lines]
 
 

@@ -21,7 +21,7 @@ from bowdenfit.description import (
     UniformPrior,
 )
 from bowdenfit.display import Display, Rows
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.errors import DescriptionError, suggest_name
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.measured_cable import measured_cable
 from bowdenfit.kinds.measurements import Measurements
@@ -91,10 +91,10 @@ def _build_space(cable: Cable, measurements: Measurements) -> ParameterSpace:
     known = [p.name for p in parameters]
     for name in description.friction:
         if name not in known and name not in description.coefficients:
-            raise DescriptionError(f"cable.toml, friction.{name}: no such coefficient{nearest(name, cable.coefficients)}")
+            raise DescriptionError(f"cable.toml, friction.{name}: no such coefficient{suggest_name(name, cable.coefficients)}")
     for name in description.prior:
         if name not in known or name in cable.coefficients:
-            hint = f"; friction coefficients belong under [friction.{name}]." if name in known else nearest(name, known)
+            hint = f"; friction coefficients belong under [friction.{name}]." if name in known else suggest_name(name, known)
             raise DescriptionError(f"cable.toml, prior.{name}: no such parameter{hint}")
     of_groups = {name: split_coefficient(name, description.coefficients)[0] for name in cable.coefficients}
     settings: dict[str, ParameterSetting] = {

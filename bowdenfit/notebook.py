@@ -10,7 +10,7 @@ from bowdenfit.verb import Watch
 
 
 @contextmanager
-def watched(watch: Watch, report: Callable[..., None] | None) -> Iterator[Callable[..., None] | None]:
+def show_progress_bar(watch: Watch, report: Callable[..., None] | None) -> Iterator[Callable[..., None] | None]:
     """Gives what to call while a verb runs: what its caller wants called, else in a notebook what moves a bar there.
 
     The line is a display of its own and no stream, so that a notebook keeps one line of it; tqdm's own bar for notebooks asks

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, PLACE, TEXTS, Quantity, checked, measured, number_with_unit, whole_number
+from bowdenfit.arguments import DATASET, PATH, TEXTS, Quantity, as_pair, number_with_unit, read_first, whole_number
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -57,8 +57,8 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 }
 
 
-@checked
-def read(dataset: Annotated["str | Path | Dataset", DATASET, PLACE], **reading: Unpack[Reading]) -> "Dataset":
+@read_first
+def read(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: Unpack[Reading]) -> "Dataset":
     """Read and check a data set, without fitting anything.
 
     Args:
@@ -82,7 +82,7 @@ def read(dataset: Annotated["str | Path | Dataset", DATASET, PLACE], **reading: 
     changes = changed_settings(reading)
     sources = parse_channels(reading.get("channels", ()))
     columns = parse_sources(reading.get("columns", ()), "--column")
-    wrap_angle = measured(reading.get("wrap_angle"))
+    wrap_angle = as_pair(reading.get("wrap_angle"))
     with limits_times(reading.get("reading_limit") or 1):
         if wrap_angle is not None or is_lone_file(Path(dataset)):
             return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)

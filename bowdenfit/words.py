@@ -38,9 +38,9 @@ def few(names: Iterable[str], most: int = 3) -> str:
 
     Between names that have commas themselves there are semicolons.
     """
-    every = list(names)
-    rest = [f"{len(every) - most} more"] if len(every) > most else []
-    parts = [*every[:most], *rest]
+    all_names = list(names)
+    more = [f"{len(all_names) - most} more"] if len(all_names) > most else []
+    parts = [*all_names[:most], *more]
     if len(parts) > 1 and any("," in name for name in parts):
         return "; ".join(parts[:-1]) + "; and " + parts[-1]
     return listed(parts)
@@ -134,7 +134,7 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
-def _broken(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[Sequence[str], list[Sequence[str]]]:
+def _break_cells(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[Sequence[str], list[Sequence[str]]]:
     """The same with those cells in several rows for which there is no room beside the first column, or in it."""
     first, *others = (max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads)))
     if first + 2 + max(others, default=0) <= WIDTH:
@@ -153,13 +153,13 @@ def narrow_table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Coll
 
     Cells that are too wide even so are broken into lines.
     """
-    heads, rows = _broken(heads, rows)
+    heads, rows = _break_cells(heads, rows)
     widths = [max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads))]
-    blocks, rest = list[str](), list(range(1, len(heads)))
-    while rest or not blocks:
-        shown, width = [0], widths[0]
-        while rest and (len(shown) == 1 or width + 2 + widths[rest[0]] <= WIDTH):
-            width += 2 + widths[rest[0]]
-            shown.append(rest.pop(0))
-        blocks.append(table([heads[i] for i in shown], [[row[i] for i in shown] for row in rows], left))
+    blocks, remaining = list[str](), list(range(1, len(heads)))
+    while remaining or not blocks:
+        columns, width = [0], widths[0]
+        while remaining and (len(columns) == 1 or width + 2 + widths[remaining[0]] <= WIDTH):
+            width += 2 + widths[remaining[0]]
+            columns.append(remaining.pop(0))
+        blocks.append(table([heads[i] for i in columns], [[row[i] for i in columns] for row in rows], left))
     return "\n\n".join(blocks)

@@ -49,7 +49,7 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained_share
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
 CANDIDATES = tuple(Candidate(kind, at) for kind in ("angle", "efficiency") for at in LENGTHS)
@@ -189,7 +189,7 @@ class Bench:
         return self.programs[shapes]
 
     def _optimum(self, posterior: LogDensity) -> Any:
-        return for_each_draw(optimum_of(posterior.model), posterior.model.space.size)
+        return for_each_draw(make_optimizer(posterior.model), posterior.model.space.size)
 
     def _draws(self, posterior: LogDensity, seed: int) -> np.ndarray:
         """Draws of the posterior by bowdenfit's own sampler."""
@@ -236,7 +236,7 @@ def _origin(n: int) -> RowOrigin:
 
 def _refitted(posterior: LogDensity, extended: LogDensity) -> Callable[..., Any]:
     """Function: draws of the old posterior, weighted by the new reading, then moved by Metropolis steps."""
-    optimum = jax.vmap(optimum_of(posterior.model))
+    optimum = jax.vmap(make_optimizer(posterior.model))
     old, new = (jax.vmap(p.log_density, in_axes=(0, None)) for p in (posterior, extended))
     scale = 2.38 / np.sqrt(posterior.model.space.size)
 

@@ -39,7 +39,7 @@ from bowdenfit.questions.calibrate.replication import RankedTruth
 from bowdenfit.questions.calibrate.truths import StatedTruth, stated_truths
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 from bowdenfit.words import table
 
@@ -175,7 +175,7 @@ def apart(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[s
     kept = [(each, fit) for each, fit in zip(made, laboratory.found, strict=True) if not each.reasons]
     space, held = workbench.stated.space, dict[tuple[str, str], list[Held | None]]()
     with jax.enable_x64(True):
-        optimum = for_each_draw(optimum_of(workbench.stated), space.size)
+        optimum = for_each_draw(make_optimizer(workbench.stated), space.size)
         for each, fit in kept:
             draws = dict(zip((p.name for p in space.free), fit.z.T, strict=True))
             own = {truth.parameter.name: of_range(truth, draws[truth.parameter.name]) for truth in plan.truths}

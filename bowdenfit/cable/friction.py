@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.description import BY_GROUP, PriorDefaults
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.errors import DescriptionError, suggest_name
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Uniform
 from bowdenfit.parameters.space import Parameter, Role
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
@@ -194,7 +194,7 @@ def friction_options(text: str) -> tuple[str, ...]:
     for name in options:
         if name not in FRICTION_OPTIONS:
             known = ["capstan", *FRICTION_OPTIONS]
-            raise DescriptionError(f"the friction model {name!r} is unknown{nearest(name, known)}")
+            raise DescriptionError(f"the friction model {name!r} is unknown{suggest_name(name, known)}")
         if options.count(name) > 1:
             raise DescriptionError(f"the friction model {text!r} names {name!r} twice; once is enough.")
     return options

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from bowdenfit.description import Description
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.errors import DescriptionError, suggest_name
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def check_names(description: Description) -> None:
         for what, name, known in named:
             if name is not None and name not in known:
                 raise DescriptionError(
-                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{nearest(name, known)}"
+                    f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{suggest_name(name, known)}"
                 )
 
 

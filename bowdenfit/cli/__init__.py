@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from cyclopts import CycloptsError
 
-from bowdenfit.cli.commands import refusal
+from bowdenfit.cli.commands import describe_error
 from bowdenfit.cli.interrupts import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.program import bowdenfit
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
@@ -52,10 +52,10 @@ def main() -> None:
         code = run_interruptibly(lambda: bowdenfit(sys.argv[1:])) or (0 if sys.argv[1:] else UsageError.exit_code)
         sys.exit(code)
     except CycloptsError as error:
-        _complain(f"Error: {refusal(error)}")
+        _print_error(f"Error: {describe_error(error)}")
         sys.exit(UsageError.exit_code)
     except BowdenfitError as error:
-        _complain(f"Error: {_NEW_LINE.sub('?', str(error))}")
+        _print_error(f"Error: {_NEW_LINE.sub('?', str(error))}")
         sys.exit(error.exit_code)
     except KeyboardInterrupt as stop:
         _end_interrupted(*stop.args)
@@ -68,27 +68,27 @@ def main() -> None:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is
-        what = f"{type(error).__name__}: {error}".removesuffix(": ")
-        ours = f"something went wrong inside bowdenfit ({what}). {_whose_fault()}"
+        description = f"{type(error).__name__}: {error}".removesuffix(": ")
+        unforeseen = f"something went wrong inside bowdenfit ({description}). {_suggest_remedy()}"
         refused = system_error(error)
-        _complain(f"Error: {refused or ours}")
+        _print_error(f"Error: {refused or unforeseen}")
         sys.exit(refused.exit_code if refused else 1)
 
 
-def _whose_fault() -> str:
+def _suggest_remedy() -> str:
     """What to do about an error that nothing foresaw; what tells libraries what to do, such as a device, may be behind it."""
     report = "please report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
-    every = [name for name, value in os.environ.items() if name.startswith(_OF_LIBRARIES) and (name, value) not in _HARMLESS]
-    if not every:
+    settings = [name for name, value in os.environ.items() if name.startswith(_OF_LIBRARIES) and (name, value) not in _HARMLESS]
+    if not settings:
         return f"This is our fault: {report}"
-    them = "it" if len(every) == 1 else "them"
+    them = "it" if len(settings) == 1 else "them"
     return (
-        f"{few(every)} in the environment may be the cause: unset {them}, and run the command again. If that does not help, "
+        f"{few(settings)} in the environment may be the cause: unset {them}, and run the command again. If that does not help, "
         f"this is our fault: {report}"
     )
 
 
-def _complain(text: str) -> None:
+def _print_error(text: str) -> None:
     """Say what went wrong, where that can be said; the exit code says it in any case."""
     with suppress(OSError):
         say(text, err=True)

@@ -46,25 +46,27 @@ def command(verb: Verb) -> App:
     Args:
         verb: What it does; see `bowdenfit.verb`.
     """
-    written = _written_signature(verb)
+    command_signature = _command_signature(verb)
 
     def run(*arguments: Any, **options: Any) -> int:
-        asked = written.bind(*arguments, **options).arguments
-        forms = [form for form in ("json", "csv") if asked.pop(form, False)]
+        request = command_signature.bind(*arguments, **options).arguments
+        forms = [form for form in ("json", "csv") if request.pop(form, False)]
         if len(forms) == 2:
             raise UsageError("--json and --csv are two forms of the same answer; name one of them.")
-        return _run(verb, asked, "".join(forms))
+        return _run(verb, request, "".join(forms))
 
-    run.__annotations__, vars(run)["__signature__"] = {}, written
+    run.__annotations__, vars(run)["__signature__"] = {}, command_signature
     return App(name=verb.name or verb.function.__name__, help=verb.text, default_command=run, **LOOK)
 
 
-def _written_signature(verb: Verb) -> Signature:
+def _command_signature(verb: Verb) -> Signature:
     """The parameters of a verb's function as they are written, and --csv and --json."""
     described = [*parse(Reading.__doc__ or "").params, *parse(verb.function.__doc__ or "").params]
-    words = {each.arg_name: " ".join((each.description or "").split()) for each in described}
+    words = {parameter.arg_name: " ".join((parameter.description or "").split()) for parameter in described}
     declared = parameters_of(verb.function).items()
-    parameters = [_written(each, words.get(name)) for name, each in declared if each.option.parse is not False]
+    parameters = [
+        _command_parameter(parameter, words.get(name)) for name, parameter in declared if parameter.option.parse is not False
+    ]
     for form, meaning in (("csv", verb.csv), ("json", verb.json)):
         if meaning:
             annotation = Annotated[bool, Parameter(help=meaning)]
@@ -72,14 +74,14 @@ def _written_signature(verb: Verb) -> Signature:
     return Signature(parameters)
 
 
-def _written(declared: Declared, words: str | None) -> Stated:
+def _command_parameter(declared: Declared, words: str | None) -> Stated:
     """A parameter as it is written: by its place if its name is in capitals, else by name; as text if a reader reads it."""
     type_, default = declared.type, declared.plain.default
     about, by_place = [Parameter(help=words)], declared.written_name.isupper()
     kind = Stated.POSITIONAL_ONLY if by_place else Stated.KEYWORD_ONLY
     if declared.reader:
-        type_ = declared.reader.written
-    elif choices := [each for each in (type_, *get_args(type_)) if get_origin(each) is Literal]:
+        type_ = declared.reader.command_line_type
+    elif choices := [part for part in (type_, *get_args(type_)) if get_origin(part) is Literal]:
         type_, about = str, [*about, Parameter(choices=choices[0])]
     if by_place and get_origin(type_) is list:  # wherever they stand among the options
         about, marked = [*about, Parameter(required=default is Stated.empty)], get_args(type_)[0]
@@ -92,7 +94,7 @@ def _written(declared: Declared, words: str | None) -> Stated:
     return Stated(declared.plain.name, kind, default=default, annotation=Annotated[type_, *about, declared.option])
 
 
-def refusal(error: CycloptsError) -> str:
+def describe_error(error: CycloptsError) -> str:
     """Return what to say of a command that cannot be understood."""
     see = f"See {' '.join(['bowdenfit', *(error.command_chain or ())])} --help."
     if isinstance(error, UnusedCliTokensError):
@@ -104,63 +106,64 @@ def refusal(error: CycloptsError) -> str:
     return f"{error} {see}"
 
 
-def _run(verb: Verb, given: dict[str, Any], form: str) -> int:
+def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
     """Ask, and print the reply for people, or as "json" or "csv"."""
-    declared = {name: each for name, each in parameters_of(verb.function).items() if each.option.parse is not False}
-    asked = {name: each.plain.default for name, each in declared.items()} | given
-    first, source = next(iter(asked.items()))
+    parameters = parameters_of(verb.function).items()
+    declared = {name: parameter for name, parameter in parameters if parameter.option.parse is not False}
+    request = {name: parameter.plain.default for name, parameter in declared.items()} | options
+    first, source = next(iter(request.items()))
     is_of_fit = declared[first].reader in (FIT, FITS)
-    texts = {name: value for name, value in asked.items() if declared[name].reader not in (None, FIT, FITS)}
-    asked |= read_arguments(verb.function, texts, typed=True)
-    answers = _kept(source) if isinstance(source, Path) and (verb.kept or verb.warns) else {}
-    reply = _read_back(verb, answers, asked)
+    texts = {name: value for name, value in request.items() if declared[name].reader not in (None, FIT, FITS)}
+    request |= read_arguments(verb.function, texts, typed=True)
+    answers = _load_kept_answers(source) if isinstance(source, Path) and (verb.kept or verb.warns) else {}
+    reply = _reply_from_kept(verb, answers, request)
     if reply is None or (form == "json" and reply.page is None) or (form == "csv" and reply.csv is None):
-        asked[first] = _loaded(source) if is_of_fit else source
-        reply = _answer(verb, asked, source)
+        request[first] = _load_fits(source) if is_of_fit else source
+        reply = _compute_reply(verb, request, source)
     if verb.warns and isinstance(source, Path):
-        troubles = answers["troubles"] if "troubles" in answers else _troubles(asked[first], source)
-        reply = _with_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
-    say(_page(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
+        troubles = answers["troubles"] if "troubles" in answers else _list_troubles(request[first], source)
+        reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
+    say(_to_json(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:
         say(note, err=True)
     return reply.exit_code
 
 
-def _kept(source: Path) -> dict[str, Any]:
+def _load_kept_answers(source: Path) -> dict[str, Any]:
     """What the fit of a results folder has answered before."""
-    from bowdenfit.results.kept import kept
+    from bowdenfit.results.kept import read_answers
 
-    return kept(source)
+    return read_answers(source)
 
 
-def _read_back(verb: Verb, answers: dict[str, Any], asked: dict[str, Any]) -> Reply | None:
+def _reply_from_kept(verb: Verb, answers: dict[str, Any], request: dict[str, Any]) -> Reply | None:
     """The reply where a fit has answered just this before."""
     try:
-        return verb.kept(answers, asked) if verb.kept and answers else None
+        return verb.kept(answers, request) if verb.kept and answers else None
     except (LookupError, TypeError, ValueError, AttributeError):  # kept when the answer had another shape
         return None
 
 
-def _answer(verb: Verb, asked: dict[str, Any], source: Any) -> Reply:
+def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     """The reply, worked out."""
-    if verb.results and asked["output"] is None:
-        asked["output"] = Path(verb.results) / _name_of(source)
-    if asked.get("output") is not None:
+    if verb.results and request["output"] is None:
+        request["output"] = Path(verb.results) / _results_name(source)
+    if request.get("output") is not None:
         from bowdenfit.results.folder import refuse_unwritable
 
-        refuse_unwritable(asked["output"])
+        refuse_unwritable(request["output"])
     function = unwrap(verb.function)  # whose arguments have been read
     if "report" in parameters_of(function):
-        asked["report"] = lambda sentence: say(sentence, err=True)
+        request["report"] = lambda sentence: say(sentence, err=True)
     if verb.watch is None:
-        answer = function(**asked)
+        answer = function(**request)
     else:
-        with watch_verb(asked["output"], verb.watch) as progress:
-            answer = function(**asked, progress=progress)
-    return verb.reply(answer, asked)
+        with watch_verb(request["output"], verb.watch) as progress:
+            answer = function(**request, progress=progress)
+    return verb.reply(answer, request)
 
 
-def _troubles(found: Any, source: Path) -> Collection[str]:
+def _list_troubles(fit: Any, source: Path) -> Collection[str]:
     """Why a fit is not to be trusted, worked out; nothing where the source is no fit.
 
     Args:
@@ -169,25 +172,25 @@ def _troubles(found: Any, source: Path) -> Collection[str]:
     """
     from bowdenfit.results.folder import FIT
 
-    if found is source and (source / FIT).exists():
-        found = _loaded(source)
-    return () if isinstance(found, Path) else tuple(found.verdict().troubles)
+    if fit is source and (source / FIT).exists():
+        fit = _load_fits(source)
+    return () if isinstance(fit, Path) else tuple(fit.verdict().troubles)
 
 
-def _with_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:
+def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:
     """A reply that says beside the answer, and by its exit code, where a fit is not to be trusted."""
-    said = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
-    return replace(reply, notes=(*reply.notes, said), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
+    warning = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
+    return replace(reply, notes=(*reply.notes, warning), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
 
 
-def _page(reply: Reply) -> str:
+def _to_json(reply: Reply) -> str:
     """An answer as JSON."""
-    from bowdenfit.results.plain import plain
+    from bowdenfit.results.plain import plain_data
 
-    return json.dumps(plain(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
+    return json.dumps(plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
 
 
-def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
+def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
     """The fit of a results folder; of several, by their own names, or from where their paths part where two have the same."""
     from bowdenfit.front_desk import load
 
@@ -202,6 +205,6 @@ def _loaded(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
     }
 
 
-def _name_of(dataset: Path) -> str:
+def _results_name(dataset: Path) -> str:
     """What the results of a data set are called if nothing else is said."""
     return dataset.stem if dataset.suffix else dataset.resolve().name

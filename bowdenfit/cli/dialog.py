@@ -25,7 +25,7 @@ class Terminal:
             say(f"({such}there is no default, because nothing says it)")
         shown = f"[{question.default}]" if question.default is not None else ""
         while True:
-            typed = _typed(f"{shown}> ") or question.default or ""
+            typed = _read_line(f"{shown}> ") or question.default or ""
             if not typed.strip():
                 say("Something must be written here; Ctrl-C ends it all, and nothing is written.")
                 continue
@@ -42,7 +42,7 @@ class Terminal:
         """Nothing: everything was answered."""
 
 
-def _typed(prompt: str) -> str:
+def _read_line(prompt: str) -> str:
     """What is typed behind a prompt."""
     say(prompt, nl=False)
     sys.stdout.flush()
@@ -53,6 +53,6 @@ def _typed(prompt: str) -> str:
     return line.rstrip("\n")
 
 
-def has_person() -> bool:
+def is_interactive() -> bool:
     """Whether somebody can be asked."""
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()

@@ -27,7 +27,7 @@ _how_to_go_on: list[Callable[[], str]] = []
 
 
 @contextmanager
-def keeping(how_to_go_on: Callable[[], str]) -> Iterator[None]:
+def announce_continuation(how_to_go_on: Callable[[], str]) -> Iterator[None]:
     """Announce that an interrupted command may leave something to go on from.
 
     Args:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from bowdenfit.cli.interrupts import keeping, refuse_interrupted
+from bowdenfit.cli.interrupts import announce_continuation, refuse_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.verb import Watch
@@ -33,7 +33,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         return f"{watch.remark} {folder}: run the same command with --resume" if kept is not None and kept.exists() else ""
 
     try:
-        with keeping(how_to_go_on), _bar(watch) as show:
+        with announce_continuation(how_to_go_on), _bar(watch) as show:
 
             def report(*progress: Any) -> None:
                 refuse_interrupted()

@@ -49,37 +49,37 @@ def init(
         files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
         example: Write a data set that comes with bowdenfit; without a name, list them.
     """
-    from bowdenfit.cli.dialog import Terminal, has_person
+    from bowdenfit.cli.dialog import Terminal, is_interactive
     from bowdenfit.questions.start.folder import refuse_existing, write_template
     from bowdenfit.questions.start.question import Nobody
 
     if example is not None:
         _example(example, folder, files)
         return
-    place, measured = _folder_and_files(folder, files or [])
-    if not has_person() and place is None and not measured:
+    target, measured = split_folder_and_files(folder, files or [])
+    if not is_interactive() and target is None and not measured:
         raise UsageError(f"name the folder to write, such as bowdenfit init {FOLDER}.")
-    ask: Asker = Terminal() if has_person() else Nobody()
-    refuse_existing(place or Path(FOLDER))
+    ask: Asker = Terminal() if is_interactive() else Nobody()
+    refuse_existing(target or Path(FOLDER))
     ask.say("Enter takes the answer that stands in brackets; Ctrl-C ends it all, and nothing is written.")
-    place = place or _asked_folder(ask)
-    if not measured and has_person():
-        measured = _asked_files(ask)
+    target = target or _ask_folder(ask)
+    if not measured and is_interactive():
+        measured = _ask_files(ask)
     if measured:
-        _from_files(place, measured, ask)
+        _start_from_files(target, measured, ask)
         return
-    write_template(place)
-    say(filled(f"Wrote a template to {place}: fill in what stands in capitals in its cable.toml, and the tables."))
-    say(f"Next: bowdenfit check {shlex.quote(str(place))}")
+    write_template(target)
+    say(filled(f"Wrote a template to {target}: fill in what stands in capitals in its cable.toml, and the tables."))
+    say(f"Next: bowdenfit check {shlex.quote(str(target))}")
 
 
-def _folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[Path | None, list[Path]]:
+def split_folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[Path | None, list[Path]]:
     """Which of what was named is the folder to write, and which are files: it may stand behind those of --from."""
     named = [*([folder] if folder else []), *files]
-    places = [each for each in named if not (files and each.is_file())]
-    if len(places) > 1:
-        raise UsageError(f"{places[-1]} does not exist; name one new folder, and the files behind --from.")
-    return next(iter(places), None), [each for each in named if each not in places]
+    folders = [path for path in named if not (files and path.is_file())]
+    if len(folders) > 1:
+        raise UsageError(f"{folders[-1]} does not exist; name one new folder, and the files behind --from.")
+    return next(iter(folders), None), [path for path in named if path not in folders]
 
 
 def _examples() -> list[str]:
@@ -88,7 +88,7 @@ def _examples() -> list[str]:
     return list(examples())
 
 
-def _example(named: Sequence[str], place: Path | None, files: Sequence[Path] | None) -> None:
+def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | None) -> None:
     """Write an example, into a folder that may be named behind it, or say which there are."""
     from bowdenfit.questions.start.folder import examples, verb_of, write_example
 
@@ -98,12 +98,12 @@ def _example(named: Sequence[str], place: Path | None, files: Sequence[Path] | N
         for known in examples():
             say(known)
         return
-    name, folder = named[0], place or Path(named[-1])
+    name, folder = named[0], folder or Path(named[-1])
     write_example(name, folder)
     say(f"Wrote {folder}. Next: bowdenfit {verb_of(folder)} {shlex.quote(str(folder))}")
 
 
-def _asked_folder(ask: "Asker") -> Path:
+def _ask_folder(ask: "Asker") -> Path:
     from bowdenfit.questions.start.folder import refuse_existing
     from bowdenfit.questions.start.question import Question
 
@@ -114,7 +114,7 @@ def _asked_folder(ask: "Asker") -> Path:
     return ask.ask(Question("Which folder shall be written?", read, FOLDER))
 
 
-def _asked_files(ask: "Asker") -> list[Path]:
+def _ask_files(ask: "Asker") -> list[Path]:
     """The files that were measured; none where there is only a template to write."""
     from bowdenfit.files import FORMATS
     from bowdenfit.questions.start.folder import measured_files, refuse_files
@@ -129,30 +129,30 @@ def _asked_files(ask: "Asker") -> list[Path]:
             names = shlex.split(typed)
         except ValueError:
             raise UsageError("a quotation mark is not closed; close it.") from None
-        found = [Path(each).expanduser() for name in names for each in (sorted(glob.glob(name)) or [name])]  # noqa: PTH207
-        refuse_files(found)
-        return found
+        paths = [Path(match).expanduser() for name in names for match in (sorted(glob.glob(name)) or [name])]  # noqa: PTH207
+        refuse_files(paths)
+        return paths
 
     words = "Which files did you measure? Names with blanks between, or a pattern such as bench/*.csv (- for none yet)."
     proposed = shlex.join([path.name for path in here]) if 0 < len(here) <= _MOST_FILES else "-"
     return ask.ask(Question(words, read, proposed))
 
 
-def _from_files(place: Path, files: Sequence[Path], ask: "Asker") -> None:
+def _start_from_files(folder_: Path, files: Sequence[Path], ask: "Asker") -> None:
     """Describe files, write the folder, and see whether `check` accepts it."""
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.start.describe import description_of
     from bowdenfit.questions.start.folder import refuse_files, write_data_set, written
 
     refuse_files(files)
-    called = printable(place.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
+    called = printable(folder_.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
     text = description_of(files, (called.strip() and called) or "cable", ask)
-    write_data_set(place, text, files)
+    write_data_set(folder_, text, files)
     say("")
-    say(filled(written(place)))
-    folder = shlex.quote(str(place))
+    say(filled(written(folder_)))
+    folder = shlex.quote(str(folder_))
     try:
-        check(place)
+        check(folder_)
     except BowdenfitError as error:
         say(f"The files cannot be fitted yet. Correct them in {folder}, then run: bowdenfit check {folder}")
         raise error from None

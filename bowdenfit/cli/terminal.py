@@ -22,9 +22,9 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
         NoReaderError: Nobody reads it.
     """
     stream = sys.stderr if err else sys.stdout
-    said = printable(text)
+    printed = printable(text)
     try:
-        stream.write((said if shows(said, getattr(stream, "encoding", None)) else in_ascii(said)) + "\n" * nl)
+        stream.write((printed if can_show(printed, getattr(stream, "encoding", None)) else in_ascii(printed)) + "\n" * nl)
         stream.flush()
     except BrokenPipeError:
         raise NoReaderError from None
@@ -40,7 +40,7 @@ def say_interrupted(how_to_go_on: str = "") -> None:
     say(f"{apart}Interrupted{how_to_go_on and f'; {how_to_go_on}'}.", err=True)
 
 
-def shows(text: str, encoding: str | None) -> bool:
+def can_show(text: str, encoding: str | None) -> bool:
     """Whether a terminal of an encoding can show a text; one of the locale C says that it has no more than ASCII.
 
     Args:

@@ -29,7 +29,7 @@ from bowdenfit.description.values import (
     UniformPrior,
 )
 from bowdenfit.display import Display, Rows
-from bowdenfit.errors import nearest
+from bowdenfit.errors import suggest_name
 from bowdenfit.words import counted, listed
 
 __all__ = [
@@ -146,9 +146,9 @@ class Description(Display, Frozen):
                 yield f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names"
         for name in self.friction:
             if name not in used and name.partition("[")[0] not in used:
-                yield f"[friction.{name}] belongs to no contact{nearest(name, used)}"
+                yield f"[friction.{name}] belongs to no contact{suggest_name(name, used)}"
         if self.stretch.friction is not None and self.stretch.friction not in used:
-            hint = nearest(self.stretch.friction, used)
+            hint = suggest_name(self.stretch.friction, used)
             yield f"stretch.friction {self.stretch.friction!r} belongs to no contact{hint}"
         if self.group is not None and not self.by_group:
             yield 'group names the one that predictions are for, which belongs to friction_model = "by-group"'

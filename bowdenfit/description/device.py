@@ -12,7 +12,7 @@ from bowdenfit.description import SCHEMA
 from bowdenfit.description.device_keys import KEYS, Key
 from bowdenfit.description.values import Frozen, Name, QuantityValue
 from bowdenfit.description.wrong_keys import wrong_keys
-from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError, Faults, together
+from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError, Faults, combine_errors
 from bowdenfit.inputs import read_toml_file
 
 ENCODER = "controller.encoder_counts"
@@ -156,7 +156,7 @@ class Device(Frozen):
         """
         faults, found = Faults(), {}
         for key in keys:
-            with faults.noted():
+            with faults.collect():
                 if key in self._told:
                     found[key] = self._told[key]
                 elif (stated := self._stated(key)) is not None:
@@ -202,7 +202,7 @@ def asked_for(what: str, missing: Sequence[str]) -> BowdenfitError:
         what: That needs it, in words.
         missing: Keys.
     """
-    return together([DescriptionError(_asked(what, key)) for key in missing])
+    return combine_errors([DescriptionError(_asked(what, key)) for key in missing])
 
 
 def _asked(what: str, key: str) -> str:
@@ -242,7 +242,7 @@ def read_device(path: Path) -> Device:
         raise wrong_keys(error, raw, Device, path.name, 'write it, such as name = "knee"') from None
     faults = Faults()
     for key, stated in _quantities(device):
-        with faults.noted():
+        with faults.collect():
             _check(f"{path.name}, {key}", KEYS[key], stated)
     faults.refuse()
     return device

@@ -69,11 +69,11 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
     except ValidationError as error:
         raise wrong_keys(error, raw, model, file) from None
     faults = Faults()
-    with faults.noted():
+    with faults.collect():
         check_quantities(_quantities(description), file)
-    with faults.noted(place=("route",)):
+    with faults.collect(key_path=("route",)):
         _check_route(description.route, file)
-    with faults.noted(place=("prior",)):
+    with faults.collect(key_path=("prior",)):
         check_elastic(description.preload, description.prior, file)
         check_shares(description.prior, file)
     faults.refuse()
@@ -120,7 +120,7 @@ def check_quantities(quantities: Iterable[Stated], file: str) -> None:
     """
     faults = Faults()
     for where, quantity, dimension in quantities:
-        with faults.noted(place=(where.partition(",")[0].split()[0],)):
+        with faults.collect(key_path=(where.partition(",")[0].split()[0],)):
             if quantity is not None:
                 _check_quantity(f"{file}, {where}", where, quantity, dimension)
     faults.refuse()

@@ -34,7 +34,7 @@ def placeholders_in(raw: Mapping[str, Any], text: str, file: str) -> dict[Place,
             where = f"{file}, line {lines[0]}" if lines else f"{file}, {'.'.join(map(str, place))}"
             what = f"{where}: {shown(value)} is left from the template; write {PLACEHOLDERS[value]}."
             found[place] = DescriptionError(what)
-            found[place].place = place
+            found[place].key_path = place
     return found
 
 

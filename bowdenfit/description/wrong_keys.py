@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from bowdenfit.description import SCHEMA, QuantityValue
 from bowdenfit.description.device_keys import KEYS
-from bowdenfit.errors import BowdenfitError, DescriptionError, nearest, together
+from bowdenfit.errors import BowdenfitError, DescriptionError, combine_errors, suggest_name
 from bowdenfit.words import shown
 
 _INIT = "`bowdenfit init` writes a template that has it"
@@ -35,9 +35,9 @@ def wrong_keys(
         of = model if number < _MOST_UNKNOWN else BaseModel
         for message in cause["msg"].removeprefix("Value error, ").splitlines():
             fault = DescriptionError(_sentence({**cause, "msg": message}, of, file, remedy))
-            fault.place = tuple(cause["loc"])
+            fault.key_path = tuple(cause["loc"])
             found.append(fault)
-    return together(found)
+    return combine_errors(found)
 
 
 def _causes(error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel]) -> list[dict[str, Any]]:
@@ -77,7 +77,7 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     said = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
     place = f"{file}, {'.'.join(said)}" if where else file
     if error["type"] == "extra_forbidden":
-        return f"{file}: unknown key {shown('.'.join(where))}{nearest(where[-1][:80], _siblings(model, where[:-1]))}"
+        return f"{file}: unknown key {shown('.'.join(where))}{suggest_name(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
         return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1])}."
     if error["type"] == "missing":

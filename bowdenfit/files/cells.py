@@ -69,7 +69,7 @@ class Cell:
     def refuse(self, what: str) -> DatasetError:
         """An error that names this cell."""
         error = DatasetError(f"{self.file}, row {self.row}, column {shown(self.column)}: {what}")
-        error.alike, error.row = (self.file, self.column, what.replace(self.shown, "")), self.row
+        error.fault_key, error.row = (self.file, self.column, what.replace(self.shown, "")), self.row
         return error
 
     @property

@@ -43,7 +43,7 @@ class Column:
 
     def each(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
         """Every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
-        return self.faults.each(read, self.cells, otherwise) if self.known else [otherwise] * len(self.cells)
+        return self.faults.read_all(read, self.cells, otherwise) if self.known else [otherwise] * len(self.cells)
 
     def value(self, cell: Cell) -> float:
         """The number in one of the cells, in the internal unit.
@@ -91,7 +91,7 @@ def find_columns(
         columns = can_be[quantity.name]
         if quantity.name in sources or columns:
             found[quantity.name] = _unknown(table, quantity.name)
-        with table.faults.noted():
+        with table.faults.collect():
             if len(columns) > 1:
                 raise _several(table, quantity.name, columns)
             if quantity.name in sources and quantity.name not in wrong:
@@ -118,7 +118,7 @@ def _check_single_meaning(
 ) -> None:
     for heading, _ in headings:
         names = [quantity.name for quantity, _ in meanings(heading, wanted) if quantity.name not in sources]
-        with table.faults.noted():
+        with table.faults.collect():
             if len(names) > 1:
                 raise DatasetError(
                     f"{table.file}: the column {shown(heading)} can be read as {' and '.join(names)}; rename it, or say "
@@ -141,7 +141,7 @@ def require(table: RawTable, found: Mapping[str, Column], name: str, example: st
     """The column called `name`; that there is none is noted among the table's faults."""
     if name in found:
         return found[name]
-    table.faults.found.append(_missing(table, name, example))
+    table.faults.faults.append(_missing(table, name, example))
     return _unknown(table, name)
 
 
@@ -214,7 +214,7 @@ def _wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, Colu
             _check_source(table, known, name, source, serves)
             serves[source.name] = name
         except DatasetError as error:
-            table.faults.found.append(error)
+            table.faults.faults.append(error)
             wrong |= {name, *difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE)}
     return wrong
 

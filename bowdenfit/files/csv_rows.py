@@ -101,5 +101,5 @@ def too_many_cells(file: str, row: int, cells: Sequence[str], width: int) -> Non
             f"is {shown(extra[0])}); the usual cause is a decimal comma in a file separated by commas (separate the columns "
             "with semicolons, or write decimal points), or a row that was written twice."
         )
-        error.alike, error.row = (file, "too many cells"), row
+        error.fault_key, error.row = (file, "too many cells"), row
         raise error

@@ -128,7 +128,7 @@ def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separ
     units = (*parts.units, *[""] * len(header))[: len(header)]
     too_long = Faults()
     nothing = tuple[Cell, ...]()
-    cells = tuple(too_long.each(lambda row: _cells(name, header, row, decimals), parts.body, nothing))
+    cells = tuple(too_long.read_all(lambda row: _cells(name, header, row, decimals), parts.body, nothing))
     too_long.refuse()
     return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 

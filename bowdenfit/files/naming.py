@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Collection, Sequence
 
-from bowdenfit.errors import DatasetError, nearest
+from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import shown
 
@@ -35,7 +35,7 @@ def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()
             )
         if known and quantity not in known:
             raise DatasetError(
-                f"{option} {shown(text)}: no quantity is called {shown(quantity)}{nearest(quantity, list(known))}"
+                f"{option} {shown(text)}: no quantity is called {shown(quantity)}{suggest_name(quantity, list(known))}"
             )
         if quantity in sources:
             raise DatasetError(

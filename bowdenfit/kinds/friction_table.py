@@ -31,7 +31,7 @@ class FrictionTableKind(FrictionKind[AnyRows]):
         """
         faults, angles = Faults(), measurements.table(AngleTable)
         for contact in description.contact:
-            with faults.noted():
+            with faults.collect():
                 if contact.wrap_angle.constant is None:
                     _check_contact(description, angles, contact, table)
         faults.refuse()
@@ -65,5 +65,5 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
 def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
     """Return what is wrong with a column in a row of a table, behind the value that stands there."""
     error = DatasetError(f"{table.origin.place(i)}, column {column!r}: {value}{what}")
-    error.alike, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
+    error.fault_key, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
     return error

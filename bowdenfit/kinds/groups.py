@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError, together
+from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity
 from bowdenfit.types import Labels
@@ -51,7 +51,7 @@ def read_groups(
         f"({few([shown(each) for each in distinct if each], _NAMED)}), or leave the row out."
     )
     if blank := [cell.refuse(why) for cell, name in zip(column.cells, names, strict=True) if asked and not name]:
-        raise together(blank)
+        raise combine_errors(blank)
     names = tuple(name or NO_GROUP for name in names)
     if asked or len(distinct) == 1:
         return names, []

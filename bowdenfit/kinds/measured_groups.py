@@ -1,7 +1,7 @@
 """The groups of a data set's readings, which may have friction coefficients of their own."""
 
 from bowdenfit.description import BY_GROUP, Description
-from bowdenfit.errors import DescriptionError, nearest
+from bowdenfit.errors import DescriptionError, suggest_name
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.measurements import Measurements
@@ -29,5 +29,6 @@ def measured_groups(description: Description, measurements: Measurements) -> tup
             "readings of another group."
         )
     if description.group is not None and description.group not in names:
-        raise DescriptionError(f"cable.toml, group: there is no group {description.group!r}{nearest(description.group, names)}")
+        suggestion = suggest_name(description.group, names)
+        raise DescriptionError(f"cable.toml, group: there is no group {description.group!r}{suggestion}")
     return tuple(sorted(names, key=lambda name: name != description.group))

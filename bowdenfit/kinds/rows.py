@@ -227,7 +227,7 @@ def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Seque
     for heading in table.header:
         name = heading.lower().partition(" ")[0].partition("_")[0]
         near = get_close_matches(name, missing, n=1, cutoff=_ALIKE) if heading and heading not in read else []
-        with table.faults.noted():
+        with table.faults.collect():
             if near:
                 raise DatasetError(
                     f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "

@@ -40,12 +40,12 @@ def load_description(
     text, stated = read_toml(path, overrides)
     raw, wrong = with_columns(stated, columns or {}), Faults()
     left = placeholders_in(raw, text, path.name)
-    wrong.found += left.values()
+    wrong.faults += left.values()
     try:
         description = parse_description(raw, path.name)
     except DescriptionError as error:
-        wrong.found += [each for each in error.faults or (error,) if not _is_about(each.place, left)]
-        keys = {str(each.place[0]) if each.place else "schema" for each in wrong.found}
+        wrong.faults += [each for each in error.faults or (error,) if not _is_about(each.key_path, left)]
+        keys = {str(each.key_path[0]) if each.key_path else "schema" for each in wrong.faults}
         if keys & _ASKED_BY_TABLES or not keys <= set(raw):
             wrong.refuse()
         try:
@@ -57,7 +57,7 @@ def load_description(
     if faults is None:
         wrong.refuse()
     else:
-        faults.found += wrong.found
+        faults.faults += wrong.faults
     return description
 
 
@@ -77,7 +77,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
     faults = Faults()
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
-        with faults.noted(place=("tables",)):
+        with faults.collect(key_path=("tables",)):
             if why := kind.contradiction(settings, description):
                 raise DescriptionError(f"{file}: {why}.")
             if settings is not None:

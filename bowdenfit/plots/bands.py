@@ -88,13 +88,13 @@ def name_band(axes: Axes, quantiles: np.ndarray, color: Any = GRAY) -> None:
         axes.fill_between([], [], [], color=color, alpha=0.3, linewidth=0, label=WIDE_INTERVAL)
 
 
-def evenly(every: Sequence[Any], most: int) -> list[Any]:
+def choose_evenly(items: Sequence[Any], most: int) -> list[Any]:
     """So many of a sequence at most, from its first to its last."""
-    places = np.linspace(0, len(every) - 1, min(len(every), most)).round().astype(int)
-    return [every[i] for i in places.tolist()]
+    indices = np.linspace(0, len(items) - 1, min(len(items), most)).round().astype(int)
+    return [items[i] for i in indices.tolist()]
 
 
-def say_of_how_many(axes: Axes, drawn: int, of: int, what: str = "") -> None:
+def note_shown_count(axes: Axes, count: int, total: int, noun: str = "") -> None:
     """An entry of the legend that says so where not all are drawn."""
-    if drawn < of:
-        axes.plot([], [], " ", label=" ".join(filter(None, (f"{drawn} of {of}", what, "shown"))))
+    if count < total:
+        axes.plot([], [], " ", label=" ".join(filter(None, (f"{count} of {total}", noun, "shown"))))

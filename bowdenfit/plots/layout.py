@@ -81,9 +81,9 @@ def number_width(axes: Axes) -> float:
     axis = axes.yaxis
     if not axis.get_tick_params()["labelleft"]:
         return 0.0
-    places = [float(place) for place in axis.get_majorticklocs()]
-    texts = axis.get_major_formatter().format_ticks(places)
-    return max((text_width(t) for t, at in zip(texts, places, strict=True) if t and low <= at <= high), default=0.0)
+    positions = [float(position) for position in axis.get_majorticklocs()]
+    texts = axis.get_major_formatter().format_ticks(positions)
+    return max((text_width(t) for t, at in zip(texts, positions, strict=True) if t and low <= at <= high), default=0.0)
 
 
 def squeeze(figure: Figure, left: float, to: float) -> None:
@@ -107,7 +107,7 @@ def drop_unused(flat: list[Axes], used: int) -> list[Axes]:
     return flat[:used]
 
 
-def columns_within(page: float, most: int, least: float, gap: float) -> int:
+def count_columns(page: float, most: int, least: float, gap: float) -> int:
     """How many panels fit side by side.
 
     Args:
@@ -135,7 +135,7 @@ def text_width(words: str, size: float = SMALL, weight: str = "normal") -> float
     return max(map(width, words.split("\n"))) / 72
 
 
-def wrapped(words: str, room: float, size: float = SMALL, weight: str = "normal", most: int | None = None) -> str:
+def wrap_words(words: str, room: float, size: float = SMALL, weight: str = "normal", most: int | None = None) -> str:
     """Words in lines that are no wider than the room, in so many lines at most; the end of what is longer is left out."""
     if text_width(words, size, weight) <= room:
         return words
@@ -173,7 +173,7 @@ def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
     entries: dict[str, Artist] = {}
     for panel in axes:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            entries.setdefault(wrapped(label, room - _MARK * SMALL / 72), handle)
+            entries.setdefault(wrap_words(label, room - _MARK * SMALL / 72), handle)
     if not entries:
         return
     widths = [_MARK * SMALL / 72 + text_width(label) for label in entries]
@@ -200,16 +200,16 @@ def title_above(figure: Figure, words: str, mark: str = "") -> None:
         mark: Why nobody should rely on the figure, which stands below the title.
     """
     width = figure.get_size_inches()[0]
-    said = wrapped(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
-    marked = wrapped(mark, width - 2 * EDGE, TITLE_SIZE, "bold").split("\n") if mark else []
-    above = EDGE + _TITLE_ROW * (1 + said.count("\n"))
+    title = wrap_words(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
+    marked = wrap_words(mark, width - 2 * EDGE, TITLE_SIZE, "bold").split("\n") if mark else []
+    above = EDGE + _TITLE_ROW * (1 + title.count("\n"))
     room = above + _TITLE_ROW * len(marked)
     _add_room(figure, room)
     height = figure.get_size_inches()[1]
     for legend in figure.legends:
         legend.set_bbox_to_anchor((0.5, 1 - room / height), figure.transFigure)
     figure.text(
-        EDGE / width, 1 - EDGE / height, said, ha="left", va="top", fontsize=TITLE_SIZE, fontweight="bold",
+        EDGE / width, 1 - EDGE / height, title, ha="left", va="top", fontsize=TITLE_SIZE, fontweight="bold",
         parse_math=False,
     )  # fmt: skip
     for row, line in enumerate(marked):
@@ -224,7 +224,7 @@ def label_across(axes: Axes, words: str) -> None:
     figure = axes.figure
     assert figure is not None  # a panel is on a page
     page, box = figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
-    axes.set_xlabel(wrapped(words, page * min(box.width + 0.16 / page, 2 * (1 - box.x0 - box.width / 2)), 8))
+    axes.set_xlabel(wrap_words(words, page * min(box.width + 0.16 / page, 2 * (1 - box.x0 - box.width / 2)), 8))
 
 
 def room_for_labels(figure: Figure) -> None:

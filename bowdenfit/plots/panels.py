@@ -11,7 +11,7 @@ from bowdenfit.plots.layout import (
     LEFT,
     RIGHT,
     TITLE,
-    columns_within,
+    count_columns,
     drop_unused,
     label_across,
     panels,
@@ -48,7 +48,7 @@ def span(values: Iterable[np.ndarray], room: float = 0.05) -> tuple[float, float
     return low - margin, high + margin
 
 
-def alike(spans: Sequence[tuple[float, float]]) -> bool:
+def share_limits(spans: Sequence[tuple[float, float]]) -> bool:
     """Whether ranges are so much alike that each can be read on an axis that shows them all."""
     low, high = min(s[0] for s in spans), max(s[1] for s in spans)
     return high - low <= ALIKE * min(s[1] - s[0] for s in spans)
@@ -76,7 +76,7 @@ def recording_panels(
         width: Of the page, whatever is on it [in].
     """
     across, down = (0.16 if share_y else 0.42), TITLE + (0.08 if share_x else 0.2)
-    rows = -(-len(names) // columns_within(width or WIDE, most_columns, LEAST_WIDTH, across))
+    rows = -(-len(names) // count_columns(width or WIDE, most_columns, LEAST_WIDTH, across))
     columns = -(-len(names) // rows)
     page = width or (page if columns == 1 else WIDE)
     inner = (page - LEFT - RIGHT - across * (columns - 1)) / columns
@@ -84,7 +84,7 @@ def recording_panels(
     figure, flat = panels(heights, columns, TITLE, (across, down), page, sharex=share_x, sharey=share_y)
     flat = drop_unused(flat, len(names))
     for axes, name in zip(flat, names, strict=True):
-        axes.set_title(short_title(name, inner), fontsize=SMALL)
+        axes.set_title(shorten_title(name, inner), fontsize=SMALL)
     return figure, flat, columns
 
 
@@ -108,24 +108,24 @@ def panels_with_limits(
         page: Width of the page for a single column [in].
         width: Of the page, whatever is on it [in].
     """
-    share_x, share_y = alike(across), alike(up)
+    share_x, share_y = share_limits(across), share_limits(up)
     figure, flat, columns = recording_panels(names, most_columns, height, share_x, share_y, page, width)
     set_limits(flat, across, "x", share_x)
     set_limits(flat, up, "y", share_y)
     return figure, flat, columns
 
 
-def short(name: str, longest: int) -> str:
+def shorten_name(name: str, longest: int) -> str:
     """The end of a name, which tells recordings of one folder apart."""
     return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]
 
 
-def short_title(name: str, room: float) -> str:
+def shorten_title(name: str, room: float) -> str:
     """The end of a name that is no wider than the room [in], from the beginning of a word on where there is one."""
     if text_width(name) <= room:
         return name
-    longest = next((n for n in range(len(name) - 1, 1, -1) if text_width(short(name, n)) <= room), 1)
-    cut = short(name, longest)
+    longest = next((n for n in range(len(name) - 1, 1, -1) if text_width(shorten_name(name, n)) <= room), 1)
+    cut = shorten_name(name, longest)
     return f"\N{HORIZONTAL ELLIPSIS} {cut.partition(' ')[2]}" if " " in cut else cut
 
 
@@ -210,5 +210,5 @@ def extremes(values: np.ndarray, most: int) -> np.ndarray:
         return np.arange(len(values))
     padded = np.append(values, np.full(-len(values) % size, values[-1])).reshape(-1, size)
     start = size * np.arange(len(padded))
-    places = np.concatenate([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
-    return np.unique(np.minimum(places, len(values) - 1))
+    indices = np.concatenate([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
+    return np.unique(np.minimum(indices, len(values) - 1))

@@ -13,7 +13,7 @@ from bowdenfit.plots.layout import (
     RIGHT,
     TITLE,
     axes_at,
-    columns_within,
+    count_columns,
     empty_page,
     label_across,
     number_width,
@@ -21,7 +21,7 @@ from bowdenfit.plots.layout import (
     room_for_labels,
     squeeze,
 )
-from bowdenfit.plots.panels import LEAST_WIDTH, alike, finite, set_limits, short_title
+from bowdenfit.plots.panels import LEAST_WIDTH, finite, set_limits, share_limits, shorten_title
 from bowdenfit.plots.style import GRAY, MEDIUM, SMALL, WIDE
 
 if TYPE_CHECKING:
@@ -134,9 +134,9 @@ def panels_with_strips(
         least: Width of a panel that can still be read [in].
         usual: Width of the page for a single column [in].
     """
-    share_x, share_y = alike(across), alike(up)
+    share_x, share_y = share_limits(across), share_limits(up)
     gap = 0.16 if share_y else 0.42
-    rows = -(-len(names) // columns_within(width or WIDE, most_columns, least, gap))
+    rows = -(-len(names) // count_columns(width or WIDE, most_columns, least, gap))
     columns = -(-len(names) // rows)
     page = width or (usual if columns == 1 else WIDE)
     inner = (page - LEFT - RIGHT - gap * (columns - 1)) / columns
@@ -150,7 +150,7 @@ def panels_with_strips(
         first = made.mains[0] if made.mains else None
         sharing = {"sharex": first if share_x else None, "sharey": first if share_y else None}
         made.mains.append(axes_at(figure, left, bottom + STRIP + GAP, inner, main, **sharing))
-        made.mains[-1].set_title(short_title(name, inner), fontsize=SMALL)
+        made.mains[-1].set_title(shorten_title(name, inner), fontsize=SMALL)
         sharing = {"sharex": made.mains[-1], "sharey": made.strips[0] if made.strips else None}
         made.strips.append(axes_at(figure, left, bottom, inner, STRIP, **sharing))
         inside = i % columns > 0

@@ -92,24 +92,24 @@ def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments,
 def _boxes_without_words() -> Iterator[None]:
     """Letters that the font lacks are boxes in a figure; matplotlib says so of each, in each format, in words of its own."""
     log = logging.getLogger("matplotlib.mathtext")  # where letters behind a symbol are placed
-    log.addFilter(_is_of_no_letter)
+    log.addFilter(_is_not_about_glyphs)
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from")
             yield
     finally:
-        log.removeFilter(_is_of_no_letter)
+        log.removeFilter(_is_not_about_glyphs)
 
 
-def _is_of_no_letter(said: logging.LogRecord) -> bool:
-    return "does not have a glyph" not in str(said.msg)
+def _is_not_about_glyphs(message: logging.LogRecord) -> bool:
+    return "does not have a glyph" not in str(message.msg)
 
 
-def mapped_color(colors: str, place: float) -> Any:
+def mapped_color(colors: str, position: float) -> Any:
     """The color at a place from 0 to 1 of one of matplotlib's color maps."""
     import matplotlib as mpl
 
-    return mpl.colormaps[colors](place)
+    return mpl.colormaps[colors](position)
 
 
 def percent(fraction: float) -> str:

@@ -34,8 +34,8 @@ def number_below(axes: Axes, whole: bool = False) -> None:
     axes.set_xticks(values, texts)
     axes.tick_params(axis="x", length=72 * TICK, pad=72 * 0.8 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
     for label, value in zip(axes.get_xticklabels(), values, strict=True):  # at the ends they are moved inwards
-        half, place = LETTER * len(label.get_text()) / 2, width * (value - low) / (high - low)
-        inwards = float(np.clip(place, half - TICK, max(width - half + TICK, half - TICK))) - place
+        half, position = LETTER * len(label.get_text()) / 2, width * (value - low) / (high - low)
+        inwards = float(np.clip(position, half - TICK, max(width - half + TICK, half - TICK))) - position
         label.set_transform(label.get_transform() + ScaledTranslation(inwards, 0.0, axes.figure.dpi_scale_trans))
 
 
@@ -70,14 +70,14 @@ def ticks(
     low, high = limits
 
     def round_values(most: int) -> tuple[np.ndarray, float]:
-        every = np.asarray(MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high))
-        return every[(every >= low) & (every <= high)], float(every[1] - every[0])
+        candidates = np.asarray(MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high))
+        return candidates[(candidates >= low) & (candidates <= high)], float(candidates[1] - candidates[0])
 
     def apart(values: np.ndarray, texts: list[str]) -> bool:
         """Whether numbers keep apart that are moved inwards at the ends of the axis."""
         share = LEAST_SPACE / room(texts)  # of the axis that a number takes
-        places = np.clip((values - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
-        return bool(np.all(np.diff(places) >= share))
+        positions = np.clip((values - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
+        return bool(np.all(np.diff(positions) >= share))
 
     for most in (4, 3, 2, 1):
         values, step = round_values(most)

@@ -50,14 +50,14 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
         ending: Format.
     """
     options: dict[str, Any] = {"format": ending, "dpi": DOTS_PER_INCH, **OPTIONS.get(ending, {})}
-    drawn: Path | BinaryIO = BytesIO() if ending == PNG else target
+    buffer: Path | BinaryIO = BytesIO() if ending == PNG else target
     try:
-        figure.savefig(drawn, **options)
+        figure.savefig(buffer, **options)
     except ValueError:  # a name that someone chose has dollar signs in it, and no formula between them
         _show_as_written(figure)
-        figure.savefig(drawn, **options)
-    if isinstance(drawn, BytesIO):
-        _save_in_few_colors(drawn, target)
+        figure.savefig(buffer, **options)
+    if isinstance(buffer, BytesIO):
+        _save_in_few_colors(buffer, target)
 
 
 def _save_in_few_colors(png: BytesIO, target: Path | BinaryIO) -> None:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.arguments import NumberWithUnit
-from bowdenfit.errors import UsageError, nearest
+from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, mark_of, page_width
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.results.record import Record
@@ -43,7 +43,7 @@ class FigureMethods:
             UsageError: The fit has no such figure, and which it has; or none can be so wide.
         """
         if name not in FIGURES:
-            raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+            raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
         if self._shown(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
         mark = mark_of(verdict(self._fit).troubles)
@@ -53,7 +53,7 @@ class FigureMethods:
         if name.startswith("_"):
             raise AttributeError(name)
         if name not in FIGURES:
-            raise NoSuchFigureError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+            raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
         return partial(self, name)
 
     def __dir__(self) -> list[str]:

@@ -41,7 +41,7 @@ from bowdenfit.questions.summary import (
 )
 from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.folder import FIGURE_DATA
-from bowdenfit.results.kept import kept
+from bowdenfit.results.kept import read_answers
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def kept_figures(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
         folder: Its results folder.
         names: Which; all if omitted.
     """
-    if not kept(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
+    if not read_answers(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
         return {}
     try:
         return read_arrays(folder / FIGURE_DATA, data_types(names or FIGURES))

@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.predict.lengths import predict_at_lengths
 from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.results.plain import stored
+from bowdenfit.results.plain import serialize
 from bowdenfit.results.record import Record
 
 
@@ -19,10 +19,10 @@ def answers_of(fit: Record) -> dict[str, Any]:
     """
     answers: dict[str, Any] = {"troubles": list(verdict(fit).troubles)}
     if fit.sampled is not None:
-        answers["identify"] = stored(vars(identifiability(fit)))
+        answers["identify"] = serialize(vars(identifiability(fit)))
         if (route := fit.dataset.description.route) is not None:
-            answers["length"] = stored(fit.optimal_length())
+            answers["length"] = serialize(fit.optimal_length())
             if route.choices:
                 rows = predict_at_lengths(fit, np.asarray(route.choices), None, "pull")
-                answers["predict"] = [[length, stored(row)] for length, row in zip(route.choices, rows, strict=True)]
+                answers["predict"] = [[length, serialize(row)] for length, row in zip(route.choices, rows, strict=True)]
     return answers

@@ -96,21 +96,21 @@ def write_answer(
         StoreError: The folder cannot be written.
     """
     from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.captions import bring_captions
-    from bowdenfit.results.folder import filled_when_whole, write_text
-    from bowdenfit.results.plain import plain
+    from bowdenfit.results.captions import copy_captions
+    from bowdenfit.results.folder import fill_folder_atomically, write_text
+    from bowdenfit.results.plain import plain_data
 
     page_file, text_file, *_ = files = files_of(folder, name)
     files += [path for each in figures if each != name for path in figures_of(folder, each)]
-    with filled_when_whole(Path(folder), page_file.name) as place:
-        bring_captions(Path(folder), place)
+    with fill_folder_atomically(Path(folder), page_file.name) as place:
+        copy_captions(Path(folder), place)
         write_text(place / text_file.name, text)
         for each, figure in figures.items():
             write_figure(figure, answer, place, each, cable)
         if page is not None:
             written = write_page(page, place, place / f"{name}.html")
             files.insert(0, Path(folder) / written.name)
-        write_text(place / page_file.name, json.dumps(plain(answer), indent=1, allow_nan=False) + "\n")
+        write_text(place / page_file.name, json.dumps(plain_data(answer), indent=1, allow_nan=False) + "\n")
     return files
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError, nearest
+from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.matching import Quantity, candidates, meanings
 from bowdenfit.files.naming import parse_sources
@@ -95,7 +95,7 @@ def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
         )
     raise DatasetError(
         f"{file.path.name} has no channel {shown(wanted)}, which you name as {quantity}"
-        f"{nearest(wanted, [c.name for c in file.channels])}"
+        f"{suggest_name(wanted, [c.name for c in file.channels])}"
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_packed, refuse_special
-from bowdenfit.results.folder import replace_when_whole
-from bowdenfit.results.plain import rebuilt, stored
+from bowdenfit.results.folder import replace_atomically
+from bowdenfit.results.plain import deserialize, serialize
 
 _PAGE, _ARRAY = "page", "array"
 
@@ -28,8 +28,8 @@ def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
         arrays[id(array)] = array
         return {_ARRAY: list(arrays).index(id(array))}
 
-    page = np.frombuffer(json.dumps({name: stored(one, put) for name, one in data.items()}).encode(), dtype=np.uint8)
-    with replace_when_whole(path) as temporary, temporary.open("wb") as file:
+    page = np.frombuffer(json.dumps({name: serialize(one, put) for name, one in data.items()}).encode(), dtype=np.uint8)
+    with replace_atomically(path) as temporary, temporary.open("wb") as file:
         np.savez(
             file, allow_pickle=False, **{_PAGE: page}, **{f"{i}": array for i, array in enumerate(arrays.values())}
         )
@@ -54,4 +54,4 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
             return file[str(data[_ARRAY])] if _ARRAY in data else {key: take(one) for key, one in data.items()}
 
         page = json.loads(file[_PAGE].tobytes())
-        return {name: rebuilt(kinds[name], take(page[name])) for name in kinds if name in page}
+        return {name: deserialize(kinds[name], take(page[name])) for name in kinds if name in page}

@@ -42,7 +42,7 @@ class Window:
     JSON: ClassVar = ("within", "probability", ("from", "start"), ("to", "stop"))
 
 
-def at_edge(lengths: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+def is_at_edge(lengths: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
     """Which optima lie at an end of the range, where the true optimum may be outside."""
     tolerance = EDGE_FRACTION * (limits[1] - limits[0])
     return (lengths <= limits[0] + tolerance) | (lengths >= limits[1] - tolerance)
@@ -62,7 +62,7 @@ def rank_choices(lengths: np.ndarray, efficiency: np.ndarray) -> tuple[Choice, .
     return tuple(Choice(float(a), float(b), float(c)) for a, b, c in rows)
 
 
-def best_window(
+def find_best_window(
     grid: np.ndarray, efficiency: np.ndarray, best: np.ndarray, within: float = 0.01, probability: float = 0.95
 ) -> Window:
     """The longest window whose every length is within a fraction of the draw's best efficiency with a probability.

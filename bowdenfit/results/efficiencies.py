@@ -17,8 +17,8 @@ class Efficiencies(Display, list[Interval]):
         lengths: Route values.
     """
 
-    def __init__(self, found: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
-        super().__init__(found)
+    def __init__(self, intervals: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
+        super().__init__(intervals)
         at = [float(length) for length in lengths]
         self._at = [{} if route is None else {f"{route.variable}_{route.unit}": length} for length in at]
         self._outside = ["" if route is None else route.outside(length) for length in at]
@@ -28,11 +28,11 @@ class Efficiencies(Display, list[Interval]):
         """As `predict` gives them."""
         return [
             at
-            | {"efficiency": each.median}
-            | {k: v for k, v in vars(each).items() if k != "median"}
+            | {"efficiency": interval.median}
+            | {k: v for k, v in vars(interval).items() if k != "median"}
             | ({"in_range": not outside} if at else {})
             | {"note": outside}
-            for at, each, outside in zip(self._at, self, self._outside, strict=True)
+            for at, interval, outside in zip(self._at, self, self._outside, strict=True)
         ]
 
     def _table(self) -> Rows:

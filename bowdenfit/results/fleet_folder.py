@@ -11,8 +11,8 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import or_damaged, refuse_special
-from bowdenfit.results.folder import read_page, replace_when_whole
-from bowdenfit.results.kept import checksum
+from bowdenfit.results.folder import read_page, replace_atomically
+from bowdenfit.results.kept import file_checksum
 from bowdenfit.types import Vector
 
 if TYPE_CHECKING:
@@ -84,11 +84,11 @@ def write_fleet_draws(path: Path, fleet: FleetDraws) -> None:
         for name, draws in fleet.values.items():
             variable = posterior.create_variable(name, ("chain", "draw", "cable"), data=draws.T[None])
             variable.attrs.update({**fleet.attributes.get(name, {}), "coordinates": metadata})
-        for name, each in fleet.stats.items():
-            kind = {"dtype": text} if each.dtype == object else {}
-            data = each.astype("int8") if each.dtype == bool else each
+        for name, statistic in fleet.stats.items():
+            kind = {"dtype": text} if statistic.dtype == object else {}
+            data = statistic.astype("int8") if statistic.dtype == bool else statistic
             stats.create_variable(name, ("cable",), data=data, **kind).attrs["coordinates"] = metadata
-    with replace_when_whole(path) as temporary:
+    with replace_atomically(path) as temporary:
         temporary.write_bytes(in_memory.getbuffer())
 
 
@@ -103,8 +103,8 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     path = folder / FLEET_DRAWS
     refuse_special(path, StoreError)
     if not path.is_file():
-        what = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
-        raise StoreError(f"{path} cannot be read: {folder} {what}, or name a folder that `bowdenfit fleet` wrote.")
+        problem = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
+        raise StoreError(f"{path} cannot be read: {folder} {problem}, or name a folder that `bowdenfit fleet` wrote.")
     damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
     _refuse_changed(folder, damaged)
     with or_damaged(damaged), h5py.File(path) as file:
@@ -114,9 +114,9 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         attributes = {name: {k: v for k, v in group[name].attrs.items() if isinstance(v, str)} for name in values}
         labels, names = (tuple(group[name].asstr()[()]) for name in ("cable", "cable_name"))
         cycles, temperature, lubricated = (np.asarray(group[name][()]) for name in _METADATA)
-        known = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
+        statistics = {name: np.asarray(stats[name][()]) for name in stats if name not in fixed}
         about = json.loads(file.attrs["fleet"])
-    return FleetDraws(labels, names, cycles, temperature, lubricated, values, known, attributes, about)
+    return FleetDraws(labels, names, cycles, temperature, lubricated, values, statistics, attributes, about)
 
 
 def _members(file: "h5py.File", group: str) -> "dict[str, h5py.Dataset]":
@@ -138,5 +138,5 @@ def _refuse_changed(folder: Path, damaged: StoreError) -> None:
         raise StoreError(f"{folder} holds an unfinished fleet; finish it with `bowdenfit fleet ... --resume`.") from None
     if not isinstance(page, dict):
         raise StoreError(f"{folder / FLEET_PAGE} is damaged; fit the fleet again, or restore the folder from a copy.")
-    if page.get(CHECKSUM) != checksum(folder / FLEET_DRAWS):  # before HDF5 opens it, which may go in circles for ever
+    if page.get(CHECKSUM) != file_checksum(folder / FLEET_DRAWS):  # before HDF5 opens it, which may go in circles for ever
         raise damaged

@@ -30,7 +30,7 @@ _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DA
 
 
 @contextmanager
-def replace_when_whole(path: Path) -> Iterator[Path]:
+def replace_atomically(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong.
 
     Raises:
@@ -47,7 +47,7 @@ def replace_when_whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def filled_when_whole(folder: Path, last: str = "") -> Iterator[Path]:
+def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
     """A folder beside or inside `folder` to write into; what is in it moves there when all is written, else it is gone.
 
     Args:
@@ -57,27 +57,27 @@ def filled_when_whole(folder: Path, last: str = "") -> Iterator[Path]:
     Raises:
         StoreError: It cannot be written.
     """
-    there = folder.is_dir()  # perhaps a disk of its own, or one in a folder that may not be written
+    exists = folder.is_dir()  # perhaps a disk of its own, or one in a folder that may not be written
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         name = f".{folder.resolve().name[:40]}."
-        place = Path(tempfile.mkdtemp(prefix=name, suffix=_PARTIAL, dir=folder if there else folder.parent))
+        temporary = Path(tempfile.mkdtemp(prefix=name, suffix=_PARTIAL, dir=folder if exists else folder.parent))
     except OSError as error:
         raise disk_error(folder, error) from None
     try:
-        yield place
-        if there:
+        yield temporary
+        if exists:
             if last:
                 (folder / last).unlink(missing_ok=True)
-            for path in sorted(place.iterdir(), key=lambda path: path.name == last):
+            for path in sorted(temporary.iterdir(), key=lambda path: path.name == last):
                 path.replace(folder / path.name)
         else:
-            place.chmod(0o777 & ~_umask())
-            place.replace(folder)
+            temporary.chmod(0o777 & ~_umask())
+            temporary.replace(folder)
     except OSError as error:
         raise disk_error(folder, error) from None
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def is_empty(folder: Path) -> bool:
@@ -85,7 +85,7 @@ def is_empty(folder: Path) -> bool:
     return all(_is_partial(path) for path in _contents(folder))
 
 
-def is_left_of(folder: Path, names: Collection[str]) -> bool:
+def holds_only_run_files(folder: Path, names: Collection[str]) -> bool:
     """Whether nothing lies in a folder but what a run of some kind writes, whole or not, and notes (*.md).
 
     Args:
@@ -96,7 +96,7 @@ def is_left_of(folder: Path, names: Collection[str]) -> bool:
     return all(path.name in names or path.suffix == ".md" or _is_partial(path) for path in inside)
 
 
-def remove_what_is_left(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
+def remove_run_files(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
     """Remove what a run of some kind wrote, whole or not, and nothing else.
 
     Args:
@@ -154,7 +154,7 @@ def file_to_write(path: Path) -> Iterator[Path]:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with replace_when_whole(path) as temporary:
+        with replace_atomically(path) as temporary:
             yield temporary
     except OSError as error:
         raise disk_error(path, error) from None
@@ -162,7 +162,7 @@ def file_to_write(path: Path) -> Iterator[Path]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
-    with replace_when_whole(path) as temporary:
+    with replace_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
@@ -204,17 +204,17 @@ def refuse_unwritable(target: Path) -> None:
     Raises:
         StoreError: It cannot be made, as far as that can be told without making it.
     """
-    place = target
+    existing = target
     try:
-        while not place.exists():
-            if place.is_symlink():
+        while not existing.exists():
+            if existing.is_symlink():
                 raise OSError(errno.ENOENT, "it is a link that leads nowhere")
-            place = place.parent
-        if place != target and not place.is_dir():
+            existing = existing.parent
+        if existing != target and not existing.is_dir():
             raise OSError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-        if not (place.is_dir() or place.is_file()):
+        if not (existing.is_dir() or existing.is_file()):
             raise OSError(errno.EEXIST, "it is a device or a pipe")
-        if not os.access(place if place.is_dir() else place.parent, os.W_OK | os.X_OK):
+        if not os.access(existing if existing.is_dir() else existing.parent, os.W_OK | os.X_OK):
             raise OSError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise disk_error(target, error) from None
@@ -231,23 +231,23 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
         StoreError: The folder holds something already.
     """
     if (folder / FIT).exists():
-        there = "holds a finished fit already; add --force to replace it, or name another with --output."
+        problem = "holds a finished fit already; add --force to replace it, or name another with --output."
     elif (folder / CHAIN).exists():
-        there = "holds an interrupted fit; go on with --resume, or start over with --force."
+        problem = "holds an interrupted fit; go on with --resume, or start over with --force."
     elif not folder.exists():
         return
-    elif not folder.is_dir() or not is_left_of(folder, {*_WRITTEN, FIGURES}):
+    elif not folder.is_dir() or not holds_only_run_files(folder, {*_WRITTEN, FIGURES}):
         raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
     elif any(path.suffix != ".md" for path in _contents(folder)):
-        there = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
+        problem = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
     else:
         return
     if not force:
-        raise StoreError(f"{folder} {there}")
+        raise StoreError(f"{folder} {problem}")
 
 
 @contextmanager
-def reserved(folder: Path | None) -> Iterator[None]:
+def reserve_folder(folder: Path | None) -> Iterator[None]:
     """A results folder that no other process writes into meanwhile; the reservation ends with this process at the latest.
 
     Args:
@@ -285,9 +285,9 @@ def _contents(folder: Path) -> list[Path]:
     return [path for path in folder.iterdir() if path.name != _LOCK]
 
 
-def clear(folder: Path) -> None:
+def remove_earlier_fit(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
-    remove_what_is_left(folder, _WRITTEN, [FIGURES])
+    remove_run_files(folder, _WRITTEN, [FIGURES])
 
 
 def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
@@ -298,7 +298,7 @@ def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
     """
     from bowdenfit.inference.checkpoint import checkpoint_header
 
-    with folder_to_write(path.parent), replace_when_whole(path) as temporary:
+    with folder_to_write(path.parent), replace_atomically(path) as temporary:
         temporary.write_bytes(checkpoint_header(fingerprint))
 
 
@@ -314,16 +314,16 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
     if not path.exists():
         raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
     try:
-        found = read_fingerprint(path)
-        refuse_no_seed(found["seed"])
-        if isinstance(found["description"], dict) and isinstance(found["sha256"], dict):
-            return found
+        fingerprint = read_fingerprint(path)
+        refuse_invalid_seed(fingerprint["seed"])
+        if isinstance(fingerprint["description"], dict) and isinstance(fingerprint["sha256"], dict):
+            return fingerprint
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         pass
     raise damaged_checkpoint_error(path)
 
 
-def refuse_no_seed(seed: Any) -> None:
+def refuse_invalid_seed(seed: Any) -> None:
     """Refuse what no run was started with.
 
     Raises:

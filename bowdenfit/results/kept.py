@@ -20,7 +20,7 @@ CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once
 
 
-def keep(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
+def write_answers(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
     """Write what a fit has answered; everything that it follows from is there already, but for fit.json.
 
     Args:
@@ -28,11 +28,11 @@ def keep(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
         answers: Plain data, by question.
         fit_page: Text that fit.json will be.
     """
-    of = {FIT: crc32(fit_page.encode()), **{name: checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
-    _write(folder, {"schema": SCHEMA, "version": version_of("bowdenfit"), "of": of, "answers": answers})
+    checksums = {FIT: crc32(fit_page.encode()), **{name: file_checksum(folder / name) for name in (POSTERIOR, FIGURE_DATA)}}
+    _write(folder, {"schema": SCHEMA, "version": installed_version("bowdenfit"), "of": checksums, "answers": answers})
 
 
-def keep_too(folder: Path, question: str, answer: Any) -> None:
+def add_answer(folder: Path, question: str, answer: Any) -> None:
     """Add one answer to those that are kept, which are as they were written."""
     page = read_page(folder / ANSWERS)
     del page[CHECKSUM]
@@ -40,10 +40,10 @@ def keep_too(folder: Path, question: str, answer: Any) -> None:
 
 
 def _write(folder: Path, page: Mapping[str, Any]) -> None:
-    write_text(folder / ANSWERS, json.dumps({CHECKSUM: own_checksum(page), **page}, allow_nan=False) + "\n")
+    write_text(folder / ANSWERS, json.dumps({CHECKSUM: page_checksum(page), **page}, allow_nan=False) + "\n")
 
 
-def kept(folder: Path, *beside: str) -> dict[str, Any]:
+def read_answers(folder: Path, *beside: str) -> dict[str, Any]:
     """What the fit in a folder has answered, by question; empty where nothing is kept of just this fit.
 
     Args:
@@ -52,20 +52,20 @@ def kept(folder: Path, *beside: str) -> dict[str, Any]:
     """
     try:
         page = read_page(folder / ANSWERS)
-        of_this = (page["schema"], page["version"]) == (SCHEMA, version_of("bowdenfit"))
-        as_written = page.pop(CHECKSUM) == own_checksum(page) and of_this
-        same = as_written and all(checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
+        of_this = (page["schema"], page["version"]) == (SCHEMA, installed_version("bowdenfit"))
+        as_written = page.pop(CHECKSUM) == page_checksum(page) and of_this
+        same = as_written and all(file_checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         return dict(page["answers"]) if same else {}
     except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 
 
-def own_checksum(page: Mapping[str, Any]) -> int:
+def page_checksum(page: Mapping[str, Any]) -> int:
     """Of what a page of JSON says, however it is spaced; the page carries it as its `CHECKSUM`, which is no part of it."""
     return crc32(json.dumps(page).encode())
 
 
-def checksum(path: Path) -> int | None:
+def file_checksum(path: Path) -> int | None:
     """Of a file; None where there is none."""
     if not path.exists():
         return None
@@ -77,7 +77,7 @@ def checksum(path: Path) -> int | None:
     return checksum
 
 
-def version_of(package: str) -> str:
+def installed_version(package: str) -> str:
     """Which version of a package is installed; empty where that is not known."""
     try:
         return version(package)

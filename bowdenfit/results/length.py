@@ -62,7 +62,7 @@ class OptimalLength(Display):
         choice, length = self.best_choice, self.length
         value = f"{choice.length:g}" if choice else f"{length.median:z.{length.digits}f}"
         is_cut = self.variable == "cable_length"
-        if not self.is_settled:
+        if not self.is_certain:
             return f"measure more{' before you cut' if is_cut else ''}; the best guess is {value} {self.unit}"
         return f"{'cut the cable to' if is_cut else f'the best {self.what} is'} {value} {self.unit}"
 
@@ -71,8 +71,8 @@ class OptimalLength(Display):
 
     def _table(self) -> Rows:
         if not self.choices:
-            known = {self.variable: self.length, "efficiency": self.efficiency}
-            rows = [{"quantity": name} | vars(interval) for name, interval in known.items()]
+            quantities = {self.variable: self.length, "efficiency": self.efficiency}
+            rows = [{"quantity": name} | vars(interval) for name, interval in quantities.items()]
             return rows, {self.variable: self.unit, "efficiency": "1"}
         rows = [{self.variable: c.length} | {k: v for k, v in vars(c).items() if k != "length"} for c in self.choices]
         return rows, {self.variable: self.unit, "probability_best": "1", "expected_regret": "1"}
@@ -87,20 +87,20 @@ class OptimalLength(Display):
         at = "" if self.at_input_force is None else f", at an input force of {significant(self.at_input_force)} N"
         length, eta = self.length, self.efficiency.times(100)
         digits, of_force = length.digits, eta.digits
-        said = [
+        sentences = [
             f"The best {self.what} is {length.median:z.{digits}f} {self.unit} (90 % interval {length.q05:z.{digits}f} to "
             f"{length.q95:z.{digits}f} {self.unit}); {eta.median:z.{of_force}f} % of the force arrives there "
             f"({eta.q05:z.{of_force}f} to {eta.q95:z.{of_force}f} %){at}."
         ]
         if self.at_edge > _WORTH_SAYING:
-            said.append(
+            sentences.append(
                 f"With {percent(self.at_edge, 0)} probability the best lies at an end of the range: a better {self.what} may "
                 "lie outside what was measured."
             )
-        return [*said, self.good_enough if self.is_settled else self.not_settled]
+        return [*sentences, self.good_enough if self.is_certain else self.not_good_enough]
 
     @property
-    def is_settled(self) -> bool:
+    def is_certain(self) -> bool:
         """Whether some length is good enough for sure."""
         return bool(np.isfinite(self.window.start))
 
@@ -115,7 +115,7 @@ class OptimalLength(Display):
         )
 
     @property
-    def not_settled(self) -> str:
+    def not_good_enough(self) -> str:
         """That none will do yet."""
         window = self.window
         return (

@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
-from bowdenfit.results.folder import replace_when_whole
+from bowdenfit.results.folder import replace_atomically
 
 if TYPE_CHECKING:
     import h5py
@@ -47,7 +47,7 @@ def write_groups(
                 attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior", DERIVED) else {}
                 of_readings = labels.get(variable.removeprefix(EXPECTED))
                 _write(group, _key(variable), np.asarray(values), of_readings, attached)
-    with replace_when_whole(path) as temporary:
+    with replace_atomically(path) as temporary:
         temporary.write_bytes(in_memory.getbuffer())
 
 
@@ -56,8 +56,8 @@ def _write(
 ) -> None:
     """A variable with its dimensions, as xarray would write it, which takes a third of a second to load."""
     of_readings = [] if labels is None else [f"{name.removeprefix(EXPECTED)}_reading"]
-    drawn = values.ndim - len(of_readings)
-    dimensions = [*("chain", "draw")[:drawn], *(f"{name}_dim_{i}" for i in range(drawn - 2)), *of_readings]
+    draw_axes = values.ndim - len(of_readings)
+    dimensions = [*("chain", "draw")[:draw_axes], *(f"{name}_dim_{i}" for i in range(draw_axes - 2)), *of_readings]
     for dimension, length in zip(dimensions, values.shape, strict=True):
         if dimension not in group.dimensions:
             group.dimensions[dimension] = length
@@ -93,7 +93,7 @@ def read_groups(path: Path) -> Groups:
     with h5py.File(path) as file:
         groups = {name: own_member(file, name) for name in _members(file)}
         return {
-            name: {unquote(key): _array(found) for key in _members(group) if not _is_label(found := own_member(group, key))}
+            name: {unquote(key): _array(member) for key in _members(group) if not _is_label(member := own_member(group, key))}
             for name, group in groups.items()
             if isinstance(group, h5py.Group)
         }

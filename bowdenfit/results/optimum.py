@@ -22,7 +22,7 @@ def route_grid(model: Model, points: int = GRID_POINTS) -> np.ndarray:
     return np.linspace(*route.range, points)
 
 
-def optimum_of(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, Array]]:
+def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, Array]]:
     """Function of z: the optimal route value and the efficiency there.
 
     Grid search, then golden section between the neighbors of the best grid point; at a jump of a published geometry the

@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 
-def plain(answer: Any) -> Any:
+def plain_data(answer: Any) -> Any:
     """An answer as programs read it: what is no finite number is None.
 
     A dataclass gives its fields, or what its `JSON` lists: names of attributes and methods, where `...` stands for all fields,
@@ -21,7 +21,7 @@ def plain(answer: Any) -> Any:
     return _plain(answer, keep=False)
 
 
-def stored(data: Any, put: Callable[[np.ndarray], Any] | None = None) -> Any:
+def serialize(data: Any, put: Callable[[np.ndarray], Any] | None = None) -> Any:
     """The same so that `rebuilt` gives it back: all fields of dataclasses, and infinity as a word.
 
     Args:
@@ -63,7 +63,7 @@ def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def rebuilt(kind: Any, value: Any) -> Any:
+def deserialize(kind: Any, value: Any) -> Any:
     """A value of an annotated type from what `stored` made of it.
 
     Args:
@@ -76,19 +76,19 @@ def rebuilt(kind: Any, value: Any) -> Any:
         return None
     parts, origin = [part for part in get_args(kind) if part is not NoneType], get_origin(kind)
     if isinstance(kind, UnionType):
-        return rebuilt(parts[0], value)
+        return deserialize(parts[0], value)
     if origin is dict:
-        return {key: rebuilt(parts[1], item) for key, item in value.items()}
+        return {key: deserialize(parts[1], item) for key, item in value.items()}
     if origin is list:
-        return [rebuilt(parts[0], item) for item in value]
+        return [deserialize(parts[0], item) for item in value]
     if origin is tuple:
-        each = [parts[0]] * len(value) if Ellipsis in parts else parts
-        return tuple(rebuilt(part, item) for part, item in zip(each, value, strict=True))
+        types = [parts[0]] * len(value) if Ellipsis in parts else parts
+        return tuple(deserialize(part, item) for part, item in zip(types, value, strict=True))
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
         named = [(f, stored_key(f)) for f in fields(kind)]
         present = [(f.name, key) for f, key in named if key in value or f.default is MISSING]  # others are newer than the data
-        return kind(**{name: rebuilt(hints[name], value[key]) for name, key in present})
+        return kind(**{name: deserialize(hints[name], value[key]) for name, key in present})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
     return _number(value) if kind is float else value

@@ -21,7 +21,13 @@ from bowdenfit.inference.sampler_agreement import SamplerAgreement
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.efficiencies import Efficiencies
 from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.route_draws import RouteDraws, best_length, compile_along_route, new_mounting, route_draws
+from bowdenfit.results.route_draws import (
+    RouteDraws,
+    compile_along_route,
+    compute_along_route,
+    draw_new_mounting,
+    summarize_optimum,
+)
 from bowdenfit.words import few, shown
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
@@ -124,7 +130,7 @@ class DrawPrograms:
     """
 
     values: DrawFunction
-    implied: DrawFunction
+    quantities: DrawFunction
     along_route: DrawFunction | None
 
 
@@ -179,12 +185,12 @@ class Record(Display):
             UsageError: The description has no route, or there is no posterior.
         """
         self._needs_route()
-        return route_draws(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
+        return compute_along_route(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
 
     def mounting(self) -> np.ndarray:
         """Effect of one new mounting on the friction exponent of each draw [1]."""
-        drawn = self.draws()
-        return new_mounting(self.dataset.description, drawn.values, len(drawn.flat_z), self.provenance.seed)
+        draws = self.draws()
+        return draw_new_mounting(self.dataset.description, draws.values, len(draws.flat_z), self.provenance.seed)
 
     def efficiency(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
         """Efficiency at values of the route variable, with intervals.
@@ -230,7 +236,7 @@ class Record(Display):
         lengths, efficiencies = (optimum[name].ravel() for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY))
         friction = self.model.cable.friction
         force = friction.conditions.reference_force if friction.depends_on_load else None
-        return best_length(route, lengths, efficiencies, self.along_route, force)
+        return summarize_optimum(route, lengths, efficiencies, self.along_route, force)
 
     @cached_property
     def posterior(self) -> Draws:
@@ -265,7 +271,7 @@ class Record(Display):
             )
 
 
-def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
+def cached_per_fit(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
     """Decorate a question so that it is worked out once for each record, and its answer kept as long as that record."""
     answers: WeakKeyDictionary[Record, Answer] = WeakKeyDictionary()
 
@@ -278,27 +284,27 @@ def once(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
     return answer
 
 
-@once
-def values_of(fit: Record) -> dict[str, np.ndarray]:
+@cached_per_fit
+def parameter_values(fit: Record) -> dict[str, np.ndarray]:
     """Named values of all parameters [internal units] of every draw, or of least squares alone."""
     space = fit.model.space
     if fit.sampled is None:
         with jax.enable_x64(True):
             vector = compile_program(space.vector, jax.ShapeDtypeStruct((space.size,), float), run_once=True)
-            found = np.asarray(vector(fit.least_squares.z))[None]
-        free = {p.name: found[:, i] for i, p in enumerate(space.free)}
+            values = np.asarray(vector(fit.least_squares.z))[None]
+        free = {p.name: values[:, i] for i, p in enumerate(space.free)}
     else:
         free = {p.name: fit.sampled.values[p.name].ravel() / p.shown_scale for p in space.free}
     n = 1 if fit.sampled is None else len(fit.sampled.flat_z)
     return free | {p.name: np.full(n, p.fixed) for p in space.fixed}
 
 
-def some_values(fit: Record, n: int) -> dict[str, np.ndarray]:
+def thinned_parameter_values(fit: Record, n: int) -> dict[str, np.ndarray]:
     """The same of so many draws, evenly chosen, or as many times of least squares."""
-    return {name: drawn[np.linspace(0, len(drawn) - 1, n).astype(int)] for name, drawn in values_of(fit).items()}
+    return {name: draws[np.linspace(0, len(draws) - 1, n).astype(int)] for name, draws in parameter_values(fit).items()}
 
 
-@once
+@cached_per_fit
 def along_route_program(fit: Record) -> DrawFunction:
     """See `compile_along_route`."""
     return fit.programs.along_route if fit.programs and fit.programs.along_route else compile_along_route(fit.model)

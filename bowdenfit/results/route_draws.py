@@ -17,7 +17,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import DrawFunction, curves_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
-from bowdenfit.results.choices import at_edge, best_window, rank_choices
+from bowdenfit.results.choices import find_best_window, is_at_edge, rank_choices
 from bowdenfit.results.length import OptimalLength
 from bowdenfit.results.optimum import GRID_POINTS, route_grid
 
@@ -47,7 +47,7 @@ class RouteDraws(Display):
         """Medians and intervals on the grid."""
         quantiles = {name: np.quantile(draws, (0.5, 0.05, 0.95), axis=0) for name, draws in self.curves.items()}
         endings = ("", "_q05", "_q95")
-        columns = {name + ending: q for name, every in quantiles.items() for ending, q in zip(endings, every, strict=True)}
+        columns = {name + ending: q for name, levels in quantiles.items() for ending, q in zip(endings, levels, strict=True)}
         return {"route": self.grid} | columns, {name: "1" if name.startswith("efficiency") else "deg" for name in columns}
 
 
@@ -76,7 +76,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFun
         return for_each_draw(implied, model.space.size + 1, run_once=True, beside=beside)
 
 
-def route_draws(model: Model, program: DrawFunction, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
+def compute_along_route(model: Model, program: DrawFunction, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
     """What draws imply along the route.
 
     Args:
@@ -86,18 +86,18 @@ def route_draws(model: Model, program: DrawFunction, z: np.ndarray, mounting: np
         mounting: Effect of a new mounting on the friction exponent of each.
     """
     with jax.enable_x64(True):
-        found = program(np.column_stack([z, mounting]))
+        outputs = program(np.column_stack([z, mounting]))
     none = np.zeros((len(z), 0))
     return RouteDraws(
         route_grid(model),
-        {name: draws[:, :GRID_POINTS] for name, draws in found["curves"].items()},
-        found["curves"]["efficiency"][:, GRID_POINTS:],
-        found.get("mean", none),
-        found.get("mounted", none),
+        {name: draws[:, :GRID_POINTS] for name, draws in outputs["curves"].items()},
+        outputs["curves"]["efficiency"][:, GRID_POINTS:],
+        outputs.get("mean", none),
+        outputs.get("mounted", none),
     )
 
 
-def new_mounting(description: Description, values: dict[str, np.ndarray], n: int, seed: int) -> np.ndarray:
+def draw_new_mounting(description: Description, values: dict[str, np.ndarray], n: int, seed: int) -> np.ndarray:
     """Effect of one new mounting on the friction exponent [1], for every draw.
 
     Args:
@@ -110,7 +110,7 @@ def new_mounting(description: Description, values: dict[str, np.ndarray], n: int
     return scatter * noise_law(description).draw_with(np.random.default_rng([seed, 3]), n)
 
 
-def best_length(
+def summarize_optimum(
     route: Route, lengths: np.ndarray, efficiencies: np.ndarray, along: RouteDraws, force: float | None
 ) -> OptimalLength:
     """The design answer.
@@ -127,8 +127,8 @@ def best_length(
         route.unit,
         Interval.of(lengths),
         Interval.of(efficiencies),
-        float(at_edge(lengths, route.range).mean()),
-        best_window(along.grid, along.curves["efficiency"], efficiencies),
+        float(is_at_edge(lengths, route.range).mean()),
+        find_best_window(along.grid, along.curves["efficiency"], efficiencies),
         rank_choices(np.asarray(route.choices), along.choices) if route.choices else (),
         force,
     )

@@ -20,14 +20,14 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.results.arrays import write_arrays
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
-from bowdenfit.results.kept import CHECKSUM, checksum, keep, own_checksum
+from bowdenfit.results.kept import CHECKSUM, file_checksum, page_checksum, write_answers
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
-from bowdenfit.results.plain import rebuilt, stored
+from bowdenfit.results.plain import deserialize, serialize
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 
 SCHEMA = 6
 LOG_POSTERIOR, WALKER = "lp", "walker"
-_NOT_DRAWN = ("prior", "observed_data")  # groups of posterior.nc without chains
+_WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
 COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "agreement", "diagnostics")
 
@@ -62,15 +62,15 @@ def save(
         else:
             write_groups(folder / POSTERIOR, *posterior_page(fit))
         write_text(folder / SUMMARY, json.dumps(summary, indent=1) + "\n")
-        page = _fit_text(_fit_page(fit) | {"posterior_crc32": checksum(folder / POSTERIOR)}, fit.dataset.measurements)
+        page = _fit_text(_fit_page(fit) | {"posterior_crc32": file_checksum(folder / POSTERIOR)}, fit.dataset.measurements)
         (folder / FIGURE_DATA).unlink(missing_ok=True)
         if figures:
             write_arrays(folder / FIGURE_DATA, figures)
-        keep(folder, answers, page)
+        write_answers(folder, answers, page)
         write_text(folder / FIT, page)
 
 
-_STUMBLED = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)  # over what was changed
+_DAMAGE_ERRORS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)  # over what was changed
 
 
 def load(folder: Path) -> Record:
@@ -82,14 +82,14 @@ def load(folder: Path) -> Record:
     page = _read_page(folder)
     try:
         dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
-        squares = rebuilt(LeastSquares, page["least_squares"])
-        as_written = page["posterior_crc32"] == checksum(folder / POSTERIOR)
+        squares = deserialize(LeastSquares, page["least_squares"])
+        as_written = page["posterior_crc32"] == file_checksum(folder / POSTERIOR)
         if page["posterior"] and (folder / POSTERIOR).exists() and not as_written:
             raise StoreError(f"{folder / POSTERIOR} is not as it was written; fit again, or restore the folder from a copy.")
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
         verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
-        provenance = rebuilt(Provenance, page["provenance"])
-    except (*_STUMBLED, OSError, DescriptionError) as error:
+        provenance = deserialize(Provenance, page["provenance"])
+    except (*_DAMAGE_ERRORS, OSError, DescriptionError) as error:
         why = f"{type(error).__name__}: {shorten(str(error), 200)}"
         raise StoreError(f"{folder} is damaged ({why}); fit again, or restore the folder from a copy.") from error
     return Record(dataset, squares, posterior, *verdict, provenance)
@@ -103,8 +103,8 @@ def _read_page(folder: Path) -> dict[str, Any]:
             raise StoreError(
                 f"{folder} holds an interrupted fit; finish it with `bowdenfit fit ... --resume`."
             ) from None
-        what = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
-        raise StoreError(f"{folder} {what}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
+        problem = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
+        raise StoreError(f"{folder} {problem}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
     schema = page.get("schema", SCHEMA) if isinstance(page, dict) else None
     if not isinstance(schema, int):
         raise StoreError(f"{folder / FIT} is damaged; fit again, or restore the folder from a copy.")
@@ -114,7 +114,7 @@ def _read_page(folder: Path) -> dict[str, Any]:
         raise StoreError(
             f"{folder} was written by an older bowdenfit (schema {schema}, where {SCHEMA} is read); fit the data set again."
         )
-    if page.pop(CHECKSUM, None) != own_checksum(page):
+    if page.pop(CHECKSUM, None) != page_checksum(page):
         raise StoreError(
             f"{folder / FIT} is not as it was written: it was edited, or is damaged; fit again, or restore the folder "
             "from a copy."
@@ -129,32 +129,32 @@ def _fit_page(fit: Record) -> dict[str, Any]:
         "description": fit.dataset.description.to_json(),
         "sha256": fit.dataset.sha256,
         "verdict": {"converged": fit.converged, "reasons": list(fit.reasons)},
-        "least_squares": stored(fit.least_squares),
+        "least_squares": serialize(fit.least_squares),
         "posterior": _posterior_page(posterior) if posterior else None,
-        "provenance": stored(fit.provenance),
+        "provenance": serialize(fit.provenance),
     }
 
 
 def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
     measured = _measurements_page(measurements)
-    known = {**page, CHECKSUM: own_checksum({**page, "measurements": measured})}
+    contents = {**page, CHECKSUM: page_checksum({**page, "measurements": measured})}
     long = json.dumps(measured)  # on one line, and read by no person
-    return f'{json.dumps(known, indent=1)[:-2]},\n "measurements": {long}\n}}\n'
+    return f'{json.dumps(contents, indent=1)[:-2]},\n "measurements": {long}\n}}\n'
 
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:
     tables = {kind.name: table for kind, table in each_table(measurements)}
-    found: dict[str, Any] = stored({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
-    return found
+    page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
+    return page
 
 
 def _posterior_page(posterior: Draws) -> dict[str, Any]:
     trajectories = posterior.trajectories and replace(posterior.trajectories, statistics={})
-    return {name: stored(getattr(replace(posterior, trajectories=trajectories), name)) for name in COUNTS}
+    return {name: serialize(getattr(replace(posterior, trajectories=trajectories), name)) for name in COUNTS}
 
 
 def _measurements(page: Mapping[str, Any]) -> Measurements:
-    tables = (rebuilt(kind.table | None, page.get(name)) for name, kind in KINDS.items())
+    tables = (deserialize(kind.table | None, page.get(name)) for name, kind in KINDS.items())
     return Measurements(tuple(table for table in tables if table is not None), tuple(page["remarks"]))
 
 
@@ -179,7 +179,7 @@ def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], di
     labels = {term.name: term.labels for term in fit.model.terms}
     groups = {name: variables for name, variables in groups.items() if variables or name != DERIVED}
     attributes = {"provenance": json.dumps(asdict(fit.provenance)), "name": fit.name}
-    for name in groups.keys() - _NOT_DRAWN:
+    for name in groups.keys() - _WITHOUT_CHAINS:
         groups[name] = {variable: as_chains(draws, posterior.n_ensembles) for variable, draws in groups[name].items()}
     return groups, labels, attributes, _variable_attributes(fit)
 
@@ -196,11 +196,11 @@ def _walkers(posterior: Draws) -> dict[str, np.ndarray]:
 def _as_walkers(groups: Groups) -> Groups:
     """The other way round."""
     walker = groups["sample_stats"].pop(WALKER, np.zeros(1))
-    each = int(np.max(walker)) + 1
+    n_walkers = int(np.max(walker)) + 1
     return {
         group: variables
-        if group in _NOT_DRAWN
-        else {n: draws.reshape(len(draws) * each, -1, *draws.shape[2:]) for n, draws in variables.items()}
+        if group in _WITHOUT_CHAINS
+        else {n: draws.reshape(len(draws) * n_walkers, -1, *draws.shape[2:]) for n, draws in variables.items()}
         for group, variables in groups.items()
     }
 
@@ -223,7 +223,7 @@ def _posterior(path: Path, page: Mapping[str, Any]) -> Draws:
     values, z = dict(sorted((groups["posterior"] | groups.get(DERIVED, {})).items())), groups["unconstrained_posterior"]
     optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
     hints = get_type_hints(Draws)
-    counts = {name: rebuilt(hints[name], page[name]) for name in COUNTS}
+    counts = {name: deserialize(hints[name], page[name]) for name in COUNTS}
     if counts["trajectories"] is not None:
         statistics = {name: value for name, value in groups["sample_stats"].items() if name != LOG_POSTERIOR}
         counts["trajectories"] = replace(counts["trajectories"], statistics=statistics)

@@ -73,7 +73,7 @@ def fit_posterior(
         posterior, reasons = draw_posterior(programs, request, watch)
         least = squares.result()
     watch.seconds |= {f"{stage}, beside": seconds for stage, seconds in beside.seconds.items()}
-    return Fit(data, least, posterior, not reasons, reasons, provenance(seed, watch), programs.of_draws)
+    return Fit(data, least, posterior, not reasons, reasons, provenance(seed, watch), programs.draw_programs)
 
 
 def find_maximum(density: LogDensity, watch: Stopwatch) -> tuple[Objective, MaximumPosterior]:

@@ -17,7 +17,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.sampler_agreement import SAMPLER_NAMES, SamplerDraws, compare_samplers
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import Model
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws
 from bowdenfit.results.route_draws import compile_along_route
 
@@ -59,7 +59,7 @@ class Programs:
 
     samplers: dict[str, Any]
     optimum: Callable[[np.ndarray], Any] | None
-    of_draws: DrawPrograms
+    draw_programs: DrawPrograms
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
         """What must converge besides the parameters, by name, of many z."""
@@ -76,7 +76,7 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
             programs[name] = compile_walkers(density, settings, beside=beside)
         else:
             programs[name] = import_module(_MODULES[name]).make_program(density, settings)
-    optimum = for_each_draw(optimum_of(model), model.space.size, beside=beside) if model.description.route else None
+    optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
     implied = replicator(density, seed, beside)
     along_route = compile_along_route(model, beside) if model.description.route is not None else None
     return Programs(programs, optimum, DrawPrograms(lambda z: implied(z)["values"], implied, along_route))
@@ -91,16 +91,16 @@ def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatc
         with watch.stage(f"sample with {SAMPLER_NAMES[name]}" if chains else "sample"):
             chains.append(sampler.sample(request, program))
     with watch.stage("replicate"):
-        posterior = _posterior(model, chains[0], programs.of_draws.implied, request.seed)
+        posterior = _posterior(model, chains[0], programs.draw_programs.quantities, request.seed)
     if len(chains) == 1:
         return posterior, chains[0].reasons
     with watch.stage("compare samplers"):
-        agreement = compare_samplers(*(_drawn(model, chain) for chain in chains))
+        agreement = compare_samplers(*(_sampler_draws(model, chain) for chain in chains))
     of_other = [f"{SAMPLER_NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
     return replace(posterior, agreement=agreement), (*chains[0].reasons, *of_other, *agreement.reasons())
 
 
-def _drawn(model: Model, chain: Chain) -> SamplerDraws:
+def _sampler_draws(model: Model, chain: Chain) -> SamplerDraws:
     draws = {p.name: chain.z[..., i] for i, p in enumerate(model.space.free)} | chain.quantities
     return SamplerDraws(chain.sampler, draws, chain.n_ensembles)
 

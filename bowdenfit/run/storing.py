@@ -10,10 +10,10 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.results.folder import CHAIN, clear, read_checkpoint, refuse_to_overwrite, start_checkpoint
+from bowdenfit.results.folder import CHAIN, read_checkpoint, refuse_to_overwrite, remove_earlier_fit, start_checkpoint
 
 
-def with_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
+def choose_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
     """The same data set, to be sampled by another method than its description says; the description's if None.
 
     Raises:
@@ -21,9 +21,9 @@ def with_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
     """
     if method is not None and not mcmc:
         raise UsageError("--no-mcmc leaves out what --sampler would do; leave one of them out.")
-    asked = _with_method(data, method)
-    _refuse_out_of_reach(asked.description.sampler)
-    return asked
+    changed = _with_method(data, method)
+    _refuse_out_of_reach(changed.description.sampler)
+    return changed
 
 
 def _refuse_out_of_reach(settings: SamplerSettings) -> None:
@@ -74,9 +74,9 @@ def choose_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None
     before["description"] = _with_defaults(before["description"])
     changed = [key for key in now if now[key] != before[key]]
     if changed:
-        what = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
+        name = {"description": "the description", "sha256": "an input file", "seed": "the seed"}[changed[-1]]
         raise StoreError(
-            f"{folder} cannot be resumed because {what} changed since; undo the change, or start over with --force."
+            f"{folder} cannot be resumed because {name} changed since; undo the change, or start over with --force."
         )
     return int(before["seed"])
 
@@ -86,6 +86,6 @@ def start_checkpointing(folder: Path | None, data: Dataset, seed: int, resume: b
     if folder is None:
         return None
     if not resume:
-        clear(folder)
+        remove_earlier_fit(folder)
         start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return folder / CHAIN

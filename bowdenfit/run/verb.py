@@ -8,7 +8,7 @@ from warnings import warn
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, HIDDEN, PLACE, Output, Seed, checked
+from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Seed, read_first
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 Sampler = Literal["emcee", "nuts", "both"]
 
 
-@checked
+@read_first
 def fit(
-    dataset: Annotated["str | Path | Dataset", DATASET, PLACE],
+    dataset: Annotated["str | Path | Dataset", DATASET, PATH],
     *,
     output: Annotated[Output, Parameter(show_default="fits/NAME OF DATASET")] = None,
     mcmc: Annotated[bool, Parameter(negative="--no-mcmc")] = True,
@@ -57,14 +57,14 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from bowdenfit.notebook import watched
-    from bowdenfit.results.folder import reserved
-    from bowdenfit.run.storing import choose_seed, start_checkpointing, with_sampler
+    from bowdenfit.notebook import show_progress_bar
+    from bowdenfit.results.folder import reserve_folder
+    from bowdenfit.run.storing import choose_sampler, choose_seed, start_checkpointing
 
     refuse_low_memory()
     folder = Path(output) if output is not None else None
-    data = with_sampler(read(dataset, **reading), sampler, mcmc)
-    with reserved(folder):
+    data = choose_sampler(read(dataset, **reading), sampler, mcmc)
+    with reserve_folder(folder):
         seed = choose_seed(folder, data, mcmc, seed, resume, force)
         import jax
 
@@ -74,7 +74,7 @@ def fit(
         keep_compiled_programs()
         with jax.enable_x64(True):
             if mcmc:
-                with watched(WATCH, progress) as show:
+                with show_progress_bar(WATCH, progress) as show:
                     checkpoint = partial(start_checkpointing, folder, data, seed, resume)
                     result = fit_posterior(data, seed, checkpoint, resume, show)
             else:
@@ -84,10 +84,10 @@ def fit(
     return result
 
 
-def _reply(found: "Fit", asked: dict[str, Any]) -> Reply:
-    said = reply(found, {})
-    exit_code = 0 if found.verdict().trusted else NOT_TRUSTED
-    return Reply(said.text, said.page, (f"Wrote {asked['output']}.",), exit_code)
+def _reply(fit: "Fit", request: dict[str, Any]) -> Reply:
+    summary = reply(fit, {})
+    exit_code = 0 if fit.verdict().trusted else NOT_TRUSTED
+    return Reply(summary.text, summary.page, (f"Wrote {request['output']}.",), exit_code)
 
 
 def _show(bar: Any, progress: "Progress") -> None:

@@ -17,8 +17,8 @@ from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.questions.summary.words import full_text
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.captions import write_captions
-from bowdenfit.results.drawn import keep_drawn
-from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, clear, write_text
+from bowdenfit.results.drawn import record_drawn_figures
+from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit, write_text
 from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable
 
@@ -38,7 +38,7 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
         StoreError: The fit itself, or for want of room what belongs to it, could not be written.
     """
     if fit.sampled is None:
-        clear(folder)
+        remove_earlier_fit(folder)
     failed: dict[str, Exception] = {}
 
     def attempt(name: str, step: Callable[..., Any], *arguments: Any) -> None:
@@ -55,9 +55,10 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
     for name, shown in data.items():
         attempt(name, draw_figure, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
     attempt(REPORT, lambda: write_page(report_page(fit, data), folder / FIGURES, folder / REPORT))
-    drawn = {name: shown for name, shown in data.items() if name not in failed}
+    drawn_figures = {name: shown for name, shown in data.items() if name not in failed}
     if data:
-        attempt("captions", _write_captions, folder, captions_of(drawn, fit.name, mark), len(drawn) == len(data))
+        captions, is_complete = captions_of(drawn_figures, fit.name, mark), len(drawn_figures) == len(data)
+        attempt("captions", _write_captions, folder, captions, is_complete)
     return _what_is_missing(folder, failed)
 
 
@@ -76,7 +77,7 @@ def _write_captions(folder: Path, captions: dict[str, str], is_complete: bool) -
 
     write_captions(captions, folder / FIGURES)
     if is_complete:
-        keep_drawn(folder, captions)
+        record_drawn_figures(folder, captions)
 
 
 def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from pooled_fleets import fleet_draws
 
 from bowdenfit import verbs
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FLEET_TABLE, write_fleet_draws
-from bowdenfit.results.kept import checksum
+from bowdenfit.results.kept import file_checksum
 
 TABLE = "input_force_N,output_force_N\n10,8\n20,16.1\n30,23.9\n40,32.1\n50,39.9\n60,48.1\n"
 COMMANDS = {  # what is typed behind each verb, and a word of what it prints
@@ -51,7 +51,7 @@ def places(tmp_path_factory, on_body, quick_results, loop_results):
     (folder / "fleet" / FLEET_TABLE).write_text("\n".join(lines[:4]) + "\n")
     (folder / "pooled").mkdir()
     write_fleet_draws(folder / "pooled" / FLEET_DRAWS, fleet_draws(3, cables=4, draws=256)[0])
-    (folder / "pooled" / FLEET_PAGE).write_text(json.dumps({CHECKSUM: checksum(folder / "pooled" / FLEET_DRAWS)}))
+    (folder / "pooled" / FLEET_PAGE).write_text(json.dumps({CHECKSUM: file_checksum(folder / "pooled" / FLEET_DRAWS)}))
     return {"DATASETS": on_body.parent, "FIT": quick_results, "OTHER": folder / "other", "LOOP": loop_results, "TMP": folder}
 
 

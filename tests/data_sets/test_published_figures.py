@@ -20,7 +20,7 @@ from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.units import conversion_factor
 
 # The on-body paper's printed curves: A [deg], B [mm], C [mm] of equation 8.
@@ -167,7 +167,7 @@ def test_equation_9_with_the_papers_coefficients_gives_its_efficiencies(on_body,
 
 def test_equation_9_is_best_at_475_mm(on_body):
     model = build_model(_equation_9(on_body, PRINTED_COEFFICIENTS))
-    length, efficiency = jax.jit(optimum_of(model))(jnp.zeros(model.space.size))
+    length, efficiency = jax.jit(make_optimizer(model))(jnp.zeros(model.space.size))
     assert float(length) == pytest.approx(475.25, abs=0.005)
     assert 100 * float(efficiency) == pytest.approx(78.683, abs=5e-4)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.arguments import checked
+from bowdenfit.arguments import read_first
 
 pytestmark = pytest.mark.extended
 
@@ -97,7 +97,7 @@ def test_every_public_function_reads_its_arguments():
 
 
 def test_arguments_by_place_and_by_name_are_read_alike():
-    @checked
+    @read_first
     def plain(dataset: Path, *, count: int = 3) -> tuple[Path, int]:
         return dataset, count
 

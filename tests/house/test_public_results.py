@@ -14,7 +14,7 @@ import pytest
 from IPython.lib.pretty import pretty
 
 import bowdenfit as bf
-from bowdenfit.display import Display, shortened
+from bowdenfit.display import Display, shorten_lines
 from bowdenfit.html_text import as_html
 from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
@@ -297,10 +297,10 @@ def test_what_is_not_to_be_trusted_says_so_first():
 
 def test_what_is_long_is_cut_with_a_word_on_how_to_see_the_rest():
     text = "\n".join(f"line {i} {'x' * 200}" for i in range(50))
-    lines = shortened(text).splitlines()
+    lines = shorten_lines(text).splitlines()
     assert len(lines) == MOST_LINES and all(len(line) <= 90 for line in lines)
     assert lines[-1] == "... and 41 more lines; print() shows them."
-    assert shortened("a\nb") == "a\nb"
+    assert shorten_lines("a\nb") == "a\nb"
 
 
 def test_ruled_columns_become_cells_and_what_stands_below_them_does_not():

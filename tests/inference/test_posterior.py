@@ -22,7 +22,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import build_model
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.results.store import posterior_page
 
 # model.md, section 8: mean, standard deviation; efficiencies only, continuous geometry. Two NUTS implementations agree.
@@ -75,7 +75,7 @@ class Bench:
     """One density and what follows from its z; compiled once."""
 
     def __init__(self, posterior: LogDensity):
-        names, optimum = value_function(posterior.model), optimum_of(posterior.model)
+        names, optimum = value_function(posterior.model), make_optimizer(posterior.model)
         self.posterior = posterior
         self._implied = for_each_draw(lambda z: (names(z), optimum(z)), posterior.model.space.size)
         self._programs = cache(lambda walkers: compile_walkers(posterior, SamplerSettings(n_walkers=walkers)))

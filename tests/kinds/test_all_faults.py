@@ -6,7 +6,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.description.placeholders import PLACEHOLDERS
-from bowdenfit.errors import DatasetError, Faults, together
+from bowdenfit.errors import DatasetError, Faults, combine_errors
 
 CABLE = """
 schema = 1
@@ -88,7 +88,7 @@ def test_of_many_different_faults_twenty_are_said_and_the_rest_counted():
     lines = str(error.value).splitlines()
     assert (lines[0], len(lines), lines[-1]) == ("32 things are wrong:", 22, "- and 12 more.")
     assert len(error.value.faults) == 32
-    assert len(together([error.value, DatasetError("one more.")]).faults) == 33
+    assert len(combine_errors([error.value, DatasetError("one more.")]).faults) == 33
 
 
 def test_a_column_that_is_missing_is_one_fault_however_many_rows_need_it(bench, refuse):

@@ -9,7 +9,7 @@ from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
 from kept_data import assert_kept
 
-from bowdenfit.plots.bands import evenly
+from bowdenfit.plots.bands import choose_evenly
 from bowdenfit.questions.bends.bending_loss_figure import BendingLoss, EfficiencyLine
 from bowdenfit.questions.bends.loops_figure import LoopCurve
 from bowdenfit.questions.bends.preload_figure import PreloadCurve, stretches
@@ -313,8 +313,8 @@ def test_wrap_angles_differ_in_color_and_marker_and_are_sorted():
 
 
 def test_of_many_wrap_angles_an_even_choice_is_shown_and_this_is_said():
-    assert evenly(range(12), 6) == [0, 2, 4, 7, 9, 11]
-    assert evenly(range(3), 6) == [0, 1, 2]
+    assert choose_evenly(range(12), 6) == [0, 2, 4, 7, 9, 11]
+    assert choose_evenly(range(3), 6) == [0, 1, 2]
     assert "8 of 12 shown" in labels_of(drawn("stretch", "twelve angles"))
     loops = drawn("loops", "twelve angles")
     assert len(loops.axes[::2]) == 6 and loops.axes[-2].get_title() == "990 deg"

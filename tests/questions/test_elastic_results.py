@@ -29,7 +29,7 @@ from bowdenfit.questions.simulate.simulation import empty_tables, true_values, w
 from bowdenfit.questions.simulate.tables import read_bench
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 
 pytestmark = pytest.mark.extended
 
@@ -329,8 +329,8 @@ def test_a_loop_along_a_route_without_preload_has_the_optimum_of_one_rope(on_bod
     single, loop = (build_model(bf.read(on_body, settings=settings)) for settings in ((), ('cable.kind="loop"',)))
     z = np.random.default_rng(0).normal(scale=0.2, size=single.space.size)
     z = jax.numpy.asarray(z)
-    length, efficiency = optimum_of(single)(z)
-    length_of_loop, efficiency_of_loop = optimum_of(loop)(z)
+    length, efficiency = make_optimizer(single)(z)
+    length_of_loop, efficiency_of_loop = make_optimizer(loop)(z)
     assert float(length_of_loop) == pytest.approx(float(length), abs=1e-4)
     assert float(efficiency_of_loop) == pytest.approx(float(efficiency), rel=1e-12)
     force = loop.cable.friction.conditions.reference_force

@@ -37,7 +37,7 @@ from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import error_of_difference, explained_share, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin
 
@@ -64,7 +64,7 @@ def pretended(dataset: Dataset, center: np.ndarray | dict[str, float], spread: f
     z = np.asarray(model.space.unconstrain(center)) if isinstance(center, dict) else center
     z = z + spread * np.random.default_rng(4).standard_normal((n, model.space.size))
     shown = for_each_draw(value_function(model), model.space.size)(z)
-    best = for_each_draw(optimum_of(model), model.space.size)(z) if model.description.route else ()
+    best = for_each_draw(make_optimizer(model), model.space.size)(z) if model.description.route else ()
     optimum = {name: b[None] for name, b in zip(("optimal_length", "optimal_efficiency"), best, strict=False)}
     drawn = Draws(z[None], {k: v[None] for k, v in shown.items()}, optimum, {}, {}, {}, {}, {}, 1, n, 0.3)
     return Fit(dataset, None, drawn, True, (), Origin(1, {}))  # type: ignore[arg-type]
@@ -555,7 +555,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), 3, design=design)
     laboratory, density = Laboratory(), Density(build_model(dataset))
     z = laboratory.draws(density, 1)
-    length = for_each_draw(optimum_of(density.model), density.model.space.size)
+    length = for_each_draw(make_optimizer(density.model), density.model.space.size)
     before, generator = length(z)[0], np.random.default_rng(2)
     candidates = [Candidate("efficiency", 400.0), Candidate("efficiency", 500.0), Candidate("angle", 500.0)]
     readings = simulated_readings(density.model, dataset.measurements, candidates, z, 1)

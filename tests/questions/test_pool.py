@@ -28,7 +28,7 @@ from bowdenfit.questions.pool.pooling import pooled
 from bowdenfit.questions.pool.unlike import anderson_darling, chances
 from bowdenfit.questions.pool.words import pool_text
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
-from bowdenfit.results.kept import checksum
+from bowdenfit.results.kept import file_checksum
 
 pytestmark = pytest.mark.extended
 
@@ -322,7 +322,7 @@ def test_coefficients_that_mean_different_things_are_pooled_apart(few):
 
 def finished_fleet(folder, drawn):
     write_fleet_draws(folder / FLEET_DRAWS, drawn)
-    (folder / FLEET_PAGE).write_text(json.dumps({CHECKSUM: checksum(folder / FLEET_DRAWS)}))
+    (folder / FLEET_PAGE).write_text(json.dumps({CHECKSUM: file_checksum(folder / FLEET_DRAWS)}))
 
 
 @pytest.mark.parametrize(

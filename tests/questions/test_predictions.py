@@ -14,8 +14,8 @@ from bowdenfit.inference import draws
 from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, replicator, value_function
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
-from bowdenfit.results.choices import at_edge, best_window, rank_choices
-from bowdenfit.results.optimum import optimum_of, route_grid
+from bowdenfit.results.choices import find_best_window, is_at_edge, rank_choices
+from bowdenfit.results.optimum import make_optimizer, route_grid
 
 FINE = 20_001
 
@@ -44,14 +44,14 @@ def on_body_model(on_body) -> Model:
 def test_the_optimum_is_that_of_a_fine_grid(on_body, geometry):
     model = build_model(load_dataset(on_body, [f'geometry="{geometry}"']))
     z = _draws(model, 120, 1)
-    length, efficiency = for_each_draw(optimum_of(model), model.space.size)(z)
+    length, efficiency = for_each_draw(make_optimizer(model), model.space.size)(z)
     brute_length, brute_efficiency = _by_brute_force(model, z)
     if geometry == "continuous":
         step = 100 / (FINE - 1)
         assert np.all(np.abs(length - brute_length) <= step + 1e-9)
         assert np.all(efficiency >= brute_efficiency - 1e-12)  # refined past the grid, so never worse
         assert np.sum((length > 431) & (length < 529)) > 10  # inside for many, and at an end for others
-        assert np.any(at_edge(length, (430.0, 530.0)))
+        assert np.any(is_at_edge(length, (430.0, 530.0)))
     else:  # past a jump of the paper's curves the best is a limit that neither reaches
         np.testing.assert_allclose(efficiency, brute_efficiency, atol=1e-4)
     at_optimum = [efficiency_at(model, z[i : i + 1], length[i : i + 1])[0, 0] for i in range(5)]
@@ -64,7 +64,7 @@ def test_the_optimum_of_two_opposed_exponentials_is_where_their_slopes_balance()
     prior = {f"{k}_angle_{x}": {"fixed": v} for k, abc in curves.items() for x, v in zip("abc", abc, strict=True)}
     description = cable(2, prior=prior, friction={"mu_free": {"fixed": 0.1}, "mu_squeezed": {"fixed": 0.16}})
     model = build_model(measured(description, noise=False)[0])
-    length, efficiency = jax.jit(optimum_of(model))(jnp.zeros(model.space.size))
+    length, efficiency = jax.jit(make_optimizer(model))(jnp.zeros(model.space.size))
     x = np.log(0.16 * np.exp(-0.9) * 1.1 / (0.1 * np.exp(-0.7) * 1.3)) / (1.3 + 1.1)
     assert float(length) == pytest.approx(500 + 100 * x, abs=1e-4)
     loss = 0.1 * np.exp(-0.7 + 1.3 * x) + 0.16 * np.exp(-0.9 - 1.1 * x)
@@ -75,9 +75,9 @@ def test_the_optimum_of_two_opposed_exponentials_is_where_their_slopes_balance()
 def test_an_optimum_at_an_end_of_the_range_is_exactly_there_and_flagged(slope, end):
     curve = {"free_angle_a": {"fixed": -0.5}, "free_angle_b": {"fixed": slope}, "free_angle_c": {"fixed": 0.0}}
     model = build_model(measured(cable(1, prior=curve), noise=False)[0])
-    length, _ = jax.jit(optimum_of(model))(jnp.zeros(model.space.size))
+    length, _ = jax.jit(make_optimizer(model))(jnp.zeros(model.space.size))
     assert float(length) == end
-    assert at_edge(np.array([float(length)]), (400.0, 600.0)).all()
+    assert is_at_edge(np.array([float(length)]), (400.0, 600.0)).all()
 
 
 def test_a_cable_without_curves_is_equally_efficient_everywhere():
@@ -88,11 +88,11 @@ def test_a_cable_without_curves_is_equally_efficient_everywhere():
     grid = route_grid(model)
     efficiency = efficiency_at(model, z, grid)
     assert np.all(np.ptp(efficiency, axis=1) == 0.0)
-    length, best = for_each_draw(optimum_of(model), model.space.size)(z)
+    length, best = for_each_draw(make_optimizer(model), model.space.size)(z)
     assert np.all(length == grid[0])  # all are best; the first is named, and flagged as at the edge
-    assert at_edge(length, description.route.range).all()
+    assert is_at_edge(length, description.route.range).all()
     np.testing.assert_allclose(best, efficiency[:, 0], rtol=1e-14)
-    window = best_window(grid, efficiency, best)
+    window = find_best_window(grid, efficiency, best)
     assert (window.start, window.stop) == (400.0, 600.0)
     choices = rank_choices(grid[:4], efficiency[:, :4])
     assert [c.probability_best for c in choices] == [0.25] * 4
@@ -101,7 +101,7 @@ def test_a_cable_without_curves_is_equally_efficient_everywhere():
 
 def test_a_length_counts_as_at_the_edge_within_a_thousandth_of_the_range():
     lengths = np.array([430.0, 430.09, 430.11, 480.0, 529.89, 529.91, 530.0])
-    np.testing.assert_array_equal(at_edge(lengths, (430.0, 530.0)), [True, True, False, False, False, True, True])
+    np.testing.assert_array_equal(is_at_edge(lengths, (430.0, 530.0)), [True, True, False, False, False, True, True])
 
 
 # Lengths that can be bought ---------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def _good(rows: list[str]) -> np.ndarray:
 )
 def test_the_window_is_the_stretch_around_the_surest_length_that_is_good_enough_often_enough(rows, probability, window):
     efficiency = _good(rows)
-    found = best_window(GRID, efficiency, efficiency.max(axis=1), 0.01, probability)
+    found = find_best_window(GRID, efficiency, efficiency.max(axis=1), 0.01, probability)
     np.testing.assert_equal((found.start, found.stop), tuple(float(x) for x in window))
     assert (found.within, found.probability) == (0.01, probability)
 
@@ -171,8 +171,8 @@ def test_every_length_of_the_window_is_within_one_per_cent_as_often_as_promised(
     z = _draws(model, 400, 3) * 0.2
     grid = route_grid(model)
     efficiency = efficiency_at(model, z, grid)
-    _, best = for_each_draw(optimum_of(model), model.space.size)(z)
-    window = best_window(grid, efficiency, best, within=0.02, probability=0.6)
+    _, best = for_each_draw(make_optimizer(model), model.space.size)(z)
+    window = find_best_window(grid, efficiency, best, within=0.02, probability=0.6)
     inside = (grid >= window.start) & (grid <= window.stop)
     share = (efficiency >= 0.98 * best[:, None]).mean(axis=0)
     assert 0 < inside.sum() < len(grid)

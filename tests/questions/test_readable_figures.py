@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
 from bowdenfit.plots.layout import text_width
-from bowdenfit.plots.panels import short_title
+from bowdenfit.plots.panels import shorten_title
 from bowdenfit.questions.figures import caption_of, figures_of
 
 pytestmark = pytest.mark.extended
@@ -66,10 +66,11 @@ def test_figures_of_the_synthetic_bench_can_be_read(least_squares_of):
 
 def test_a_name_that_is_too_long_for_a_panel_begins_with_a_word():
     long = "upper sheath between the hip plate and the first clamp of the thigh cuff"
-    shown = short_title(long, 1.9)
+    shown = shorten_title(long, 1.9)
     assert shown == "\N{HORIZONTAL ELLIPSIS} and the first clamp of the thigh cuff" and text_width(shown) <= 1.9
-    assert short_title("squeezed sheath", 1.9) == "squeezed sheath"
-    assert short_title("x" * 200, 1.9).startswith("\N{HORIZONTAL ELLIPSIS}x") and text_width(short_title("x" * 200, 1.9)) <= 1.9
+    assert shorten_title("squeezed sheath", 1.9) == "squeezed sheath"
+    cut = shorten_title("x" * 200, 1.9)
+    assert cut.startswith("\N{HORIZONTAL ELLIPSIS}x") and text_width(cut) <= 1.9
 
 
 def test_no_friction_model_is_left_out():

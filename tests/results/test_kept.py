@@ -19,8 +19,8 @@ from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.results import drawn
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
-from bowdenfit.results.kept import SCHEMA, keep, kept
-from bowdenfit.results.plain import stored
+from bowdenfit.results.kept import SCHEMA, read_answers, write_answers
+from bowdenfit.results.plain import serialize
 
 HEAVY = {
     "jax",
@@ -153,7 +153,7 @@ def edit_fit(folder, monkeypatch):
 
 
 def update_matplotlib(folder, monkeypatch):
-    monkeypatch.setattr(drawn, "version_of", lambda _: "99.0")
+    monkeypatch.setattr(drawn, "installed_version", lambda _: "99.0")
 
 
 def leave_unnamed(folder, monkeypatch):
@@ -248,7 +248,7 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
 )
 def test_another_question_is_not_answered_by_what_was_kept(results, other):
     asked = {name: one.default for name, one in inspect.signature(PREDICT.function).parameters.items()}
-    answers = kept(results)
+    answers = read_answers(results)
     assert PREDICT.kept(answers, asked) is not None
     assert PREDICT.kept(answers, asked | other) is None
 
@@ -283,18 +283,18 @@ def _spoil_draws(folder):
 )
 def test_nothing_is_read_back_of_a_folder_that_was_changed(results, tmp_path, change):
     copy = shutil.copytree(results, tmp_path / "copy")
-    assert kept(copy)
+    assert read_answers(copy)
     change(copy)
-    assert kept(copy) == {}
+    assert read_answers(copy) == {}
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("verb", ["length", "predict", "identify"])
 def test_an_answer_that_was_kept_in_another_shape_is_worked_out(results, tmp_path, run, verb):
     copy = shutil.copytree(results, tmp_path / "copy")
-    other = kept(copy) | {"length": {"unit": "mm"}, "predict": [430.0], "identify": {"groups": {}}}
-    keep(copy, other, (copy / "fit.json").read_text())
-    assert kept(copy) == other
+    other = read_answers(copy) | {"length": {"unit": "mm"}, "predict": [430.0], "identify": {"groups": {}}}
+    write_answers(copy, other, (copy / "fit.json").read_text())
+    assert read_answers(copy) == other
     assert run(verb, copy) == run(verb, results)
 
 
@@ -318,7 +318,7 @@ def test_a_changed_fit_is_answered_anew(results, tmp_path, run):
 def test_a_fit_that_is_not_to_be_trusted_says_so_beside_what_is_read_back(on_body, tmp_path, run):
     few = ("sampler.n_walkers=32", "sampler.max_steps=200")
     bf.fit(on_body, output=tmp_path / "fit", seed=1, settings=few, figures=False)
-    assert LENGTH.kept is not None and kept(tmp_path / "fit")["troubles"]
+    assert LENGTH.kept is not None and read_answers(tmp_path / "fit")["troubles"]
     code, out, err = run("length", tmp_path / "fit")
     (tmp_path / "fit" / ANSWERS).unlink()
     assert code == 3
@@ -331,7 +331,7 @@ def test_figures_show_what_they_would_show_if_it_were_worked_out(results):
     assert list(again) == list(worked_out)
     for name, data in worked_out.items():
         assert type(again[name]) is type(data), name
-        assert stored(again[name]) == stored(data), name
+        assert serialize(again[name]) == serialize(data), name
 
 
 def test_figures_that_were_changed_are_not_drawn_again(results, tmp_path):
@@ -340,7 +340,7 @@ def test_figures_that_were_changed_are_not_drawn_again(results, tmp_path):
     page[len(page) // 2] ^= 1
     (copy / FIGURE_DATA).write_bytes(page)
     assert kept_figures(copy) == {}
-    assert kept(copy)
+    assert read_answers(copy)
 
 
 @pytest.mark.parametrize(

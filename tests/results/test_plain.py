@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.results.plain import plain, rebuilt, stored
+from bowdenfit.results.plain import deserialize, plain_data, serialize
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 
@@ -47,14 +47,14 @@ OUTER = Outer(
 
 
 def test_an_answer_gives_the_attributes_that_its_json_names_and_no_number_where_there_is_none():
-    assert plain(OUTER)["inner"] == [{"words": "a", "twice": 2 / 3}]
-    assert plain(OUTER)["by_name"] == {"b": {"words": "c", "twice": None}}
-    assert plain(OUTER)["vector"] == [0.1, None, None]
-    assert plain({"sd": np.float64(0.5), "n": np.int64(2)}) == {"sd": 0.5, "n": 2}
+    assert plain_data(OUTER)["inner"] == [{"words": "a", "twice": 2 / 3}]
+    assert plain_data(OUTER)["by_name"] == {"b": {"words": "c", "twice": None}}
+    assert plain_data(OUTER)["vector"] == [0.1, None, None]
+    assert plain_data({"sd": np.float64(0.5), "n": np.int64(2)}) == {"sd": 0.5, "n": 2}
 
 
 def test_stored_data_come_back_bit_for_bit():
-    again = rebuilt(Outer, json.loads(json.dumps(stored(OUTER), allow_nan=False)))
+    again = deserialize(Outer, json.loads(json.dumps(serialize(OUTER), allow_nan=False)))
     for name in vars(OUTER):
         one, other = getattr(OUTER, name), getattr(again, name)
         assert type(one) is type(other), name

@@ -10,7 +10,7 @@ from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint
-from bowdenfit.results.folder import replace_when_whole
+from bowdenfit.results.folder import replace_atomically
 
 QUICK = (
     "sampler.n_ensembles=2",
@@ -252,7 +252,7 @@ def test_a_missing_folder_is_a_sentence(tmp_path):
 def test_a_write_that_fails_leaves_the_old_file(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with pytest.raises(Stop), replace_when_whole(path) as temporary:
+    with pytest.raises(Stop), replace_atomically(path) as temporary:
         temporary.write_text("new, but")
         raise Stop
     assert path.read_text() == "old"

@@ -14,7 +14,7 @@ from bowdenfit.inference.checkpoint import append_record, checkpoint_header, rea
 from bowdenfit.questions.calibrate.store import open_replications
 from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
-from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserved, write_text
+from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserve_folder, write_text
 
 pytestmark = pytest.mark.extended
 
@@ -95,7 +95,7 @@ def test_a_disk_without_room_is_no_mistake_of_the_user(tmp_path):
 
 
 def test_two_fits_into_one_folder_are_told_apart_at_the_start(on_body, tmp_path):
-    with reserved(tmp_path / "fit"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
+    with reserve_folder(tmp_path / "fit"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
         bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     assert not (tmp_path / "fit").exists()
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
@@ -160,7 +160,7 @@ def test_a_fit_that_is_written_again_counts_as_finished_only_when_all_of_it_is(o
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(store, "keep", full)
+    monkeypatch.setattr(store, "write_answers", full)
     with pytest.raises(DiskError):
         store.save(found, found.summary(), tmp_path / "fit", force=True)
     assert not (tmp_path / "fit" / "fit.json").exists()
@@ -199,6 +199,6 @@ def test_nothing_but_files_is_replaced_by_a_file(tmp_path):
 
 
 def test_a_calibration_is_refused_where_something_else_is_being_written(tmp_path):
-    with reserved(tmp_path / "cal"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
+    with reserve_folder(tmp_path / "cal"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
         bf.calibrate(YARN, replications=2, workers=1, output=tmp_path / "cal", seed=3)
     assert not (tmp_path / "cal").exists()

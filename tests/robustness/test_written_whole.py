@@ -9,7 +9,7 @@ from bowdenfit.plots.layout import empty_page
 from bowdenfit.questions.check.verb import show_priors
 from bowdenfit.questions.simulate import fleet, tables
 from bowdenfit.questions.writing import write_answer
-from bowdenfit.results.folder import filled_when_whole
+from bowdenfit.results.folder import fill_folder_atomically
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_an_answer_that_finds_no_room_leaves_nothing_and_an_earlier_one_stays(tm
 def test_what_lay_in_a_folder_stays_beside_what_is_filled_in(tmp_path):
     (tmp_path / "made").mkdir()
     (tmp_path / "made" / "bench.toml").write_text("plan")
-    with filled_when_whole(tmp_path / "made") as place:
+    with fill_folder_atomically(tmp_path / "made") as place:
         (place / "a").write_text("x")
     assert sorted(path.name for path in (tmp_path / "made").iterdir()) == ["a", "bench.toml"]
     assert [path.name for path in tmp_path.iterdir()] == ["made"]

@@ -9,7 +9,7 @@ import pytest
 from conftest import QUICK
 
 import bowdenfit as bf
-from bowdenfit.results.record import once
+from bowdenfit.results.record import cached_per_fit
 
 IN_A_PROGRAM = """
 import sys
@@ -33,7 +33,7 @@ def test_a_program_that_guards_nothing_gets_the_same_fit_as_the_command_line(on_
 def test_a_question_is_worked_out_once_for_each_record(quick_fit, on_body_squares):
     asked = []
 
-    @once
+    @cached_per_fit
     def question(fit):
         asked.append(fit)
         return len(asked)

@@ -27,7 +27,7 @@ from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, begun_before
 from bowdenfit.results import folder as names
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
-from bowdenfit.results.kept import checksum, kept
+from bowdenfit.results.kept import file_checksum, read_answers
 from bowdenfit.run.storing import choose_seed
 
 ODD_JSON: tuple[Any, ...] = (
@@ -192,7 +192,7 @@ def begun_fleet(place: Path) -> Path:
     attributes = {"mu": {"units": "1"}}
     drawn = FleetDraws(labels, ("a", "b", "c"), nothing, nothing, nothing, values, stats, attributes, about)
     write_fleet_draws(place / FLEET_DRAWS, drawn)
-    page = {"seed": 3, "versions": versions(), "fitted": [], CHECKSUM: checksum(place / FLEET_DRAWS)}
+    page = {"seed": 3, "versions": versions(), "fitted": [], CHECKSUM: file_checksum(place / FLEET_DRAWS)}
     (place / FLEET_PAGE).write_text(json.dumps(page) + "\n")
     store.keep([PieceFit(name, np.ones((2, 8)), "laplace", 0.1, 400.0, ("why",)) for name in "de"])
     return place
@@ -209,7 +209,7 @@ def ask_fit(folder: Path) -> None:
     """What questions read of a finished fit."""
     from bowdenfit.questions.figures import kept_figures
 
-    kept(folder)
+    read_answers(folder)
     kept_figures(folder)
     found = bf.load(folder)
     found.summary()

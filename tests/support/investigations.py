@@ -12,7 +12,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.calibrate.refit import with_parameters_of
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 
 HELD = 0.9
 
@@ -59,5 +59,5 @@ def drawn(model: Model, z: np.ndarray) -> dict[str, np.ndarray]:
     values = np.asarray(jax.vmap(model.space.vector)(z))
     found = {p.name: values[:, i] for i, p in enumerate(model.space.free)}
     if model.description.route is not None:
-        found["best length"] = np.asarray(for_each_draw(optimum_of(model), model.space.size)(z)[0])
+        found["best length"] = np.asarray(for_each_draw(make_optimizer(model), model.space.size)(z)[0])
     return found

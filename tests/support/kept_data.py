@@ -2,7 +2,7 @@
 
 from bowdenfit.questions.figures import data_types
 from bowdenfit.results.arrays import read_arrays, write_arrays
-from bowdenfit.results.plain import stored
+from bowdenfit.results.plain import serialize
 
 
 def assert_kept(data, path):
@@ -12,4 +12,4 @@ def assert_kept(data, path):
     assert list(again) == list(data)
     for name, one in data.items():
         assert type(again[name]) is type(one), name
-        assert stored(again[name]) == stored(one), name
+        assert serialize(again[name]) == serialize(one), name

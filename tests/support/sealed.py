@@ -5,13 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.results.kept import CHECKSUM, own_checksum
+from bowdenfit.results.kept import CHECKSUM, page_checksum
 
 
 def sealed(page: dict[str, Any]) -> str:
     """A page with the checksum of what it says."""
     said = {key: value for key, value in page.items() if key != CHECKSUM}
-    return json.dumps(said | {CHECKSUM: own_checksum(said)})
+    return json.dumps(said | {CHECKSUM: page_checksum(said)})
 
 
 def edit_sealed(path: Path, change: Callable[[dict[str, Any]], None]) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError, together
+from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
@@ -113,7 +113,7 @@ def _check_moving(strokes: Labels, found: Mapping[str, Column]) -> Labels | None
         return None
     if not strokes.all():
         why = "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
-        raise together([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
+        raise combine_errors([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
     return strokes
 
 

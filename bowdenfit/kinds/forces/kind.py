@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from bowdenfit.description import Description, Finite
-from bowdenfit.errors import nearest
+from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.coarse import Coarse, coarse
 from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
@@ -208,7 +208,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         """Return that wrap angles are of a column that no contact has."""
         known = description.angle_columns
         unknown = next((name for name in design.own_angles if name not in known), None)
-        return f"own_angles.{unknown}: no contact has that column{nearest(unknown, known or ['none'])}" if unknown else ""
+        return f"own_angles.{unknown}: no contact has that column{suggest_name(unknown, known or ['none'])}" if unknown else ""
 
     @override
     def empty_table(self, design: ForceDesign, description: Description, file: str) -> ForceTable:

@@ -84,7 +84,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
     """
     paths, contacts = source.files, source.description.angle_columns
     faults = Faults()
-    parts = [part for part in faults.each(lambda path: _read_force_file(path, source), paths, None) if part is not None]
+    parts = [part for part in faults.read_all(lambda path: _read_force_file(path, source), paths, None) if part is not None]
     faults.refuse()
     names: list[str] = []
     runs = []
@@ -142,12 +142,12 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     pulleys, nothing = source.description.cable.pulleys, np.full(len(table.rows), np.nan)
     read = partial(_tensions, table, found, pulleys)
-    input_force, output_force = table.faults.each(read, ("input", "output"), nothing)
+    input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
     own = read_own_angles(table, found, contacts)
     route_values = read_route(table, found, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
     group, remarks = tuple[str, ...](), list[str]()
-    with table.faults.noted():
+    with table.faults.collect():
         group, remarks = read_groups(found, table.file, *groups)
     remarks += taken_in_pairs(table, found, source.columns)
     if "stroke" not in found:

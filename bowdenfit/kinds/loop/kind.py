@@ -10,7 +10,7 @@ from bowdenfit.description import Description, Finite, Table
 from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.description.values import Frozen
-from bowdenfit.errors import DatasetError, together
+from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
@@ -107,7 +107,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
         check_spelling(table, found, others)
         nothing = np.full(len(table.rows), np.nan)
-        input_force, output_force = table.faults.each(
+        input_force, output_force = table.faults.read_all(
             lambda end: _end_forces(table, found, end, pulleys), ("input", "output"), nothing
         )
         stroke = read_strokes(found, len(table.rows), held="")
@@ -121,7 +121,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row "
                 "out."
             )
-            raise together([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
+            raise combine_errors([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
         made = LoopTable(at, input_force, output_force, stroke, preload, own, provenance_of(table))
         _check_loss(table, made)
         remarks = []

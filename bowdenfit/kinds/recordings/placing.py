@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.description import Description, QuantityValue, RecordingFile, Route
-from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.matching import Quantity
 from bowdenfit.recordings.name_patterns import match_name, pattern_fields
@@ -44,7 +44,7 @@ def _check_pattern(description: Description, pattern: str) -> None:
     place = "cable.toml, tables.recordings.pattern"
     for name, unit in pattern_fields(pattern):
         if name not in known:
-            raise DescriptionError(f"{place}: {name!r} is unknown{nearest(name, known)}")
+            raise DescriptionError(f"{place}: {name!r} is unknown{suggest_name(name, known)}")
         if unit and name != "at" and name != "run":
             dimension = speed_dimension(unit) if name == "velocity" else "angle"
             try:

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
-from bowdenfit.errors import DatasetError, DescriptionError, Faults, nearest
+from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.kind import Source, TableFromFiles
@@ -64,7 +64,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     entries = _entries(source)
     _check_names(entries)
     faults = Faults()
-    read = faults.each(lambda each: _to_read(description, *each, channels), entries, None)
+    read = faults.read_all(lambda each: _to_read(description, *each, channels), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -199,7 +199,7 @@ def _known(channels: Mapping[str, ColumnSource], description: Description) -> di
     for name in channels:
         if name not in known:
             raise DescriptionError(
-                f"cable.toml, channels of recordings: no quantity is called {name!r}{nearest(name, known)}"
+                f"cable.toml, channels of recordings: no quantity is called {name!r}{suggest_name(name, known)}"
             )
     return dict(channels)
 
@@ -211,7 +211,7 @@ def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndar
         if name not in columns:
             raise DescriptionError(
                 f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is no column of a contact's wrap angle"
-                f"{nearest(name, columns)}"
+                f"{suggest_name(name, columns)}"
             )
     stated = [entry.wrap_angles.get(name) for name in columns]
     angles = [float("nan") if q is None else q.to("angle") for q in stated]

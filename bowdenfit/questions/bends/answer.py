@@ -21,7 +21,7 @@ from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import stiffness_with_springs
 from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
-from bowdenfit.results.record import Record, once, values_of
+from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 
 _BENDS = 25  # wrap angles at which a range of bends is looked at
 _SHOWN = 5  # wrap angles of a summary
@@ -72,7 +72,7 @@ class Elastic(Display):
     def over(self, function: Callable[..., Any], *data: Any) -> Any:
         """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
         with jax.enable_x64(True):
-            return for_each_value(function, values_of(self.fit), *data)
+            return for_each_value(function, parameter_values(self.fit), *data)
 
     @cached_property
     def measured_bends(self) -> np.ndarray:
@@ -320,7 +320,7 @@ class Elastic(Display):
             )
 
 
-@once
+@cached_per_fit
 def elastic_answers(fit: Record) -> Elastic:
     """Return the elastic answers of a fit; of a copy, so that what is kept for a record does not keep the record itself."""
     return Elastic(replace(fit))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
-from bowdenfit.plots.captions import curve_words
-from bowdenfit.plots.layout import LEGEND_ROW, TITLE, columns_within, legend_above, panels
+from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.layout import LEGEND_ROW, TITLE, count_columns, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
 from bowdenfit.questions.bends.loop_readings import measured_efficiency, readings_of_loop
@@ -136,9 +136,9 @@ def caption(loss: BendingLoss) -> str:
     return (
         "Efficiency, output over input force while moving forward, against the wrap angle, at "
         f"{significant(loss.input_force, 4)} N input "
-        f"force. Black: the cable as fitted. {curve_words(len(loss.fitted) > 1)} In color: the same cable with other friction "
-        "coefficients, and with other preloads. Dashed: the capstan equation alone, which has no preload. Circles: measured, "
-        f"between the readings next to that input force, n = {counted(len(loss.points_wrap_angle), 'wrap angle')}."
+        f"force. Black: the cable as fitted. {describe_curve(len(loss.fitted) > 1)} In color: the same cable with other "
+        "friction coefficients and other preloads. Dashed: the capstan equation alone, which has no preload. Circles: "
+        f"measured, between the readings next to that input force, n = {counted(len(loss.points_wrap_angle), 'wrap angle')}."
     )
 
 
@@ -149,7 +149,7 @@ def draw(loss: BendingLoss, width: float | None = None) -> Figure:
     sides = [side for side in sides if side[2]] or [(*FITTED, ())]
     rows = max(-(-len(lines) // LINES_IN_A_ROW) for _, _, lines in sides)
     page, above = width or (WIDE if len(sides) > 1 else MEDIUM), TITLE + rows * LEGEND_ROW
-    columns = columns_within(page, len(sides), LEAST_WIDTH, 0.2)
+    columns = count_columns(page, len(sides), LEAST_WIDTH, 0.2)
     figure, flat = panels([2.3] * (len(sides) // columns), columns, above, (0.2, above + 0.4), page, sharey=True)
     for axes, (what, colors, lines) in zip(flat, sides, strict=True):
         _lines(axes, loss, lines, colors)

@@ -14,7 +14,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import BATCH, for_each_value
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.equations import knows_preload
-from bowdenfit.results.record import Record, some_values
+from bowdenfit.results.record import Record, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
 POINTS = 61  # of a line
@@ -30,7 +30,7 @@ def of_draws(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> dict[st
         fit: The fit.
         curves: Function of the values of one draw.
     """
-    values = some_values(fit, 1 if fit.sampled is None else BATCH)
+    values = thinned_parameter_values(fit, 1 if fit.sampled is None else BATCH)
     with jax.enable_x64(True):
         found: dict[str, np.ndarray] = for_each_value(curves, values)
     return found

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
-from bowdenfit.plots.captions import curve_words, shown_words, strip_words
+from bowdenfit.plots.bands import choose_evenly, draw_quantiles, middle, name_band, note_shown_count
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
@@ -98,16 +98,16 @@ def caption(loops: tuple[LoopCurve, ...]) -> str:
     """What is drawn, in plain words."""
     n, shown = sum(len(loop.points_input) for loop in loops), min(len(loops), MOST)
     return (
-        f"Output against input force of the loop, moving forward and back, at {shown_words(shown, len(loops), 'wrap angle')}. "
-        f"{curve_words(len(loops[0].forward) > 1)} Dashed: a rope without preload. Purple: the input force beyond which the "
-        f"return side is slack. {strip_words('in N')} n = {counted(n, 'reading')}."
+        f"Output against input force of the loop, moving forward and back, at {count_shown(shown, len(loops), 'wrap angle')}. "
+        f"{describe_curve(len(loops[0].forward) > 1)} Dashed: a rope without preload. Purple: the input force beyond which the "
+        f"return side is slack. {describe_strip('in N')} n = {counted(n, 'reading')}."
     )
 
 
 @in_paper_style
 def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
     """Output against input force [N], a panel for each of at most six wrap angles."""
-    shown = evenly(loops, MOST)
+    shown = choose_evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
     made = panels_with_strips([loop.label for loop in shown], across, up, MOST_COLUMNS, width=width)
@@ -119,7 +119,7 @@ def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
         _residuals(strip, loop)
     made.finish_strips()
     made.label("Input force (N)", "Output force (N)", "N")
-    say_of_how_many(made.mains[-1], len(shown), len(loops), "wrap angles")
+    note_shown_count(made.mains[-1], len(shown), len(loops), "wrap angles")
     legend_above(made.figure, made.mains, columns={1: 2, 2: 3}.get(made.columns, 4))
     enlarge_marks(made.figure)
     return made.figure

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
-from bowdenfit.plots.captions import curve_words, shown_words, strip_words
+from bowdenfit.plots.bands import choose_evenly, draw_quantiles, name_band, note_shown_count
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
@@ -111,8 +111,8 @@ def caption(runs: tuple[MotorForce, ...]) -> str:
     """What is drawn, in plain words."""
     n, shown = sum(int(run.points_used.sum()) for run in runs), min(len(runs), MOST)
     return (
-        f"Force at the motor against its displacement, {shown_words(shown, len(runs), 'run')}: what was read, and the "
-        f"fitted loop through every turn of the motor. {curve_words(len(runs[0].force) > 1)} {strip_words('in N')} "
+        f"Force at the motor against its displacement, {count_shown(shown, len(runs), 'run')}: what was read, and the "
+        f"fitted loop through every turn of the motor. {describe_curve(len(runs[0].force) > 1)} {describe_strip('in N')} "
         f"n = {counted(n, 'reading')} in {counted(len(runs), 'run')}."
     )
 
@@ -120,7 +120,7 @@ def caption(runs: tuple[MotorForce, ...]) -> str:
 @in_paper_style
 def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
     """Force at the motor [N] against displacement [mm], a panel for each of at most six runs."""
-    shown = evenly(runs, MOST)
+    shown = choose_evenly(runs, MOST)
     across = [span([run.displacement], room=0.03) for run in shown]
     up = [span([run.force, run.points_force]) for run in shown]
     made = panels_with_strips([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
@@ -130,7 +130,7 @@ def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
         _readings(strip, run.points_force - run.points_fitted, run)
     made.finish_strips()
     made.label("Displacement at the motor (mm)", "Force at the motor (N)", "N")
-    say_of_how_many(made.mains[-1], len(shown), len(runs), "runs")
+    note_shown_count(made.mains[-1], len(shown), len(runs), "runs")
     legend_above(made.figure, made.mains, columns={1: 2, 2: 3}.get(made.columns, 4))
     enlarge_marks(made.figure)
     return made.figure

@@ -11,7 +11,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, has_elastic_answers
 from bowdenfit.questions.bends.equations import bending_contact
 from bowdenfit.questions.bends.preload_window import PreloadAnswer
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import significant
 
 _CLOSE = -0.9  # correlation of logarithms beyond which only a product is said to be known
@@ -38,7 +38,7 @@ class ElasticOverview:
     JSON: ClassVar = ("input_force", "friction_unit", "bends", "preload_window?", "sentences")
 
 
-@once
+@cached_per_fit
 def elastic_overview(fit: Record) -> ElasticOverview | None:
     """Answers at the wrap angles that were measured at; None without draws, or of a cable that has none."""
     if fit.sampled is None or not has_elastic_answers(fit):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, middle, name_band
-from bowdenfit.plots.captions import curve_words, strip_words
+from bowdenfit.plots.captions import describe_curve, describe_strip
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
@@ -85,9 +85,9 @@ def caption(curve: PreloadCurve) -> str:
     n = len(curve.points_preload)
     return " ".join(filter(None, (
         "Tension of the rope between fixed ends, which bending changes because it lengthens the sheath.",
-        curve_words(len(curve.preload) > 1),
+        describe_curve(len(curve.preload) > 1),
         "Gray: where the rope is slack." if np.max(curve.slack) > 0 else "",
-        strip_words("in N") if n else "",
+        describe_strip("in N") if n else "",
         f"n = {counted(n, 'reading')}." if n else "Preload was read at no bend; the curve follows from the other tables.",
     )))  # fmt: skip
 

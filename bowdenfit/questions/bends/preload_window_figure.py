@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, middle, name_band
-from bowdenfit.plots.captions import curve_words
+from bowdenfit.plots.captions import describe_curve
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.style import (
@@ -99,7 +99,7 @@ def caption(window: PreloadWindow) -> str:
     """What is drawn, in plain words."""
     return (
         "What a preload costs and what it buys. Above: the friction that is felt in free motion at the bend where it is "
-        f"largest. {curve_words(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
+        f"largest. {describe_curve(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
         "over all bends. Green: preloads for which that is nearly sure; the vertical line is the lowest that keeps both "
         "sides taut. Nothing here is measured directly; it follows from the fit."
     )

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, evenly, name_band, say_of_how_many
-from bowdenfit.plots.captions import curve_words, shown_words, strip_words
+from bowdenfit.plots.bands import choose_evenly, draw_quantiles, name_band, note_shown_count
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
@@ -86,8 +86,8 @@ def caption(runs: tuple[RingDown, ...]) -> str:
     """What is drawn, in plain words."""
     first, shown = runs[0], min(len(runs), MOST)
     return (
-        f"{first.quantity} against the time since the release of the joint, {shown_words(shown, len(runs), 'run')}: what was "
-        f"read, and the fitted free vibration. {curve_words(len(first.reading) > 1)} {strip_words(f'in {first.unit}')} "
+        f"{first.quantity} against the time since the release of the joint, {count_shown(shown, len(runs), 'run')}: what was "
+        f"read, and the fitted free vibration. {describe_curve(len(first.reading) > 1)} {describe_strip(f'in {first.unit}')} "
         f"n = {counted(sum(len(run.points) for run in runs), 'reading')} in {counted(len(runs), 'run')}."
     )
 
@@ -95,7 +95,7 @@ def caption(runs: tuple[RingDown, ...]) -> str:
 @in_paper_style
 def draw(runs: tuple[RingDown, ...], width: float | None = None) -> Figure:
     """Reading against time [s], a panel for each of at most six runs."""
-    shown = evenly(runs, MOST)
+    shown = choose_evenly(runs, MOST)
     across = [span([run.time], room=0.03) for run in shown]
     up = [span([run.reading, run.points]) for run in shown]
     made = panels_with_strips([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
@@ -107,7 +107,7 @@ def draw(runs: tuple[RingDown, ...], width: float | None = None) -> Figure:
         _readings(strip, run.points_time, run.points - run.points_fitted)
     made.finish_strips()
     made.label("Time (s)", f"{shown[0].quantity} ({shown[0].unit})", shown[0].unit)
-    say_of_how_many(made.mains[-1], len(shown), len(runs), "runs")
+    note_shown_count(made.mains[-1], len(shown), len(runs), "runs")
     legend_above(made.figure, made.mains, columns={1: 2, 2: 3}.get(made.columns, 4))
     enlarge_marks(made.figure)
     return made.figure

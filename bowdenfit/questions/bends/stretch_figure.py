@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, evenly, middle, name_band, say_of_how_many
-from bowdenfit.plots.captions import curve_words, shown_words, strip_words
+from bowdenfit.plots.bands import choose_evenly, draw_quantiles, middle, name_band, note_shown_count
+from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.strips import panels_with_strips
@@ -86,10 +86,10 @@ def caption(stretch: tuple[StretchCurve, ...]) -> str:
     n, shown = sum(len(curve.points_load) for curve in stretch), min(len(stretch), MOST)
     down = any(np.any(curve.points_unloading) for curve in stretch)
     return " ".join(filter(None, (
-        f"Stretch of the rope against its load, at {shown_words(shown, len(stretch), 'wrap angle')}, a color each.",
-        curve_words(len(stretch[0].loading) > 1),
+        f"Stretch of the rope against its load, at {count_shown(shown, len(stretch), 'wrap angle')}, a color each.",
+        describe_curve(len(stretch[0].loading) > 1),
         "Open marks and dashed lines: read while the load came down." if down else "",
-        strip_words("in mm"),
+        describe_strip("in mm"),
         f"n = {counted(n, 'reading')}.",
     )))  # fmt: skip
 
@@ -98,7 +98,7 @@ def caption(stretch: tuple[StretchCurve, ...]) -> str:
 def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figure:
     """Stretch [mm] against load [N], a color for each wrap angle."""
     every = sorted(stretch, key=lambda curve: curve.wrap_angle)
-    shown = evenly(every, MOST)
+    shown = choose_evenly(every, MOST)
     across = span([v for c in shown for v in (c.load, c.points_load)], room=0.03)
     up = span([np.zeros(1), *(v for c in shown for v in (c.loading, c.points_stretch))])
     made = panels_with_strips([""], [across], [up], 1, HEIGHT, width)
@@ -110,7 +110,7 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
         _marks(strip, curve, _off(curve), _color(i, len(shown)), MARKERS[i])
     made.finish_strips()
     made.label("Load (N)", "Stretch (mm)", "mm")
-    say_of_how_many(axes, len(shown), len(every))
+    note_shown_count(axes, len(shown), len(every))
     legend_above(made.figure, [axes], columns=min(MOST_COLUMNS, 1 - (-len(shown) // rows)))
     return made.figure
 

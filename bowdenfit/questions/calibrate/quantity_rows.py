@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bowdenfit.plots.layout import LEFT, panels, squeeze, text_width, wrapped
+from bowdenfit.plots.layout import LEFT, panels, squeeze, text_width, wrap_words
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -17,7 +17,7 @@ _MARK = 0.2  # in, from a name to the panel and to the edge of the page
 
 def quantity_rows(found: Calibration, columns: int) -> tuple[Figure, list[Axes]]:
     """Panels side by side with one row for each quantity, the first on top."""
-    names = [wrapped(q.symbol, _LONGEST, most=1) for q in found.quantities]
+    names = [wrap_words(q.symbol, _LONGEST, most=1) for q in found.quantities]
     figure, flat = panels([0.3 + _ROW * len(names)], columns, 0.1, (0.35, 0.3), sharey=True)
     for axes in flat:
         axes.set_ylim(len(names) - 0.4, -0.6)

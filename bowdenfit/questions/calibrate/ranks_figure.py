@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import LEFT, RIGHT, TITLE, drop_unused, legend_above, panels, text_width, wrapped
+from bowdenfit.plots.layout import LEFT, RIGHT, TITLE, drop_unused, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import label_outer
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, TITLE_SIZE, VERMILLION, WIDE, in_paper_style
 from bowdenfit.questions.calibrate.uniformity import UniformRanks
@@ -51,7 +51,7 @@ def draw(found: Calibration) -> Figure:
         axes.plot([0, *places, 1], [0, *difference, 0], color=color, label=said)
         axes.axhline(0.0, color=GRAY, lw=0.6)
         chance = f"   p = {q.corrected:.2g}"
-        name = wrapped(q.symbol, room - text_width(chance, TITLE_SIZE) - _MARGIN, TITLE_SIZE, most=1)
+        name = wrap_words(q.symbol, room - text_width(chance, TITLE_SIZE) - _MARGIN, TITLE_SIZE, most=1)
         axes.set_title(f"{name}{chance}", fontsize=TITLE_SIZE)
         axes.set_xlim(0, 1)
         axes.set_ylim(-1.15 * max(reach, np.max(np.abs(difference))), 1.15 * max(reach, np.max(np.abs(difference))))

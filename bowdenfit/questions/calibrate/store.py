@@ -16,13 +16,13 @@ from bowdenfit.results.folder import (
     REPORT,
     SUMMARY_TEXT,
     folder_to_write,
-    is_left_of,
+    holds_only_run_files,
     read_text,
-    refuse_no_seed,
-    remove_what_is_left,
+    refuse_invalid_seed,
+    remove_run_files,
     write_text,
 )
-from bowdenfit.results.plain import rebuilt, stored
+from bowdenfit.results.plain import deserialize, serialize
 
 CALIBRATION = "calibration.json"
 # Everything that a calibration writes.
@@ -51,15 +51,15 @@ def open_replications(
     unused = _is_unused(folder)
     if path.exists() and not (force or unused):
         raise StoreError(f"{folder} holds a calibration already; go on with --resume, or start over with --force.")
-    if not is_left_of(folder, {*_FILES, *_FOLDERS}):
+    if not holds_only_run_files(folder, {*_FILES, *_FOLDERS}):
         raise StoreError(f"{folder} exists and holds no calibration; name another with --output.")
-    if not (force or unused or is_left_of(folder, ())):
+    if not (force or unused or holds_only_run_files(folder, ())):
         raise StoreError(
             f"{folder} holds what is left of a calibration that was ended; add --force to replace it, or name another with "
             "--output."
         )
     with folder_to_write(folder):
-        remove_what_is_left(folder, _FILES, _FOLDERS)
+        remove_run_files(folder, _FILES, _FOLDERS)
         write_text(path, json.dumps(dict(fingerprint)) + "\n")
     return {}
 
@@ -67,7 +67,7 @@ def open_replications(
 def _is_unused(folder: Path) -> bool:
     """Whether a calibration was begun in a folder that failed before its first replication, so that nobody loses anything."""
     path = folder / REPLICATIONS
-    return is_left_of(folder, (REPLICATIONS, JOBS_FOLDER)) and path.is_file() and path.read_bytes().count(b"\n") == 1
+    return holds_only_run_files(folder, (REPLICATIONS, JOBS_FOLDER)) and path.is_file() and path.read_bytes().count(b"\n") == 1
 
 
 def seed_of(folder: Path) -> int:
@@ -78,7 +78,7 @@ def seed_of(folder: Path) -> int:
     """
     try:
         seed = _lines(folder / REPLICATIONS)[0]["seed"]
-        refuse_no_seed(seed)
+        refuse_invalid_seed(seed)
         return int(seed)
     except (KeyError, TypeError, ValueError):
         raise _damaged(folder / REPLICATIONS) from None
@@ -96,7 +96,7 @@ def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, 
     with folder_to_write(path.parent):
         write_text(path, "".join(json.dumps(line) + "\n" for line in (before, *pages)))
     with or_damaged(_damaged(path)):
-        found = [rebuilt(Replication, page) for page in pages]
+        found = [deserialize(Replication, page) for page in pages]
         if not (all(map(_is_whole, found)) and len({frozenset(each.ranked) for each in found if each.ranked}) <= 1):
             raise ValueError("something else was kept")
         return {each.number: each for each in found}
@@ -130,4 +130,4 @@ def _damaged(path: Path) -> StoreError:
 def keep(folder: Path, replication: Replication) -> None:
     """Add a finished replication."""
     with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(stored(replication)) + "\n")
+        file.write(json.dumps(serialize(replication)) + "\n")

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.errors import DescriptionError, UsageError, nearest
+from bowdenfit.errors import DescriptionError, UsageError, suggest_name
 from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -89,7 +89,7 @@ def stated_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> 
     known = {p.name: p for p in space.parameters}
     for name in page:
         if name not in known:
-            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{nearest(name, list(known))}")
+            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{suggest_name(name, list(known))}")
         if known[name].fixed is not None:
             raise UsageError(f"{file}: {name} is fixed in cable.toml, so there is no truth to look for; leave it out.")
     return tuple(_stated(known[name], value, f"{file}, {name}") for name, value in page.items())

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PLACE, TEXTS, Output, Seed, checked, whole_number
+from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PATH, TEXTS, Output, Seed, read_first, whole_number
 from bowdenfit.inference.resources import refuse_low_memory
-from bowdenfit.notebook import watched
+from bowdenfit.notebook import show_progress_bar
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
 from bowdenfit.verb import Reply, Verb, Watch
@@ -28,16 +28,16 @@ Report = Callable[[int, int], None]
 _WORKERS = "four at most of the cores; 16 jobs of Slurm"
 
 
-@checked
+@read_first
 def calibrate(
-    dataset: Annotated["str | Path | Dataset", DATASET, PLACE],
+    dataset: Annotated["str | Path | Dataset", DATASET, PATH],
     *,
     replications: Annotated[int, Parameter(alias="-n", metavar="NUMBER"), whole_number(2)] = 200,
     engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
     workers: Annotated[int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)] = None,
     output: Annotated[Output, Parameter(show_default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Parameter(metavar="KEY=VALUE"), TEXTS] = (),
-    truth: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    truth: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
@@ -77,12 +77,12 @@ def calibrate(
     import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
     from bowdenfit.questions.calibrate.findings import findings
     from bowdenfit.questions.calibrate.store import open_replications
-    from bowdenfit.results.folder import reserved
+    from bowdenfit.results.folder import reserve_folder
 
     quantities = _quantities(plan)
-    with reserved(folder):
+    with reserve_folder(folder):
         done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
-        with watched(WATCH, progress) as show:
+        with show_progress_bar(WATCH, progress) as show:
             _replicate(engine, workers, plan, done, replications, folder, show)
         found = findings(tuple(done.values()), quantities, assumed=tuple(assume), **_told(plan))
         _write(found, folder)
@@ -204,7 +204,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
     from bowdenfit.questions.calibrate.words import calibration_text, details_text
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
-    from bowdenfit.results.plain import plain
+    from bowdenfit.results.plain import plain_data
 
     with folder_to_write(folder):
         (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications
@@ -212,7 +212,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
         write_text(folder / DETAILS_TEXT, details_text(found))
         draw_calibration(found, folder / FIGURES)
         write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
-        write_text(folder / CALIBRATION, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
+        write_text(folder / CALIBRATION, json.dumps(plain_data(found), indent=1, allow_nan=False) + "\n")
 
 
 def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:

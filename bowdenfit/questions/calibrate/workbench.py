@@ -24,7 +24,7 @@ from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication, rank_truth
 from bowdenfit.questions.calibrate.truths import StatedTruth
-from bowdenfit.results.optimum import optimum_of
+from bowdenfit.results.optimum import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
 TOGETHER = 128  # replications that are fitted together: what is lost when a calibration is interrupted
@@ -108,13 +108,13 @@ class Workbench:
 
     @cached_property
     def _optimum_of_truth(self) -> Callable[..., Any]:
-        return for_each_draw(optimum_of(self.stated), self.stated.space.size)
+        return for_each_draw(make_optimizer(self.stated), self.stated.space.size)
 
     @cached_property
     def _optimum(self) -> Callable[..., Any]:
         if self.assumed is self.stated:
             return self._optimum_of_truth
-        return for_each_draw(optimum_of(self.assumed), self.assumed.space.size)
+        return for_each_draw(make_optimizer(self.assumed), self.assumed.space.size)
 
     def replications(self, numbers: Sequence[int]) -> Iterator[Replication]:
         """Replications by their numbers, as they are done.

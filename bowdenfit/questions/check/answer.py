@@ -13,7 +13,7 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
 from bowdenfit.questions.check.suspects import refit_suspects
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 
 _FEW_LEFT = 4  # readings beyond the coefficients, up to which their scatter is hardly known
 _DRAWS = 5000  # that sensitivity to the priors is worked out from
@@ -63,7 +63,7 @@ class Checks(Display):
         return Several(s for s in self.sensitivities if s.diagnosis == "conflict")
 
 
-@once
+@cached_per_fit
 def checks_of(fit: Record) -> Checks | None:
     """All checks of a fit; None without draws."""
     if fit.sampled is None:
@@ -75,7 +75,7 @@ def checks_of(fit: Record) -> Checks | None:
     return Checks(tables, found.sensitivities, find_prior_conflicts(z, parameters), _told_by_few(fit))
 
 
-@once
+@cached_per_fit
 def checks_findings(fit: Record) -> Findings:
     """What takes time of the checks of a fit with draws; `work_out` of `evidence_of` gives the same in another process."""
     return work_out(evidence_of(fit))

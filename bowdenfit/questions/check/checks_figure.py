@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
+from bowdenfit.plots.layout import TITLE, count_columns, drop_unused, legend_above, panels
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -121,7 +121,7 @@ def caption(tables: tuple[CheckedTable, ...]) -> str:
 def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure:
     """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
     page, counts = width or WIDE, [bool(len(table.at)) + len(table.numbers) for table in tables]
-    columns = columns_within(page, max(counts), LEAST_WIDTH, 0.62)
+    columns = count_columns(page, max(counts), LEAST_WIDTH, 0.62)
     rows = [-(-count // columns) for count in counts]
     figure, flat = panels([ROW] * sum(rows), columns, TITLE, (0.62, 0.74), page)
     used = []

@@ -12,7 +12,7 @@ from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, checks_of
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, significant
 
 _FEW = 3  # departures that are said
@@ -20,7 +20,7 @@ _INTERVAL = 0.9
 _FAR_LATE = 6.0  # standard errors of a delay, which are right to a third
 
 
-@once
+@cached_per_fit
 def say_what_is_not_described(fit: Record) -> tuple[str, ...]:
     """Sentences about readings that the model does not describe, the clearest first; none where all is chance."""
     clear = [each for each in fit.least_squares.departures if each.is_noticeable]

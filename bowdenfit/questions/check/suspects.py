@@ -15,7 +15,7 @@ from bowdenfit.inference.leave_one_out import LooDensity, LooRefits
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.predictive_checks import replace_by_refit
 from bowdenfit.questions.check.table_checks import TableChecks
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 
 _SUSPICIOUS = 0.1  # chance that weights call one reading of a healthy fit so, ten times that of an outlier
 _MOST = 3  # fits; where more readings are so far out, what is wrong is not one of them
@@ -44,10 +44,10 @@ def refit_suspects(fit: Record, tables: Sequence[TableChecks]) -> tuple[TableChe
     return tuple(found)
 
 
-@once
+@cached_per_fit
 def implied_program(fit: Record) -> DrawFunction:
     """What many z imply for every reading; a fit that samples has it already."""
-    return fit.programs.implied if fit.programs else replicator(LogDensity(fit.model), fit.provenance.seed)
+    return fit.programs.quantities if fit.programs else replicator(LogDensity(fit.model), fit.provenance.seed)
 
 
 def suspects_of(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, PLACE, checked
+from bowdenfit.arguments import DATASET, PATH, read_first
 from bowdenfit.errors import DatasetError
 from bowdenfit.reading import Reading, read
 from bowdenfit.verb import Reply, Verb
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 FIGURE = "prior_predictive"
 
 
-@checked
-def check(dataset: Annotated["str | Path | Dataset", DATASET, PLACE], **reading: Unpack[Reading]) -> "Report":
+@read_first
+def check(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
@@ -72,22 +72,22 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     from bowdenfit.questions.check import prior_figure
     from bowdenfit.questions.check.prior_predictive import prior_predictive
     from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.captions import bring_captions
-    from bowdenfit.results.folder import filled_when_whole
+    from bowdenfit.results.captions import copy_captions
+    from bowdenfit.results.folder import fill_folder_atomically
 
     with jax.enable_x64(True):
         found = prior_predictive(dataset, seed)
-    with filled_when_whole(Path(folder)) as place:
-        bring_captions(Path(folder), place)
+    with fill_folder_atomically(Path(folder)) as place:
+        copy_captions(Path(folder), place)
         write_figure(prior_figure, found, place, FIGURE, found.name)
     return found
 
 
-@checked
+@read_first
 def describe(
-    dataset: Annotated[Path, DATASET, PLACE],
+    dataset: Annotated[Path, DATASET, PATH],
     *,
-    prior_predictive: Annotated[Path | None, Parameter(metavar="FOLDER"), PLACE] = None,
+    prior_predictive: Annotated[Path | None, Parameter(metavar="FOLDER"), PATH] = None,
     **reading: Unpack[Reading],
 ) -> Reply:
     """What was understood of a data set; of a file alone, what it is and the command that fits it.

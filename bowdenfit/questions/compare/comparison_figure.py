@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels, wrapped
-from bowdenfit.plots.panels import short
+from bowdenfit.plots.layout import TITLE, axes_at, empty_page, legend_above, place_labels, wrap_words
+from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.style import (
     BLACK,
     GRAY,
@@ -55,7 +55,7 @@ def caption(found: Comparison) -> str:
 def draw(found: Comparison) -> Figure:
     """Differences of the score with standard errors, their contributions by reading, and parameters side by side."""
     cells = _cells(found)
-    names = [short(name, LONGEST_NAME) for name in found.differences]
+    names = [shorten_name(name, LONGEST_NAME) for name in found.differences]
     left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
     height_of_fits = 0.25 + _ROW * len(names)
     columns = min(MOST_COLUMNS, len(cells)) if cells else 0
@@ -154,7 +154,7 @@ def _tables(axes: Axes, found: Comparison) -> None:
         if number % 2:
             axes.axvspan(start - 0.5, start + n - 0.5, color=LIGHT, linewidth=0, zorder=0)
         room = n / (np.ptp(axes.get_xlim()) or 1.0) * axes.get_position().width * WIDE - _APART
-        name = wrapped(_plain(table), room, most=1) if room > LEAST_ROOM else ""
+        name = wrap_words(_plain(table), room, most=1) if room > LEAST_ROOM else ""
         axes.annotate(
             name, (start - 0.4, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -8),
             textcoords="offset points", fontsize=SMALL, color=GRAY,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FITS, HIDDEN, Output, checked
+from bowdenfit.arguments import FITS, HIDDEN, Output, read_first
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NAME = "comparison"
 
 
-@checked
+@read_first
 def compare(
     fits: Annotated[
         "Mapping[str, Record]",
@@ -48,7 +48,7 @@ def compare(
     """
     import jax
 
-    from bowdenfit.notebook import watched
+    from bowdenfit.notebook import show_progress_bar
     from bowdenfit.questions.compare import comparison_figure
     from bowdenfit.questions.compare.answer import compare as compared
     from bowdenfit.questions.compare.sections import comparison_page
@@ -56,7 +56,7 @@ def compare(
 
     if output is not None:
         refuse_to_replace(Path(output), NAME, "comparison", force)
-    with jax.enable_x64(True), watched(WATCH, progress) as show:
+    with jax.enable_x64(True), show_progress_bar(WATCH, progress) as show:
         found = compared(fits, show, leave_out)
     if output is not None:
         names = {fit.name for fit in fits.values()}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FIT, PLACE, RESULTS, Bends, Output, Quantity, checked, measured, number_with_unit
+from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Quantity, as_pair, number_with_unit, read_first
 from bowdenfit.questions.writing import figures_of, files_of, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -20,10 +20,10 @@ ACCEPTED = _PERCENT[0] / 100
 """Probability of moving by itself that is accepted if nothing is said."""
 
 
-@checked
+@read_first
 def compensate(
     found: Annotated["Record", RESULTS, FIT],
-    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     *,
     wrap_angle: Bends = None,
     law: Annotated[Law | None, Parameter(show_default="both")] = None,
@@ -84,7 +84,7 @@ def _share(risk: Quantity | None) -> float:
     from bowdenfit.errors import DatasetError, UsageError
     from bowdenfit.units import conversion_factor
 
-    value, unit = measured(risk) or _PERCENT
+    value, unit = as_pair(risk) or _PERCENT
     try:
         share = value * conversion_factor(unit, "ratio")
     except DatasetError as error:

@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FIT, PLACE, RESULTS, Output, Quantity, checked, measured, number_with_unit, whole_number
+from bowdenfit.arguments import (
+    FIT,
+    PATH,
+    RESULTS,
+    Output,
+    Quantity,
+    as_pair,
+    number_with_unit,
+    read_first,
+    whole_number,
+)
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
@@ -19,7 +29,7 @@ Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
 _ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
 
 
-@checked
+@read_first
 def export(
     found: Annotated["Record", RESULTS, FIT],
     to: Annotated[Target, Parameter(required=True)] = "csv",
@@ -28,7 +38,7 @@ def export(
     points: Annotated[int, Parameter(metavar="NUMBER"), whole_number(2, 2001)] = 101,
     draws: Annotated[int, Parameter(metavar="NUMBER"), whole_number(0, 10_000)] = 0,
     at: Annotated[Quantity | None, _PLACE, number_with_unit("90deg")] = None,
-    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    device: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     force: bool = False,
 ) -> "Exported":
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
@@ -66,7 +76,7 @@ def export(
     compensation = None if device is None else _compensation(found, to, Path(device))
     judged = verdict(found)
     tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, measured(at)), compensation))
+    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, as_pair(at)), compensation))
     with file_to_write(path) as temporary:
         temporary.write_bytes(written.content)
     return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)

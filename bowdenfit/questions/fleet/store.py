@@ -19,10 +19,10 @@ from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, 
 from bowdenfit.results.folder import (
     SUMMARY_TEXT,
     folder_to_write,
-    is_left_of,
+    holds_only_run_files,
     read_page,
-    refuse_no_seed,
-    remove_what_is_left,
+    refuse_invalid_seed,
+    remove_run_files,
     write_text,
 )
 from bowdenfit.words import few, shown
@@ -63,15 +63,15 @@ class FleetStore:
             return before | self._of_pieces()
         if (finished.exists() or kept.exists()) and not force:
             raise StoreError(f"{self.folder} holds a fleet already; go on with --resume, or start over with --force.")
-        if not is_left_of(self.folder, {*_FILES, *_FOLDERS}):
+        if not holds_only_run_files(self.folder, {*_FILES, *_FOLDERS}):
             raise StoreError(f"{self.folder} exists and holds no fleet; name another with --output.")
-        if not (force or is_left_of(self.folder, ())):
+        if not (force or holds_only_run_files(self.folder, ())):
             raise StoreError(
                 f"{self.folder} holds what is left of a fleet that was ended; add --force to replace it, or name another with "
                 "--output."
             )
         with folder_to_write(self.folder):
-            remove_what_is_left(self.folder, _FILES, _FOLDERS)
+            remove_run_files(self.folder, _FILES, _FOLDERS)
             self._begin()
         return {}
 
@@ -168,7 +168,7 @@ def begun_before(folder: Path) -> dict[str, Any]:
         if path.exists():
             page = read_page(path)
             with or_damaged(StoreError(f"{path} is damaged; start over with --force.")):
-                refuse_no_seed(page["seed"])
+                refuse_invalid_seed(page["seed"])
                 return dict(page)
     raise StoreError(f"{folder} holds no fleet to resume; leave --resume out.")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import HIDDEN, LARGEST_SEED, PLACE, Output, Seed, checked, whole_number
+from bowdenfit.arguments import HIDDEN, LARGEST_SEED, PATH, Output, Seed, read_first, whole_number
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.reading import Reading
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
@@ -30,9 +30,9 @@ Report = Callable[[int, int, float], None]
 _WORKERS = "this process, with threads; 16 jobs of Slurm"
 
 
-@checked
+@read_first
 def fleet(
-    folder: Annotated["str | Path", FOLDER, PLACE],
+    folder: Annotated["str | Path", FOLDER, PATH],
     *,
     output: Annotated[Output, Parameter(show_default="fits/NAME OF FOLDER")] = None,
     engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
@@ -61,14 +61,14 @@ def fleet(
         BowdenfitError: What is wrong, in a sentence; broken inspections are named in the answer, and the rest goes on.
     """
     import bowdenfit.questions.fleet.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.notebook import watched
+    from bowdenfit.notebook import show_progress_bar
     from bowdenfit.questions.fleet.inspections import read_inspections
-    from bowdenfit.results.folder import reserved
+    from bowdenfit.results.folder import reserve_folder
 
     refuse_low_memory()
     place = Path(output) if output is not None else None
     inspections = read_inspections(Path(folder))
-    with reserved(place), watched(WATCH, progress) as show:
+    with reserve_folder(place), show_progress_bar(WATCH, progress) as show:
         import jax
 
         from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
@@ -141,16 +141,16 @@ def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> 
     """The draws, the summary and, last, fleet.json, all of them or none; what was kept of pieces is not needed then."""
     from bowdenfit.questions.fleet.words import fleet_text
     from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
-    from bowdenfit.results.folder import SUMMARY_TEXT, filled_when_whole, write_text
-    from bowdenfit.results.kept import checksum
-    from bowdenfit.results.plain import plain
+    from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically, write_text
+    from bowdenfit.results.kept import file_checksum
+    from bowdenfit.results.plain import plain_data
     from bowdenfit.words import printable
 
-    with filled_when_whole(store.folder, FLEET_PAGE) as folder:
+    with fill_folder_atomically(store.folder, FLEET_PAGE) as folder:
         if drawn is not None:
             write_fleet_draws(folder / FLEET_DRAWS, drawn)
         write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
-        page = plain(answer) | {CHECKSUM: checksum(folder / FLEET_DRAWS)}
+        page = plain_data(answer) | {CHECKSUM: file_checksum(folder / FLEET_DRAWS)}
         write_text(folder / FLEET_PAGE, json.dumps(page, indent=1) + "\n")
     store.finish()
 

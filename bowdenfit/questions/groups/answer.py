@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import decimals
 
 _ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with the first
@@ -101,7 +101,7 @@ class Groups(Display):
         return replace(found, group=group, less=less, difference=other_way)
 
 
-@once
+@cached_per_fit
 def groups_of(fit: Record) -> Groups | None:
     """The groups of a fit and their contrasts; None where all readings share their coefficients, or without draws."""
     names = fit.model.cable.friction.groups

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import empty_page, text_width, wrapped
+from bowdenfit.plots.layout import empty_page, text_width, wrap_words
 from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
 from bowdenfit.plots.ticks import ticks
 from bowdenfit.words import counted
@@ -127,7 +127,7 @@ def _combinations(axes: Axes, group: CovarianceAnalysis) -> None:
 
 def _words(name: str, room: float, size: float = SMALL) -> str:
     """A parameter's name as words, its end left out where there is no room for it [in]."""
-    return wrapped(name.replace("_", " "), room, size, most=1)
+    return wrap_words(name.replace("_", " "), room, size, most=1)
 
 
 def _known(share: float) -> str:

@@ -10,14 +10,14 @@ from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.model import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_well
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import listed
 
 DRAWS = "what the fit found"
 _STEP = 1e-4  # of z, from which a slope is told to a part in 10^8
 
 
-@once
+@cached_per_fit
 def identifiability(fit: Record) -> Identifiability:
     """What a fit knows, from its draws.
 
@@ -70,7 +70,7 @@ def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
     return np.linalg.inv(freedom / (freedom + 3) * (np.linalg.inv(covariance) - unit) + unit)
 
 
-@once
+@cached_per_fit
 def values_program(fit: Record) -> DrawFunction:
     """Named values of many z, in shown units; a fit that samples has one already."""
     return fit.programs.values if fit.programs else _compile_values(fit.model)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PLACE, Output, checked
+from bowdenfit.arguments import PATH, Output, read_first
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.questions.writing import files_of, write_answer
@@ -24,12 +24,12 @@ NOT_IDENTIFIABLE = "not identifiable"  # what a fit is whose measurements do not
 _REACH, _PINS = 4.0, 21  # standard deviations on both sides that profiles cover, and values in them
 
 
-@checked
+@read_first
 def identify(
     source: Annotated[
         "str | Path | Dataset | Record",
         Parameter("SOURCE", help="Such as fits/my-cable, the results of a fit, or my-cable, a data set."),
-        PLACE,
+        PATH,
     ],
     *,
     output: Output = None,
@@ -166,10 +166,10 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     from bowdenfit.inference.identifiability import CovarianceAnalysis
     from bowdenfit.questions.identify.answer import Identifiability
     from bowdenfit.questions.identify.words import identifiability_text
-    from bowdenfit.results.plain import rebuilt
+    from bowdenfit.results.plain import deserialize
 
     page = answers["identify"]
-    groups = rebuilt(dict[str, CovarianceAnalysis], page["groups"])
+    groups = deserialize(dict[str, CovarianceAnalysis], page["groups"])
     words = {"units": page["units"], "meanings": page["meanings"]}
     return Reply(identifiability_text(Identifiability(page["name"], page["basis"], page["measured"], groups, **words)))
 

@@ -7,12 +7,12 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function
 from bowdenfit.plots.bands import BAND_QUANTILES, Band
 from bowdenfit.results.optimum import route_grid
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 
 _DRAWS = 5000  # enough for a line's width of accuracy
 
 
-@once
+@cached_per_fit
 def along_route(fit: Record) -> dict[str, Band]:
     """The efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
     if fit.dataset.description.route is None:

@@ -75,6 +75,6 @@ def _spans(data: AlongRoute) -> tuple[Span, ...]:
     if best is None:
         return ()
     line = Span(f"Best {best.what}", "vermillion", best.length.median, best.length.median)
-    if not best.is_settled:
+    if not best.is_certain:
         return (line,)
     return Span(f"Within {percent(best.window.within)} of the best", "window", best.window.start, best.window.stop), line

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band, draw_band, route_limits, shade_outside
-from bowdenfit.plots.captions import strip_words
+from bowdenfit.plots.captions import describe_strip
 from bowdenfit.plots.densities import GRID_POINTS, density
-from bowdenfit.plots.layout import TITLE, legend_above, panels, wrapped
+from bowdenfit.plots.layout import TITLE, legend_above, panels, wrap_words
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
     BLACK,
@@ -104,7 +104,7 @@ def caption(data: AlongRoute) -> str:
         if drawn else "Line: least squares.",
         "Dotted: nine of ten runs lie between these lines, because no two mountings are alike."
         if data.new_run is not None else "",
-        strip_words("in percent of the input force") if n else "",
+        describe_strip("in percent of the input force") if n else "",
         f"Dots: measured, n = {n}." if n else "No efficiency was measured along the route.",
         f"The curve holds at {data.at_input_force:g} N input force." if data.at_input_force is not None else "",
         "Below: where the best length lies"
@@ -208,7 +208,7 @@ def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
         said = f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability"
         room = 0.4 * axes.bbox.width / axes.figure.dpi  # beside the density
         axes.text(
-            0.03 if left else 0.97, 0.9, wrapped(said, room),
+            0.03 if left else 0.97, 0.9, wrap_words(said, room),
             transform=axes.transAxes, ha="left" if left else "right", va="top", fontsize=SMALL,
         )  # fmt: skip
 

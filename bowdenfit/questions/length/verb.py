@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bowdenfit.arguments import FIT, RESULTS, checked
+from bowdenfit.arguments import FIT, RESULTS, read_first
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
-@checked
+@read_first
 def length(found: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
     """The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.
 
@@ -32,9 +32,9 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     if "length" not in answers:
         return None
     from bowdenfit.results.length import OptimalLength
-    from bowdenfit.results.plain import rebuilt
+    from bowdenfit.results.plain import deserialize
 
-    return _reply(rebuilt(OptimalLength, answers["length"]), asked)
+    return _reply(deserialize(OptimalLength, answers["length"]), asked)
 
 
 VERB = Verb(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import Band, draw_band, route_limits, shade_outside
-from bowdenfit.plots.captions import strip_words
+from bowdenfit.plots.captions import describe_strip
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, WRAP_ANGLE, in_paper_style
@@ -97,7 +97,7 @@ def caption(data: WrapAngles) -> str:
         if drawn else "Line: least squares.",
         "Hatched: too small to be read, so anything between zero and the triangle." if limits else "",
         "Squares: outside the range of the curve, which does not use them." if unused else "",
-        strip_words("in degrees"),
+        describe_strip("in degrees"),
         f"n = {counted(read, 'reading')}" + (f" and {counted(limits, 'upper limit')}." if limits else "."),
     )))  # fmt: skip
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.recorded.rate import place_of
-from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once, values_of
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence
@@ -68,7 +68,7 @@ class Loss:
         )
 
 
-@once
+@cached_per_fit
 def loss_by_contact(fit: Record) -> Loss | None:
     r"""Share of each contact in the friction exponent, at the best length if there is one; None without draws or contacts.
 
@@ -104,6 +104,6 @@ def _shares(fit: Record, at: float) -> np.ndarray:
         return jnp.stack([law.exponent(values, angles[:, k])[0] for k, law in enumerate(cable.laws)])
 
     with jax.enable_x64(True):
-        found = np.asarray(for_each_value(exponents, values_of(fit), np.array([at])))
+        found = np.asarray(for_each_value(exponents, parameter_values(fit), np.array([at])))
     total = np.sum(found, axis=1, keepdims=True)
     return np.where(total > 0, found / np.where(total > 0, total, 1.0), 1 / len(cable.laws))

@@ -5,17 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PLACE, checked
+from bowdenfit.arguments import PATH, read_first
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.metabolic.answer import Metabolic
 
 
-@checked
+@read_first
 def metabolic(
     dataset: Annotated[
-        str | Path, Parameter("DATASET", help="Such as my-study, a folder with a metabolic.toml."), PLACE
+        str | Path, Parameter("DATASET", help="Such as my-study, a folder with a metabolic.toml."), PATH
     ],
 ) -> "Metabolic":
     """What a study of metabolic cost shows: paired differences with intervals, and what of its numbers cannot be right.

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.errors import DatasetError, UsageError, nearest
+from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate, CandidateKind
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.candidates import example, route_words, situation_of, why_not
@@ -30,7 +30,8 @@ def _parsed(fit: Record, text: str) -> Candidate:
     name, _, where = text.partition("@")
     kind = candidate_kinds().get(name)
     if kind is None:
-        raise UsageError(f"--candidate {text!r} is of no kind that can be measured{nearest(name, list(candidate_kinds()))}")
+        suggestion = suggest_name(name, list(candidate_kinds()))
+        raise UsageError(f"--candidate {text!r} is of no kind that can be measured{suggestion}")
     candidate = Candidate(name)
     for part in filter(None, (part.strip() for part in where.split(","))):
         candidate = _with_part(fit, kind, candidate, text, part)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.plots.bands import route_limits, shade_outside
-from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrapped
+from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import show_plain_numbers
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, axis_label, in_paper_style
 from bowdenfit.words import counted
@@ -107,7 +107,7 @@ def _now(axes: Axes, found: NextMeasurement, horizontal: bool) -> None:
 def _in_rows(found: NextMeasurement) -> Figure:
     """A row for each of the best candidates."""
     shown = found.ranked[:MOST]
-    names = [wrapped(r.words, LONGEST, most=1) for r in shown]
+    names = [wrap_words(r.words, LONGEST, most=1) for r in shown]
     room = max(LEFT, 0.15 + max(map(text_width, names)))
     figure, (axes,) = panels([max(1.0, ROW * (len(shown) + 1))], 1, TITLE, (0, 0), PAGE)
     box = axes.get_position()

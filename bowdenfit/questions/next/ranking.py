@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from bowdenfit.display import Several
-from bowdenfit.errors import UsageError, nearest
+from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.kinds.terms import candidate_kinds
@@ -78,7 +78,7 @@ def _stop(fit: Record, answer: Answer) -> str:
     """Whether more needs to be measured at all."""
     if answer.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
         best = fit.optimal_length()
-        return f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}" if best.is_settled else best.not_settled
+        return f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}" if best.is_certain else best.not_good_enough
     unit = f" {answer.unit}" if answer.unit else ""
     return f"You may stop if it is enough to know {answer.words} to ± {significant(answer.sd, 2)}{unit}."
 
@@ -162,7 +162,7 @@ def _check_costs(chosen: Sequence[Candidate], costs: Mapping[str, float] | None)
     kinds = list(dict.fromkeys(c.kind for c in chosen))
     for kind, cost in costs.items():
         if kind not in kinds:
-            raise UsageError(f"--cost {kind}={cost:g}: no candidate is of this kind{nearest(kind, kinds)}")
+            raise UsageError(f"--cost {kind}={cost:g}: no candidate is of this kind{suggest_name(kind, kinds)}")
         if not (np.isfinite(cost) and cost > 0):
             raise UsageError(f"--cost {kind}={cost:g} is no cost; write a positive number, such as {kind}=2.")
     missing = [kind for kind in kinds if kind not in costs]

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.errors import UsageError, nearest
+from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 
@@ -66,7 +66,7 @@ def answer_of(fit: Record, wanted: str | None) -> Answer:
             wanted, f"the efficiency at the best {variable}", "points", 100 * drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
         )
     known = ["optimal-length", "optimal-efficiency", "efficiency@..."] if route else ["efficiency"]
-    raise UsageError(f"--for {wanted!r} is no answer of this fit{nearest(wanted, [*known, *drawn.values])}")
+    raise UsageError(f"--for {wanted!r} is no answer of this fit{suggest_name(wanted, [*known, *drawn.values])}")
 
 
 def _parameter(fit: Record, name: str) -> Answer:

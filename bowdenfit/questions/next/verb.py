@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PLACE, RESULTS, TEXTS, Output, checked, numbers_by_name, whole_number
+from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 NAME = "next_measurement"
 
 
-@checked
+@read_first
 def next_measurement(
-    found: Annotated["Record | str | Path", RESULTS, PLACE],
+    found: Annotated["Record | str | Path", RESULTS, PATH],
     answer: Annotated[
         str | None,
         Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient"),

@@ -17,7 +17,7 @@ from bowdenfit.plots.layout import (
     text_width,
     title_above,
 )
-from bowdenfit.plots.panels import short
+from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -91,7 +91,7 @@ def coefficients(found: Pool, width: float | None = None) -> Figure:
     step = -(-len(order) // MOST_CABLES)
     shown = [each for i, each in enumerate(order) if i % step == 0 or each.unlike]
     page = width or (WIDE if len(columns) > 1 else MEDIUM)
-    labels = [short(each.cable, LONGEST_NAME) for each in shown]
+    labels = [shorten_name(each.cable, LONGEST_NAME) for each in shown]
     left = max(0.3, 0.2 + max(map(text_width, labels)))
     across = page >= MEDIUM
     inner = (page - left - RIGHT - 0.2 * (len(columns) - 1)) / len(columns) if across else page - left - RIGHT

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import (
-    PLACE,
+    PATH,
     TEXTS,
     NumberWithUnit,
     Output,
     Quantity,
     Seed,
-    checked,
-    measured,
+    as_pair,
     number_with_unit,
+    read_first,
     whole_number,
 )
 from bowdenfit.questions.writing import refuse_to_replace
@@ -33,14 +33,14 @@ _NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[
 _MOST_TURNS = 100
 
 
-@checked
+@read_first
 def pool(
-    results: Annotated[str | Path, FLEET, PLACE],
+    results: Annotated[str | Path, FLEET, PATH],
     *,
     until: Annotated[Quantity | None, Parameter(metavar="EFFICIENCY"), number_with_unit("60%")] = None,
     wrap_angles: Annotated[Sequence[str], Parameter("--wrap-angle", metavar="COEFFICIENT=ANGLE"), TEXTS] = (),
     cycles: Annotated[int | None, Parameter(metavar="NUMBER"), whole_number(1)] = None,
-    measurements: Annotated[str | Path | None, Parameter(metavar="FOLDER"), PLACE] = None,
+    measurements: Annotated[str | Path | None, Parameter(metavar="FOLDER"), PATH] = None,
     seed: Annotated[Seed, Parameter(show_default="that of the fleet")] = None,
     output: Output = None,
     force: bool = False,
@@ -77,7 +77,7 @@ def pool(
     if measurements is not None:
         read_inspections(Path(measurements))  # so that a wrong name is said before anything is drawn
     coefficients = [name for name, about in drawn.attributes.items() if about.get("role") == "friction"]
-    asked = asked_of(measured(until), wrap_angles, cycles, coefficients)
+    asked = asked_of(as_pair(until), wrap_angles, cycles, coefficients)
     seed = int(drawn.about.get("seed", 0)) if seed is None else seed
     with jax.enable_x64(True):
         found = pooled(drawn, asked, seed, None if measurements is None else Path(measurements))
@@ -93,17 +93,17 @@ def _write(found: "Pool", folder: Path) -> None:
     from bowdenfit.questions.pool.sections import pool_page
     from bowdenfit.questions.pool.words import pool_text
     from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import filled_when_whole, write_text
-    from bowdenfit.results.plain import plain
+    from bowdenfit.results.folder import fill_folder_atomically, write_text
+    from bowdenfit.results.plain import plain_data
     from bowdenfit.words import printable
 
     page = f"{NAME}.json"
-    with filled_when_whole(folder, page) as place:
+    with fill_folder_atomically(folder, page) as place:
         for name, figure in figures_of(found).items():
             write_all(figure, place, name)
         write_page(pool_page(found), place, place / f"{NAME}.html")
         write_text(place / f"{NAME}.txt", printable(pool_text(found)))
-        write_text(place / page, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
+        write_text(place / page, json.dumps(plain_data(found), indent=1, allow_nan=False) + "\n")
 
 
 def asked_of(

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.errors import DatasetError, UsageError, nearest
+from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
 from bowdenfit.inference.draws import for_each_draw
@@ -73,7 +73,7 @@ def gait_of(
     """
     contacts = [c.name for c in fit.dataset.description.contact]
     if contact is not None and contact not in contacts:
-        raise UsageError(f"--contact {contact!r}: there is no such contact{nearest(contact, contacts)}")
+        raise UsageError(f"--contact {contact!r}: there is no such contact{suggest_name(contact, contacts)}")
     number = bending_contact(fit.model) if contact is None else contacts.index(contact)
     if bool(angles) == (file is not None):
         raise UsageError(

@@ -9,16 +9,16 @@ from cyclopts import Parameter
 from bowdenfit.arguments import (
     FIT,
     LENGTHS,
-    PLACE,
+    PATH,
     RESULTS,
     Length,
     NumberWithUnit,
     Quantity,
     Stroke,
-    checked,
-    measured,
+    as_pair,
     number_with_unit,
     numbers_with_units,
+    read_first,
 )  # fmt: skip
 from bowdenfit.display import csv_text
 from bowdenfit.questions.predict.words import predictions_text
@@ -45,7 +45,7 @@ Angles: TypeAlias = Annotated[
 _QUANTITY = Parameter(metavar="QUANTITY", show_default="efficiency, or what --input-force and --output-force ask for")
 
 
-@checked
+@read_first
 def predict(
     found: Annotated["Record", RESULTS, FIT],
     lengths: Annotated[Length | Iterable[Length] | None, Parameter("LENGTHS"), LENGTHS] = None,
@@ -59,7 +59,7 @@ def predict(
     friction_limit: Annotated[Quantity | None, Parameter(metavar="TORQUE"), number_with_unit("50N*mm")] = None,
     spring: Annotated[Quantity | None, Parameter(metavar="STIFFNESS"), number_with_unit("5N/mm")] = None,
     contact: Annotated[str | None, Parameter(metavar="NAME")] = None,
-    gait: Annotated[str | Path | None, Parameter(metavar="FILE"), PLACE] = None,
+    gait: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     gait_column: Annotated[str | None, Parameter(metavar="HEADING")] = None,
 ) -> "Predictions":
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
@@ -89,15 +89,15 @@ def predict(
     from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
     from bowdenfit.questions.predict.lengths import predict_at_lengths
 
-    applied, wanted, angles = measured(input_force), measured(output_force), cast("list[NumberWithUnit]", wrap_angles)
+    applied, wanted, angles = as_pair(input_force), as_pair(output_force), cast("list[NumberWithUnit]", wrap_angles)
     quantity = _quantity(quantity, input_force, output_force)
     over_gait = any(each is not None for each in (contact, gait, gait_column))
     without_route = found.dataset.description.route is None and found.model.cable.is_loop
     if not over_gait and (wrap_angles or quantity not in AT_LENGTHS or without_route):
         _refuse_both(lengths)
         found.draws()
-        limit, stiffness = measured(friction_limit), measured(spring)
-        asked = question(found, angles, applied, wanted, measured(preload), limit, stroke, stiffness)
+        limit, stiffness = as_pair(friction_limit), as_pair(spring)
+        asked = question(found, angles, applied, wanted, as_pair(preload), limit, stroke, stiffness)
         return Predictions(predict_at_bends(found, quantity, asked))
     _refuse_of_bends(quantity, over_gait, preload or spring, friction_limit, input_force)
     route = _lengths(found, cast("list[float | NumberWithUnit] | None", lengths))

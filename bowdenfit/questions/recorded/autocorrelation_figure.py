@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import evenly, say_of_how_many
-from bowdenfit.plots.captions import shown_words
+from bowdenfit.plots.bands import choose_evenly, note_shown_count
+from bowdenfit.plots.captions import count_shown
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import MOST, alike, label_outer, recording_panels, set_limits
+from bowdenfit.plots.panels import MOST, label_outer, recording_panels, set_limits, share_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def caption(recordings: tuple[Autocorrelation, ...]) -> str:
     """What is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
-        f"How deviations from the fit hang together in {shown_words(shown, len(recordings), 'recording')}, by the time between "
+        f"How deviations from the fit hang together in {count_shown(shown, len(recordings), 'recording')}, by the time between "
         "them. Of noise without memory 95 % lie in the gray band; a slow wave outside it is something that the model does not "
         f"know. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
     )
@@ -77,9 +77,9 @@ def caption(recordings: tuple[Autocorrelation, ...]) -> str:
 @in_paper_style
 def draw(recordings: tuple[Autocorrelation, ...], width: float | None = None) -> Figure:
     """Autocorrelation against the lag [s], a panel a recording, and the band that noise without memory would keep to."""
-    shown = evenly(recordings, MOST)
+    shown = choose_evenly(recordings, MOST)
     lags = [(float(-0.02 * r.lag.max()), float(1.02 * r.lag.max())) for r in shown]
-    share_x = alike(lags)
+    share_x = share_limits(lags)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.2, share_x, True, width=width)
     set_limits(flat, lags, "x", share_x)
     for axes, recording in zip(flat, shown, strict=True):
@@ -88,7 +88,7 @@ def draw(recordings: tuple[Autocorrelation, ...], width: float | None = None) ->
     lowest = min(min(float(np.nanmin(r.correlation)), -_bound(r)) for r in shown)
     flat[0].set_ylim(max(-1.05, min(-0.2, 1.15 * lowest)), 1.05)
     label_outer(flat, columns, "Lag (s)", "Autocorrelation")
-    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
+    note_shown_count(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=3 if columns > 1 else 2)
     return figure
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import NEW_RUN
-from bowdenfit.plots.captions import curve_words
-from bowdenfit.plots.layout import TITLE, columns_within, drop_unused, legend_above, panels
-from bowdenfit.plots.panels import short, span
+from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.layout import TITLE, count_columns, drop_unused, legend_above, panels
+from bowdenfit.plots.panels import shorten_name, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -48,7 +48,7 @@ def caption(dependences: tuple[Dependence, ...]) -> str:
     """What is drawn, in plain words."""
     words, n = " and ".join(one.what for one in dependences), max(len(set(one.points_label)) for one in dependences)
     return (
-        f"Efficiency against {words}. {curve_words(len(dependences[0].quantiles) > 1)} Dashed: the capstan equation, by "
+        f"Efficiency against {words}. {describe_curve(len(dependences[0].quantiles) > 1)} Dashed: the capstan equation, by "
         f"which it is the same everywhere. Marks: measured, with the intervals that hold them with 90 % probability by the "
         f"scatter of their own readings; nine of ten runs lie between the dotted lines, as no two mountings are "
         f"alike. n = {counted(n, 'run')}."
@@ -58,7 +58,7 @@ def caption(dependences: tuple[Dependence, ...]) -> str:
 @in_paper_style
 def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Figure:
     """Efficiency [%] against load and speed, a panel each on one efficiency axis."""
-    columns = columns_within(width or WIDE, min(MOST_COLUMNS, len(dependences)), LEAST_WIDTH, 0.2)
+    columns = count_columns(width or WIDE, min(MOST_COLUMNS, len(dependences)), LEAST_WIDTH, 0.2)
     rows = -(-len(dependences) // columns)
     page = width or (WIDE if columns > 1 else MEDIUM)
     figure, flat = panels([2.1] * rows, columns, TITLE, (0.2, TITLE + 0.45), page, sharey=True)
@@ -105,7 +105,7 @@ def _points(axes: Axes, one: Dependence, runs: list[str]) -> None:
         _measured(axes, one, np.ones(len(labels), dtype=bool), 0, f"Measured in {len(runs)} runs")
         return
     for i, run in enumerate(runs):
-        _measured(axes, one, labels == run, i, short(run, LONGEST))
+        _measured(axes, one, labels == run, i, shorten_name(run, LONGEST))
 
 
 def _measured(axes: Axes, one: Dependence, here: np.ndarray, number: int, label: str) -> None:

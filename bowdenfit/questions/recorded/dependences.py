@@ -131,7 +131,7 @@ def _curves(
 
     from bowdenfit.inference.draws import for_each_value
     from bowdenfit.questions.recorded.traces import QUANTILES
-    from bowdenfit.results.record import some_values
+    from bowdenfit.results.record import thinned_parameter_values
 
     model, friction = fit.model, fit.model.cable.friction
 
@@ -146,7 +146,7 @@ def _curves(
         return friction.output_force(values, x, shift, jnp.ones(())) / x, reference
 
     with jax.enable_x64(True):
-        curves, reference = for_each_value(efficiency, some_values(fit, CURVES))
+        curves, reference = for_each_value(efficiency, thinned_parameter_values(fit, CURVES))
     constant = float(np.median(reference))
     if fit.sampled is None:
         return curves[:1], constant, np.zeros((0, len(curves[0])))

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import evenly, say_of_how_many
-from bowdenfit.plots.captions import shown_words
+from bowdenfit.plots.bands import choose_evenly, note_shown_count
+from bowdenfit.plots.captions import count_shown
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels, set_limits, span
+from bowdenfit.plots.panels import MOST, enlarge_marks, label_outer, recording_panels, set_limits, share_limits, span
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -74,7 +74,7 @@ def caption(recordings: tuple[LoopPanel, ...]) -> str:
     """What is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
-        f"The loop that friction opens, {shown_words(shown, len(recordings), 'recording')}: output against input force, "
+        f"The loop that friction opens, {count_shown(shown, len(recordings), 'recording')}: output against input force, "
         "dot by dot, between the two lines of the capstan equation. The words in each panel give the friction exponent "
         "of this recording by itself and the one expected of the cable, with its 90 % interval. "
         f"n = {sum(int(np.isfinite(r.input_force).sum()) for r in recordings)} blocks of samples."
@@ -84,9 +84,9 @@ def caption(recordings: tuple[LoopPanel, ...]) -> str:
 @in_paper_style
 def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figure:
     """Output against input force [N] on equal axes, a panel a recording."""
-    shown = evenly(recordings, MOST)
+    shown = choose_evenly(recordings, MOST)
     limits = [span([r.input_force, r.output_force]) for r in shown]
-    shared = alike(limits)
+    shared = share_limits(limits)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, None, shared, shared, width=width)
     set_limits(flat, limits, "x", shared)
     set_limits(flat, limits, "y", shared)
@@ -99,7 +99,7 @@ def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figur
             linespacing=1.1, zorder=5,
         )  # fmt: skip
     label_outer(flat, columns, "Input force (N)", "Output force (N)")
-    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
+    note_shown_count(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=4 if columns > 1 else 2)
     enlarge_marks(figure)
     return figure

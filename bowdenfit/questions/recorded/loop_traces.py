@@ -13,7 +13,7 @@ from bowdenfit.kinds.resolve_angles import resolve_angles
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.questions.recorded.equations import blocks_shown
 from bowdenfit.recordings.recording import Recording, Recordings
-from bowdenfit.results.record import Record, values_of
+from bowdenfit.results.record import Record, parameter_values
 
 _ALIKE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
@@ -43,7 +43,7 @@ def _angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
     measured = row_angles(cable.description, recorded_angles(recordings), angles).data
-    middle = {name: np.median(drawn, keepdims=True) for name, drawn in values_of(fit).items()}
+    middle = {name: np.median(drawn, keepdims=True) for name, drawn in parameter_values(fit).items()}
 
     def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:
         return resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in measured.items()})[0]

@@ -10,7 +10,7 @@ from bowdenfit.cable.friction import DRAG
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.recorded.rate import place_of
-from bowdenfit.results.record import OPTIMAL_LENGTH, Record, once
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit
 from bowdenfit.words import decimals
 
 
@@ -58,7 +58,7 @@ class LostForce:
         return f"{lost} lost at any load,\nby {hidden} of hidden tension" if self.at_any_load else f"{hidden} of hidden tension"
 
 
-@once
+@cached_per_fit
 def lost_force(fit: Record) -> LostForce | None:
     """Hidden tension and the force that it costs, at the best length where the fit has one; None without drag or draws.
 

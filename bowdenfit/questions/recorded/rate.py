@@ -12,7 +12,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.record import Record, once, values_of
+from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 from bowdenfit.words import significant
 
 _SURE = 0.99  # probability from which a dependence on speed is called one
@@ -56,7 +56,7 @@ class RateEffect:
         )
 
 
-@once
+@cached_per_fit
 def rate_effect(fit: Record) -> RateEffect | None:
     """The effect of speed; None where the fit has none or no draws."""
     friction = fit.model.cable.friction
@@ -99,5 +99,5 @@ def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray
         output = friction.output_force(values, force, shifts, jnp.ones(())) / force
         return output[1] - output[0]
 
-    found: np.ndarray = for_each_value(difference, values_of(fit))
+    found: np.ndarray = for_each_value(difference, parameter_values(fit))
     return found

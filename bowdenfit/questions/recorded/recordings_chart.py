@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bowdenfit.pages.chart import Chart, Group, Series, Span
-from bowdenfit.plots.bands import evenly
+from bowdenfit.plots.bands import choose_evenly
 from bowdenfit.plots.panels import extremes
 from bowdenfit.plots.style import LEAST_SQUARES, WIDE_INTERVAL
 from bowdenfit.questions.recorded.recordings_figure import (
@@ -31,7 +31,7 @@ def recordings_charts(recordings: tuple[OverTime, ...]) -> tuple[Chart, ...]:
     Args:
         recordings: What the figure shows, and all that it has no room for.
     """
-    shown = evenly(recordings, MOST)
+    shown = choose_evenly(recordings, MOST)
     return tuple(_chart(recording, _PLACES // len(shown)) for recording in shown)
 
 
@@ -74,6 +74,6 @@ def _left_out(recording: OverTime) -> Iterator[Group]:
     there = np.flatnonzero(np.isfinite(recording.flagged_output))
     if not len(there):
         return
-    some = np.array(evenly(there.tolist(), _LEFT_OUT))
+    some = np.array(choose_evenly(there.tolist(), _LEFT_OUT))
     time, first = np.unique(recording.flagged_time[some] - start_of(recording), return_index=True)
     yield Group(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[some][first]),))

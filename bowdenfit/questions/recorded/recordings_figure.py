@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import evenly, say_of_how_many
-from bowdenfit.plots.layout import columns_within, legend_above
+from bowdenfit.plots.bands import choose_evenly, note_shown_count
+from bowdenfit.plots.layout import count_columns, legend_above
 from bowdenfit.plots.panels import LEAST_WIDTH, draw_marks, extremes, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import (
     BLACK,
@@ -110,9 +110,9 @@ def caption(recordings: tuple[OverTime, ...]) -> str:
 @in_paper_style
 def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure:
     """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
-    columns = min(2 if len(recordings) <= MOST_IN_TWO else 3, columns_within(width or WIDE, 3, LEAST_WIDTH, 0.42))
+    columns = min(2 if len(recordings) <= MOST_IN_TWO else 3, count_columns(width or WIDE, 3, LEAST_WIDTH, 0.42))
     rows_with_room = int((HEIGHT + ROW_GAP) / (LEAST_HEIGHT + ROW_GAP))
-    whole = evenly(recordings, columns * rows_with_room)
+    whole = choose_evenly(recordings, columns * rows_with_room)
     rows = -(-len(whole) // columns)
     height = (HEIGHT + ROW_GAP) / rows - ROW_GAP
     shown = [beginning(r) for r in whole]
@@ -124,7 +124,7 @@ def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure
         _forces(axes, recording, POINTS // (2 * len(shown)))
         _left_out(axes, recording)
     label_outer(flat, columns, TIME, FORCE)
-    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
+    note_shown_count(flat[0], len(shown), len(recordings), "recordings")
     if any(len(a.time) < len(b.time) for a, b in zip(shown, whole, strict=True)):
         flat[0].plot([], [], " ", label=f"First {MOST_CYCLES} cycles shown")
     legend_above(figure, flat, columns=4)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.plots.bands import evenly, say_of_how_many
-from bowdenfit.plots.captions import shown_words
+from bowdenfit.plots.bands import choose_evenly, note_shown_count
+from bowdenfit.plots.captions import count_shown
 from bowdenfit.plots.layout import legend_above
-from bowdenfit.plots.panels import MOST, alike, enlarge_marks, label_outer, recording_panels
+from bowdenfit.plots.panels import MOST, enlarge_marks, label_outer, recording_panels, share_limits
 from bowdenfit.plots.style import (
     BLACK,
     BLUE,
@@ -105,7 +105,7 @@ def caption(recordings: tuple[Samples, ...]) -> str:
     """What is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
-        f"Efficiency of every used block of samples in {shown_words(shown, len(recordings), 'recording')}. Line and gray "
+        f"Efficiency of every used block of samples in {count_shown(shown, len(recordings), 'recording')}. Line and gray "
         "band: mean of its run, with the 90 % interval that its readings alone give; green: what is expected of the "
         "cable. Runs differ by more than the gray band because no two mountings are alike. "
         f"n = {sum(len(r.stroke) for r in recordings)} blocks."
@@ -115,9 +115,9 @@ def caption(recordings: tuple[Samples, ...]) -> str:
 @in_paper_style
 def draw(recordings: tuple[Samples, ...], width: float | None = None) -> Figure:
     """Efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
-    shown = evenly(recordings, MOST)
+    shown = choose_evenly(recordings, MOST)
     counts = [(0.0, float(len(r.stroke))) for r in shown]
-    share_x = alike(counts)
+    share_x = share_limits(counts)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.6, share_x, True, width=width)
     longest = max(count for _, count in counts)
     for axes, recording, (_, count) in zip(flat, shown, counts, strict=True):
@@ -130,7 +130,7 @@ def draw(recordings: tuple[Samples, ...], width: float | None = None) -> Figure:
     flat[0].set_ylim(*_limits(shown))
     flat[0].locator_params(axis="y", nbins=7)
     label_outer(flat, columns, "Number of the sample", EFFICIENCY)
-    say_of_how_many(flat[0], len(shown), len(recordings), "recordings")
+    note_shown_count(flat[0], len(shown), len(recordings), "recordings")
     legend_above(figure, flat, columns=3 if columns > 1 else 2)
     enlarge_marks(figure)
     return figure

@@ -10,7 +10,7 @@ from bowdenfit.cable.friction import STRIBECK, STRIBECK_SPEED, VISCOUS
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.physics.friction import rate_slope
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, typical_speeds
-from bowdenfit.results.record import Record, once, values_of
+from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 from bowdenfit.words import percent, significant
 
 _SHOWN = 5  # speeds
@@ -37,7 +37,7 @@ class StickSlip:
         return f"Probability that friction falls with speed, so that a compliant drive sticks and slips: {each}."
 
 
-@once
+@cached_per_fit
 def stick_slip(fit: Record) -> StickSlip | None:
     """At speeds from the lowest to the highest measured; None where the fit has no rate, or no draws."""
     friction = fit.model.cable.friction
@@ -62,5 +62,5 @@ def slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
         return rate_slope(at, *(values[name] for name in (STRIBECK, STRIBECK_SPEED, VISCOUS)))
 
     with jax.enable_x64(True):
-        found: np.ndarray = for_each_value(slope, values_of(fit), np.asarray(speeds, dtype=float))
+        found: np.ndarray = for_each_value(slope, parameter_values(fit), np.asarray(speeds, dtype=float))
     return found

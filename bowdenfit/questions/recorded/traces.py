@@ -10,7 +10,7 @@ from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.questions.recorded.equations import DRAWS, Follower, blocks_shown
 from bowdenfit.recordings.recording import Recording, Recordings
-from bowdenfit.results.record import Record, once, some_values
+from bowdenfit.results.record import Record, cached_per_fit, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
 _REACH = 0.1  # mounting effects of a run that are looked at, either way
@@ -68,7 +68,7 @@ class Trace:
         return _apart(self.output_force, self.fitted, self.loop)[self.used]
 
 
-@once
+@cached_per_fit
 def traces(fit: Record) -> tuple[Trace, ...]:
     """Every recording of a fit."""
     recordings = fit.dataset.measurements.table(Recordings)
@@ -88,7 +88,7 @@ def traces(fit: Record) -> tuple[Trace, ...]:
 
 def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
-    values, n = some_values(fit, DRAWS), len(recordings.each)
+    values, n = thinned_parameter_values(fit, DRAWS), len(recordings.each)
     if fit.sampled is None:
         force, exponent = follower(values, np.zeros((DRAWS, n)))
         return force[:1], exponent[:1]
@@ -102,7 +102,7 @@ def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple
 
 def _fitted(fit: Record, recordings: Recordings, follower: Follower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
-    center = {name: np.full(DRAWS, np.median(drawn)) for name, drawn in some_values(fit, DRAWS).items()}
+    center = {name: np.full(DRAWS, np.median(drawn)) for name, drawn in thinned_parameter_values(fit, DRAWS).items()}
     grid = np.linspace(-_REACH, _REACH, DRAWS)
     force, _ = follower(center, np.repeat(grid[:, None], len(recordings.each), axis=1))
     columns = []

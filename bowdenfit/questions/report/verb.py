@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PLACE, RESULTS, Output, checked
+from bowdenfit.arguments import PATH, RESULTS, Output, read_first
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 
-@checked
+@read_first
 def report(
-    found: Annotated["Record | str | Path", RESULTS, PLACE],
+    found: Annotated["Record | str | Path", RESULTS, PATH],
     output: Annotated[Output, Parameter(metavar="FILE", show_default="RESULTS/report.html")] = None,
     *,
     ranked: Annotated[bool, Parameter("--next")] = False,

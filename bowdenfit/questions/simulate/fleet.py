@@ -33,7 +33,7 @@ from bowdenfit.questions.simulate.tables import (
     table_texts,
 )
 from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
-from bowdenfit.results.folder import filled_when_whole, write_text
+from bowdenfit.results.folder import fill_folder_atomically, write_text
 
 READINGS = "readings"
 
@@ -179,7 +179,7 @@ def write_fleet(plan: FleetPlan, made: list[SimulatedInspection], truth: dict[st
         lubricated = "yes" if each.lubricated else "no"
         rows.append(f"{each.cable},{each.cycles:.0f},{each.temperature:g},{lubricated},{each.file}")
     files |= {FLEET_DESCRIPTION: text, FLEET_TABLE: "\n".join(rows) + "\n", TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
-    with filled_when_whole(folder) as place:
+    with fill_folder_atomically(folder) as place:
         (place / READINGS).mkdir()
         for name, content in files.items():
             write_text(place / name, content)

@@ -19,7 +19,7 @@ from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
-from bowdenfit.results.folder import filled_when_whole, write_text
+from bowdenfit.results.folder import fill_folder_atomically, write_text
 from bowdenfit.words import shown
 
 TRUTH_FILE = "truth.json"
@@ -109,7 +109,7 @@ def write_folder(folder: Path, cable: str, files: Mapping[str, str], truth: Mapp
     outside = [name for name in texts if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name]
     if outside:
         raise DescriptionError(f"the plan names the file {shown(outside[0])}, outside of what is made; name one inside.")
-    with filled_when_whole(folder) as place:
+    with fill_folder_atomically(folder) as place:
         for name, text in texts.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             write_text(place / name, text)

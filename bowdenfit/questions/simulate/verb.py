@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import LARGEST_SEED, PLACE, Output, Seed, checked
+from bowdenfit.arguments import LARGEST_SEED, PATH, Output, Seed, read_first
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 BENCH = Parameter("BENCH", help="Such as bench.toml, a cable.toml with [truth] and [design].")
 
 
-@checked
+@read_first
 def simulate(
-    bench: Annotated[str | Path, BENCH, PLACE],
+    bench: Annotated[str | Path, BENCH, PATH],
     *,
     output: Annotated[Output, Parameter(required=True)] = None,
     seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,

@@ -41,7 +41,7 @@ def description_of(paths: Sequence[Path], called: str, ask: Asker) -> str:
     source = ask.ask(text("Who measured it, when, on which bench? (- to leave it out)", "-"))
     faults = Faults()
     for sheet in sheets:
-        with faults.noted():
+        with faults.collect():
             if sheet.kind and sheet.kind.takes_channels:
                 name_channels(sheet, ask)
             else:
@@ -65,7 +65,7 @@ def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
     """What each file is; asked where it does not say."""
     faults, sheets = Faults(), list[Sheet]()
     for path in paths:
-        with faults.noted():
+        with faults.collect():
             sheet = look(path)
             if sheet.kind is None:
                 sheet = _asked(sheet, ask)
@@ -75,7 +75,7 @@ def _sheets(paths: Sequence[Path], ask: Asker) -> list[Sheet]:
     ask.settle()
     for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
         files = [sheet.file for sheet in sheets if sheet.kind is kind]
-        with faults.noted():
+        with faults.collect():
             questions = kind.init_questions
             if len(files) > 1 and questions is not None and not questions.several:
                 raise DatasetError(

@@ -7,10 +7,10 @@ from importlib import resources
 from pathlib import Path
 
 from bowdenfit.dataset import DESCRIPTION_FILE
-from bowdenfit.errors import DatasetError, UsageError, nearest
+from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
-from bowdenfit.results.folder import filled_when_whole, is_empty
+from bowdenfit.results.folder import fill_folder_atomically, is_empty
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
@@ -41,7 +41,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
         UsageError, StoreError: It exists already, or cannot be written.
     """
     refuse_existing(folder)
-    with filled_when_whole(folder) as place:
+    with fill_folder_atomically(folder) as place:
         yield place
 
 
@@ -114,7 +114,7 @@ def write_example(name: str, folder: Path) -> None:
     """
     known = examples()
     if name not in known:
-        hint = nearest(name, list(known)) if known else "; none was installed."
+        hint = suggest_name(name, list(known)) if known else "; none was installed."
         raise UsageError(f"there is no example {shown(name)}{hint}")
     with new_folder(folder) as place:
         for file in sorted(known[name].rglob("*")):  # shutil.copytree hides what the system says

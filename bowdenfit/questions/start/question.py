@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
-from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, nearest
+from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, suggest_name
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
 
@@ -61,7 +61,7 @@ class Nobody:
     def ask(self, question: Question[Answer]) -> Answer:
         """The default; where it is only proposed, or an example, to find out what else is not said."""
         if question.default is None or question.why:
-            self.faults.found.append(DescriptionError(question.why))
+            self.faults.faults.append(DescriptionError(question.why))
         return question.read(question.example if question.default is None else question.default)
 
     def say(self, sentence: str) -> None:
@@ -119,7 +119,7 @@ def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
 
     def read(typed: str) -> str:
         if typed.strip() not in known:
-            raise UsageError(f"{shown(typed)} is not known{nearest(typed.strip(), known)}")
+            raise UsageError(f"{shown(typed)} is not known{suggest_name(typed.strip(), known)}")
         return typed.strip()
 
     return Question(words, read, default)

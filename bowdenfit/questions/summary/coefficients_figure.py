@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import symbol_words
+from bowdenfit.plots.captions import explain_symbols
 from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
 from bowdenfit.plots.layout import (
     TITLE,
-    columns_within,
+    count_columns,
     drop_unused,
     label_across,
     legend_above,
@@ -85,7 +85,7 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
         f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
         "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
         "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
-        f"{symbol_words((p.symbol, p.meaning) for p in parameters)}"
+        f"{explain_symbols((p.symbol, p.meaning) for p in parameters)}"
         f"n = {parameters[0].draws.size} sampled values."
     )
 
@@ -93,7 +93,7 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
 @in_paper_style
 def draw(parameters: tuple[Coefficient, ...], width: float | None = None) -> Figure:
     """Posterior density of each coefficient against its prior, and the least-squares estimate with standard error."""
-    columns = columns_within(width or WIDE, min(MOST_COLUMNS, len(parameters)), LEAST_WIDTH, 0.68)
+    columns = count_columns(width or WIDE, min(MOST_COLUMNS, len(parameters)), LEAST_WIDTH, 0.68)
     rows = -(-len(parameters) // columns)
     page = width or (WIDE if columns > 1 else MEDIUM)
     figure, flat = panels([1.35] * rows, columns, TITLE + 0.14, (0.68, TITLE + 0.64), page)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.bands import draw_quantiles, name_band
-from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrapped
+from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrap_words
 from bowdenfit.plots.panels import make_logarithmic
 from bowdenfit.plots.style import (
     GRAY,
@@ -65,7 +65,7 @@ def caption(forces: Forces) -> str:
 def draw(forces: Forces, width: float | None = None) -> Figure:
     """Output against input with a strip of residuals below; beside them the apparent coefficient against the load."""
     page = width or WIDE
-    said = wrapped(_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
+    said = wrap_words(_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
     figure, (main, strip, beside) = _panels(page, 0.06 + VERDICT_ROW * (1 + said.count("\n")))
     if forces.logarithmic:
         for axes, name, value in ((main, "x", "input_force"), (main, "y", "output_force"), (beside, "x", "input_force")):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.plots.bands import evenly
+from bowdenfit.plots.bands import choose_evenly
 
 if TYPE_CHECKING:
     from bowdenfit.kinds.forces.table import ForceTable
@@ -95,7 +95,7 @@ def forces_shown(fit: "Record") -> Forces | None:
     table = fit.dataset.measurements.table(ForceTable)
     if table is None:
         return None
-    rows = np.array(evenly(range(len(table.run)), MOST_READINGS))
+    rows = np.array(choose_evenly(range(len(table.run)), MOST_READINGS))
     place, first, labels, shown = _places(fit, table, rows)
     low, high = table.input_force[rows].min(), table.input_force[rows].max()
     logarithmic = bool(high > _WIDE * low)
@@ -124,7 +124,7 @@ def _places(fit: "Record", table: "ForceTable", rows: np.ndarray) -> tuple[np.nd
         length = f"{at:.4g} {route.unit}" if route is not None else ""
         own = f"{np.mean(angle[place == i]):.3g} deg" if np.isfinite(table.own.angle).any() else ""
         labels.append(", ".join(part for part in (names[int(number)] if names else "", length, own) if part))
-    return place, first, labels, set(evenly(range(len(distinct)), MOST_PLACES))
+    return place, first, labels, set(choose_evenly(range(len(distinct)), MOST_PLACES))
 
 
 def _of_draws(

@@ -23,7 +23,7 @@ from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.recorded.stick_slip import stick_slip
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.plain import plain
+from bowdenfit.results.plain import plain_data
 from bowdenfit.results.record import Draws, Record
 
 SCHEMA = 1
@@ -102,7 +102,7 @@ def summarize(fit: Record) -> dict[str, Any]:
             page["samplers"] = fit.posterior.agreement
         if fit.dataset.description.route is not None:
             page["optimal"] = fit.optimal_length()
-    everything: dict[str, Any] = plain(page)
+    everything: dict[str, Any] = plain_data(page)
     return everything
 
 

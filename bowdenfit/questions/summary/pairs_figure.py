@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import symbol_words
-from bowdenfit.plots.layout import EDGE, area_entry, axes_at, empty_page, line_entry, place_labels, wrapped
+from bowdenfit.plots.captions import explain_symbols
+from bowdenfit.plots.layout import EDGE, area_entry, axes_at, empty_page, line_entry, place_labels, wrap_words
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
 from bowdenfit.plots.ticks import number_below, number_left
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
@@ -54,7 +54,7 @@ def caption(data: Pairs) -> str:
         "Every two unknowns against each other, and each alone on the diagonal. Dark and light: the smallest areas that "
         "hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements tell a combination of "
         "the two better than either alone. Dashed: median and 90 % interval. "
-        f"{symbol_words((q.symbol, q.meaning) for q in data.quantities)}"
+        f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} sampled values."
     )
 
@@ -123,7 +123,7 @@ def _regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:
 
 def _label(figure: Figure, below: Axes, left: Axes | None, label: str, size: float) -> None:
     """Write numbers and a name below a column of panels, and left of a row."""
-    label = wrapped(label, size - 0.2 * GAP, most=2)
+    label = wrap_words(label, size - 0.2 * GAP, most=2)
     number_below(below)
     below.set_xlabel(label, fontsize=SMALL, va="top")
     if left:
@@ -146,7 +146,7 @@ def _remarks(data: Pairs, shown: int) -> list[str]:
 def _key(first: Axes, remarks: list[str], room: float) -> None:
     """Write the key into the empty corner right of the first panel."""
     entries = [area_entry(f"{100 * share:.0f} % probability", color) for share, color in FILLS.items()]
-    entries += [line_entry(wrapped(remark, room)) for remark in remarks]
+    entries += [line_entry(wrap_words(remark, room)) for remark in remarks]
     first.legend(handles=entries, loc="upper left", bbox_to_anchor=(1.1, 1.0), borderaxespad=0, labelspacing=0.25)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.layout import EDGE, RIGHT, axes_at, empty_page, legend_above, text_width
-from bowdenfit.plots.panels import short
+from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.strips import NONE
 from bowdenfit.plots.style import (
     BLACK,
@@ -90,9 +90,9 @@ def _labels(tables: tuple[EfficiencyPoints, ...], room: float) -> list[str]:
     """The labels, their beginning left out where they are too long."""
     every = [label for points in tables for label in points.labels]
     longest = LONGEST
-    while longest > 4 and max(text_width(short(label, longest)) for label in every) > room:
+    while longest > 4 and max(text_width(shorten_name(label, longest)) for label in every) > room:
         longest -= 1
-    return [short(label, longest) for label in every]
+    return [shorten_name(label, longest) for label in every]
 
 
 def _rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> None:

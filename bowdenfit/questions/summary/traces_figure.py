@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.captions import symbol_words
-from bowdenfit.plots.layout import EDGE, axes_at, empty_page, line_entry, place_labels, wrapped
+from bowdenfit.plots.captions import explain_symbols
+from bowdenfit.plots.layout import EDGE, axes_at, empty_page, line_entry, place_labels, wrap_words
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
 from bowdenfit.plots.ticks import number_below, number_left
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
@@ -48,7 +48,7 @@ def caption(data: Paths) -> str:
     return (
         "Whether the sampling can be relied on: the path of every unknown through the sampling, a color for each "
         "independent start. They should lie on top of each other and go neither up nor down. Right of each panel: where "
-        f"each spent its time. {symbol_words((q.symbol, q.meaning) for q in data.quantities)}"
+        f"each spent its time. {explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
     )
 
@@ -63,7 +63,7 @@ def draw(data: Paths, width: float | None = None) -> Figure:
     columns = 2 if page >= 2 * LEAST_COLUMN and len(quantities) > 1 else 1
     rows = -(-len(quantities) // columns)
     chains = len(quantities[0].draws) == data.n_ensembles
-    key = wrapped(_key(chains), page - 2 * EDGE)
+    key = wrap_words(_key(chains), page - 2 * EDGE)
     figure = empty_page(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
     for i, quantity in enumerate(quantities):
         column, row = divmod(i, rows)
@@ -124,7 +124,7 @@ def _label(figure: Figure, trace: Axes, label: str, last: bool) -> None:
 
 def _in_two_lines(label: str) -> str:
     """A name beside a panel; of one that takes more lines the first and the last, which tells groups apart."""
-    first, *others = wrapped(label, ROW - 0.04).split("\n")
+    first, *others = wrap_words(label, ROW - 0.04).split("\n")
     between = "\N{HORIZONTAL ELLIPSIS} " if len(others) > 1 else ""
     return "\n".join([first, *(between + last for last in others[-1:])])
 

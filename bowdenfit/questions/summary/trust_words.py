@@ -95,7 +95,7 @@ def next_step(fit: Record) -> str:
         return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
     leant_on = few(map(_named, found.decisive), most=2)  # how far on each differs from one seed to the next
     again = f"; in doubt, measure again what the fit leans on: {leant_on}" if leant_on else ""
-    if fit.dataset.description.route is not None and fit.optimal_length().is_settled:
+    if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
         return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."
     if not can_be_ranked(fit):
         return f"Next: any measurement of another kind or at other bends would tell more{again}."

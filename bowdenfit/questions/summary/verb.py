@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PLACE, RESULTS, TEXTS, Output, Quantity, checked, measured, number_with_unit
+from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, Quantity, as_pair, number_with_unit, read_first
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _Asked = tuple[dict[str, str], Sequence[str], Callable[[Path, Sequence[str]], None]]
 
 
-@checked
-def summary(results: Annotated[str | Path, RESULTS, PLACE], *, full: bool = False) -> "tuple[str, Any] | Record":
+@read_first
+def summary(results: Annotated[str | Path, RESULTS, PATH], *, full: bool = False) -> "tuple[str, Any] | Record":
     """The summary of a finished fit, for people and as JSON; or the fit, where they were not written.
 
     Args:
@@ -56,9 +56,9 @@ def reply(found: "tuple[str, Any] | Record", asked: Mapping[str, Any]) -> Reply:
     return Reply(text, lambda: summarize(found), exit_code=0 if verdict(found).trusted else NOT_TRUSTED)
 
 
-@checked
+@read_first
 def plot(
-    found: Annotated["Record | str | Path", RESULTS, PLACE],
+    found: Annotated["Record | str | Path", RESULTS, PATH],
     output: Annotated[Output, Parameter(show_default="RESULTS/figures")] = None,
     *,
     figures: Annotated[Sequence[str], Parameter("--figure", metavar="NAME"), TEXTS] = (),
@@ -84,8 +84,8 @@ def plot(
     """
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.writing import Files
-    from bowdenfit.results.captions import bring_captions, write_captions
-    from bowdenfit.results.folder import FIGURES, filled_when_whole
+    from bowdenfit.results.captions import copy_captions, write_captions
+    from bowdenfit.results.folder import FIGURES, fill_folder_atomically
 
     if isinstance(found, str | Path):
         output = output or Path(found) / FIGURES
@@ -94,8 +94,8 @@ def plot(
     endings = _formats(formats)
     there = _there(Path(found), figures, endings) if isinstance(found, str | Path) and width is None else None
     captions, order, bring = there or _anew(found, figures, width)
-    with filled_when_whole(Path(output)) as place:
-        bring_captions(Path(output), place)
+    with fill_folder_atomically(Path(output)) as place:
+        copy_captions(Path(output), place)
         bring(place, endings)
         said = write_captions(captions, place, order)
     names = [f"{name}.{ending}" for name in captions for ending in endings]
@@ -104,10 +104,10 @@ def plot(
 
 def _there(results: Path, names: Sequence[str], endings: Sequence[str]) -> "_Asked | None":
     """Figures that the fit has drawn already, to be copied."""
-    from bowdenfit.results.drawn import drawn_before
+    from bowdenfit.results.drawn import captions_if_unchanged
     from bowdenfit.results.folder import FIGURES
 
-    captions = drawn_before(results, names, endings)
+    captions = captions_if_unchanged(results, names, endings)
     if captions is None:
         return None
     chosen = {name: text for name, text in captions.items() if name in names or not names}
@@ -124,7 +124,7 @@ def _anew(found: "Record | str | Path", names: Sequence[str], width: Quantity | 
     """Figures to be drawn."""
     from bowdenfit.questions.figures import FIGURES, captions_of, page_width
 
-    page = page_width(measured(width))
+    page = page_width(as_pair(width))
     shown, cable, mark = _shown(found, names)
     return captions_of(shown, cable, mark), tuple(FIGURES), partial(_draw, shown, (cable, page, mark))
 
@@ -138,28 +138,28 @@ def _draw(shown: Mapping[str, Any], look: tuple[str, float | None, str], place: 
 
 def _formats(named: Sequence[str]) -> Sequence[str]:
     """Return the endings of the files; PNG where none is named."""
-    from bowdenfit.errors import UsageError, nearest
+    from bowdenfit.errors import UsageError, suggest_name
     from bowdenfit.plots.write import FORMATS, PNG
 
     for name in named:
         if name not in FORMATS:
-            raise UsageError(f"there is no format {name!r} for figures{nearest(name, list(FORMATS))}")
+            raise UsageError(f"there is no format {name!r} for figures{suggest_name(name, list(FORMATS))}")
     return tuple(dict.fromkeys(named)) or (PNG,)
 
 
 def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str, Any], str, str]:
     """Data of all figures of a fit, or of some, the cable and `mark_of`; what is kept of it is not worked out again."""
-    from bowdenfit.errors import UsageError, nearest
+    from bowdenfit.errors import UsageError, suggest_name
     from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures, mark_of
     from bowdenfit.results.folder import FIT, read_page
-    from bowdenfit.results.kept import kept
+    from bowdenfit.results.kept import read_answers
 
     for name in names:
         if name not in FIGURES:
-            raise UsageError(f"there is no figure {name!r}{nearest(name, list(FIGURES))}")
+            raise UsageError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
     shown = kept_figures(Path(found), names) if isinstance(found, str | Path) else {}
     if shown and isinstance(found, str | Path):
-        cable, troubles = read_page(Path(found) / FIT)["description"]["name"], kept(Path(found))["troubles"]
+        cable, troubles = read_page(Path(found) / FIT)["description"]["name"], read_answers(Path(found))["troubles"]
     else:
         from bowdenfit.questions.summary.verdict import verdict
 

@@ -13,7 +13,7 @@ from bowdenfit.questions.check.words import scattering
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
-from bowdenfit.results.record import Record, once
+from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few
 
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
@@ -50,7 +50,7 @@ class Verdict(Display):
         return [{"trouble": kind, "reason": reason} for kind, said in self.troubles.items() for reason in said], {}
 
 
-@once
+@cached_per_fit
 def verdict(fit: Record) -> Verdict:
     """The verdict on a fit."""
     troubles = {

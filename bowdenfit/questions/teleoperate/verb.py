@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FIT, PLACE, RESULTS, Bends, Output, checked
+from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, read_first
 from bowdenfit.questions.writing import files_of, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -18,10 +18,10 @@ PROBABILITY = 0.95  # with which contact must be stable
 DEVICE = Parameter("DEVICE", help="Such as device.toml, which describes master, slave, hand and wall.")
 
 
-@checked
+@read_first
 def teleoperate(
     found: Annotated["Record", RESULTS, FIT],
-    device: Annotated[str | Path, DEVICE, PLACE],
+    device: Annotated[str | Path, DEVICE, PATH],
     *,
     wrap_angle: Bends = None,
     output: Output = None,

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from bowdenfit.description import Description, QuantityValue
 from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import wrong_keys
-from bowdenfit.errors import DatasetError, DescriptionError, nearest
+from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.kinds.planned_recordings import description_without_recordings
 from bowdenfit.questions.simulate.recordings.planned import Page, PlannedRecording, planned_recordings
 from bowdenfit.questions.simulate.tables import plan_page, truth_of
@@ -110,7 +110,7 @@ def _measured_angles(page: Page, description: Description, file: str) -> dict[fl
         place = f"{file}, recordings.measured_angles.{i}"
         for name in row:
             if name not in ["at", *columns]:
-                raise DescriptionError(f"{place}: unknown key {name!r}{nearest(name, ['at', *columns])}")
+                raise DescriptionError(f"{place}: unknown key {name!r}{suggest_name(name, ['at', *columns])}")
         for name in ["at", *columns]:
             if name not in row:
                 raise DescriptionError(f"{place}: the key {name!r} is missing; angles are in deg.")

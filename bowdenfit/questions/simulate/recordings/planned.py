@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
-from bowdenfit.errors import DescriptionError, UsageError, nearest
+from bowdenfit.errors import DescriptionError, UsageError, suggest_name
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, check_settings
 
 RECORDINGS_FOLDER = "recordings"
@@ -126,7 +126,7 @@ def _explained(error: ValidationError) -> str:
     if first["type"] == "unexpected_keyword_argument":
         kind: Any = PlannedRecording.model_fields[section].annotation
         known = [field.name for field in dataclasses.fields(kind) if field.name != "speed" or kind is not MotorProfile]
-        return f"{section}: unknown key {where[0]!r}{nearest(where[0], known)}"
+        return f"{section}: unknown key {where[0]!r}{suggest_name(where[0], known)}"
     message = f"{first['msg'][:1].lower()}{first['msg'][1:]}"
     return f"{section}, {'.'.join(where)}: {message} (found {first['input']!r})."
 

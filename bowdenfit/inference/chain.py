@@ -1,4 +1,4 @@
-"""What every sampler gives, and what they share: draws with their diagnostics, reports on the way, the verdict's reasons."""
+"""What all samplers share: the request, progress reports, and the chain of draws with its diagnostics."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from bowdenfit.inference.log_density import LogDensity
 
 @dataclass(frozen=True)
 class Progress:
-    """Where sampling stands, for a progress bar; R-hat and effective sample size once they have been looked at."""
+    """Progress of sampling, for a progress bar; R-hat and effective sample size once they have been computed."""
 
     steps: int
     max_steps: int
@@ -29,15 +29,15 @@ class Chain:
     """Draws of the posterior after burn-in.
 
     Args:
-        z: Draws in z, (ensemble x walker, draw, parameter); a chain of NUTS is an ensemble of one walker.
-        quantities: Named derived quantities of every draw, (ensemble x walker, draw).
-        diagnostics: Of parameters and derived quantities.
+        z: Draws in z, (ensemble x walker, draw, parameter); a NUTS chain counts as an ensemble of one walker.
+        quantities: Named derived quantities at every draw, (ensemble x walker, draw).
+        diagnostics: Diagnostics of parameters and derived quantities.
         n_ensembles: Number of independent ensembles.
-        steps: Steps taken by each walker; of NUTS, without warm-up.
-        acceptance: Mean fraction of accepted proposals; of NUTS, mean acceptance along trajectories.
-        reasons: Why the draws should not be trusted; empty if they may.
+        steps: Steps taken by each walker; for NUTS, without warm-up.
+        acceptance: Mean fraction of accepted proposals; for NUTS, mean acceptance along trajectories.
+        reasons: Why the draws should not be trusted; empty if they can be.
         sampler: "emcee" or "nuts".
-        trajectories: How those of NUTS went.
+        trajectories: Statistics of the trajectories of NUTS.
     """
 
     z: np.ndarray
@@ -53,18 +53,18 @@ class Chain:
 
 @dataclass(frozen=True)
 class SamplingRequest:
-    """What a sampler is asked for: to sample until converged, or until the stated maximum of steps.
+    """What a sampler is asked to do: sample until converged, or until the maximum number of steps.
 
     Args:
-        posterior: What is sampled.
+        posterior: The posterior to sample.
         start: Center and covariance of the start.
-        settings: Ensembles or chains, maximum of steps and targets.
+        settings: Ensembles or chains, maximum steps, and targets.
         seed: Seed of everything random here.
-        quantities: Derived quantities of many z; they must converge too.
-        checkpoint: File that every stored state is written to; see `bowdenfit.inference.checkpoint`.
-        resume: Go on from the states in `checkpoint`.
-        report: Called after every block.
-        diagnose: What diagnoses all quantities; `diagnose_all`, or something that has another process do it.
+        quantities: Derived quantities at many z; they must converge too.
+        checkpoint: File to which every stored state is written; see `bowdenfit.inference.checkpoint`.
+        resume: Whether to continue from the states in `checkpoint`.
+        report: Called after every block of steps.
+        diagnose: Computes diagnostics of all quantities: `diagnose_all`, or a function that has another process do it.
     """
 
     posterior: LogDensity
@@ -78,7 +78,7 @@ class SamplingRequest:
     diagnose: Callable[[Mapping[str, np.ndarray], int], dict[str, Diagnostics]] = diagnose_all
 
     def make_chain(self, z: np.ndarray, n_ensembles: int, **sampler_details: Any) -> Chain:
-        """Draws (walker, draw, parameter), ordered by ensemble, with derived quantities, diagnostics, and their shortfalls."""
+        """Return the chain of draws (walker, draw, parameter), ordered by ensemble, with derived quantities and diagnostics."""
         flat = self.quantities(z.reshape(-1, z.shape[-1]))
         derived = {name: np.asarray(values).reshape(z.shape[:2]) for name, values in flat.items()}
         draws = {p.name: z[..., i] for i, p in enumerate(self.posterior.model.space.free)} | derived
@@ -88,7 +88,7 @@ class SamplingRequest:
 
 
 def describe_stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
-    """Walkers that never moved in half their path; a few of them far out pass every other check."""
+    """Describe walkers that never moved in half their path; a few of them far out pass every other check."""
     count = int(np.sum(np.ptp(z[..., 0], axis=1) == 0)) if z.shape[1] > 1 and z.shape[2] else 0
     if not count:
         return ()
@@ -96,6 +96,6 @@ def describe_stuck_walkers(z: np.ndarray) -> tuple[str, ...]:
 
 
 def worst_diagnostics(chain: Chain) -> tuple[float, float]:
-    """Highest R-hat and lowest effective sample size of all quantities."""
+    """Return the highest R-hat and the lowest effective sample size of all quantities."""
     diagnostics = chain.diagnostics.values()
     return max(d.r_hat for d in diagnostics), min(min(d.ess_bulk, d.ess_tail) for d in diagnostics)

@@ -1,8 +1,7 @@
-"""The sampler's checkpoint: what it was started for, then one record after the other, each whole or not there.
+"""A sampler's checkpoint file: a fingerprint of the run, then one record after the other, each either complete or absent.
 
-A file that only grows, written by plain means: where the disk is full or the process is ended in the middle of a record, the
-records before it stand, and sampling goes on after them. (HDF5 keeps its books all over the file, and a write that fails
-leaves them unreadable.)
+The file only grows. Where the disk is full or the process ends in the middle of a record, the records before it remain valid,
+and sampling continues after them. (HDF5 keeps its index all over the file, and a failed write leaves it unreadable.)
 """
 
 import io
@@ -21,24 +20,24 @@ from bowdenfit.inputs import or_damaged, refuse_packed, refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _RECORD_HEADER = struct.Struct("<QI")  # length and checksum of a record
-_LONGEST_FINGERPRINT = 1 << 24  # bytes of what it was started for
+_LONGEST_FINGERPRINT = 1 << 24  # bytes; a longer fingerprint is damage
 Record = dict[str, np.ndarray]
 
 
 def checkpoint_header(fingerprint: Mapping[str, Any]) -> bytes:
-    """How a checkpoint begins.
+    """Return the first bytes of a checkpoint.
 
     Args:
-        fingerprint: What it is started for, as plain data.
+        fingerprint: What the run was started for, as plain data.
     """
     return _MARK + json.dumps(fingerprint).encode() + b"\n"
 
 
 def read_fingerprint(path: Path) -> dict[str, Any]:
-    """What a checkpoint was started for.
+    """Read what a checkpoint was started for.
 
     Raises:
-        ValueError: It is no checkpoint.
+        ValueError: The file is not a checkpoint.
         OSError: It cannot be read.
     """
     refuse_special(path, StoreError)
@@ -47,11 +46,11 @@ def read_fingerprint(path: Path) -> dict[str, Any]:
 
 
 def read_records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Record]:
-    """Records in their order; what stands behind the last whole one is cut off.
+    """Read all complete records in order; cut off what follows the last complete one.
 
     Args:
         path: The checkpoint.
-        shapes: Of the arrays of numbers that a record has, by name.
+        shapes: Shapes of the numeric arrays of a record, by name.
 
     Raises:
         StoreError: It cannot be read, or holds other records.
@@ -74,7 +73,7 @@ def read_records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Reco
 
 
 def damaged_checkpoint_error(path: Path) -> StoreError:
-    """That a checkpoint is not as it was written.
+    """Return the error that says a checkpoint is damaged.
 
     Args:
         path: The checkpoint.
@@ -83,14 +82,14 @@ def damaged_checkpoint_error(path: Path) -> StoreError:
 
 
 def append_record(path: Path, record: Mapping[str, np.ndarray]) -> None:
-    """Add a record.
+    """Append a record to a checkpoint.
 
     Args:
-        path: The checkpoint, begun by `heading`.
+        path: The checkpoint, started with `checkpoint_header`.
         record: Named arrays.
 
     Raises:
-        StoreError: There is no room for it.
+        StoreError: The disk is full, or the file cannot be written.
     """
     buffer = io.BytesIO()
     save: Any = np.savez  # its stub takes arrays for its own keywords

@@ -1,4 +1,4 @@
-"""How well each of several models predicts readings it was not fitted to: leave-one-out, from the draws of one fit each."""
+"""Model comparison by leave-one-out: how well each model predicts readings that it was not fitted to, from draws of its fit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,9 +8,9 @@ import numpy as np
 
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
-FEW_READINGS = 100  # readings below which the standard error of a difference is too small more often than not
-_CLEAR_ERRORS = 2.0  # differences of so many standard errors, and of more than _NOTICEABLE, are said to be seen
-_NOTICEABLE = 4.0
+FEW_READINGS = 100  # readings below which the standard error of a difference is usually too small (Sivula and others 2020)
+_CLEAR_ERRORS = 2.0  # standard errors, together with _NOTICEABLE, beyond which a difference counts (Vehtari's loo FAQ)
+_NOTICEABLE = 4.0  # difference of elpd below which models predict about equally well (Sivula and others 2020)
 
 LooMethod = Literal["importance sampling", "moment matching", "refit", "rough"]
 Verdict = Literal["clear", "leaning", "open"]
@@ -18,14 +18,14 @@ Verdict = Literal["clear", "leaning", "open"]
 
 @dataclass(frozen=True)
 class LooPrediction:
-    """Of one model, reading by reading; a run of forces, whose samples belong together, counts as one.
+    """Leave-one-out prediction of every reading by one model; a run of forces, whose samples belong together, counts as one.
 
     Args:
-        elpd: Expected log predictive density of each reading, had it been left out.
-        pareto_k: Reliability of each, as the draws of the fit give it.
-        error: Monte Carlo standard error of each; empty where it was not asked for.
-        readings: Table and label of each; empty where they were not given.
-        how: How each was found; empty where all are by importance sampling, reliable or not.
+        elpd: Expected log predictive density (elpd) of each reading, had it been left out.
+        pareto_k: Pareto k of each reading, from the draws of the fit.
+        error: Monte Carlo standard error of each elpd; empty where not computed.
+        readings: Table and label of each reading; empty where not given.
+        how: Method used for each reading; empty where all are by importance sampling, reliable or not.
     """
 
     elpd: np.ndarray
@@ -35,7 +35,7 @@ class LooPrediction:
     how: tuple[LooMethod, ...] = ()
 
     def describe_reading(self, i: int) -> dict[str, Any]:
-        """What is known of one reading, as plain data."""
+        """Return the results of one reading as plain data."""
         return {
             "elpd": self.elpd[i],
             "monte_carlo_error": self.error[i],
@@ -45,7 +45,7 @@ class LooPrediction:
 
     @property
     def unreliable(self) -> int:
-        """Number of readings whose value leans on few draws."""
+        """Number of readings whose value depends on few draws."""
         if self.how:
             return self.how.count("rough")
         return int(np.sum(~(self.pareto_k <= RELIABLE_K)))
@@ -53,12 +53,12 @@ class LooPrediction:
 
 @dataclass(frozen=True)
 class ElpdDifference:
-    """How much worse a model predicts than the best.
+    """How much worse a model predicts than the best one.
 
     Args:
-        elpd: Best less this one, 0 for the best itself.
-        standard_error: Of that, from the scatter over readings.
-        unreliable: Readings of either whose value leans on few draws.
+        elpd: elpd of the best model minus that of this one; 0 for the best itself.
+        standard_error: Standard error of the difference, from its scatter over readings.
+        unreliable: Number of readings of either model whose value depends on few draws.
     """
 
     elpd: float
@@ -67,14 +67,14 @@ class ElpdDifference:
 
     @property
     def is_distinguishable(self) -> bool:
-        """Whether the data can tell the two apart."""
+        """Whether the data distinguish the two models."""
         return self.elpd > max(_CLEAR_ERRORS * self.standard_error, _NOTICEABLE)
 
     def verdict(self, n_readings: int) -> Verdict:
-        """Whether the data can tell the two apart, with so few or so many readings.
+        """Return whether the data distinguish the two models, given the number of readings.
 
-        Below a hundred readings the standard error is itself known badly, and rather too small: between two and four of
-        them the data lean, and no more.
+        Below a hundred readings the standard error is itself uncertain, and usually too small. A difference between two and
+        four standard errors then only counts as leaning.
 
         References:
             Sivula, Magnusson, Matamoros and Vehtari 2020, "Uncertainty in Bayesian leave-one-out cross-validation based
@@ -86,10 +86,10 @@ class ElpdDifference:
 
 
 def psis_loo(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> LooPrediction:
-    """Leave-one-out by Pareto-smoothed importance sampling.
+    """Compute leave-one-out by Pareto-smoothed importance sampling.
 
     Args:
-        log_likelihood: Of every reading by table, (chain, draw, reading).
+        log_likelihood: Log likelihood of every reading by table, (chain, draw, reading).
         n_effective: Effective number of the draws.
 
     References:
@@ -105,10 +105,10 @@ def psis_loo(log_likelihood: Mapping[str, np.ndarray], n_effective: float) -> Lo
 
 
 def compare_predictions(predictions: Mapping[str, LooPrediction]) -> dict[str, ElpdDifference]:
-    """Every model against the one that predicts best, which comes first.
+    """Compare every model with the one that predicts best, which comes first.
 
     Args:
-        predictions: By name of the model, of the same readings in the same order.
+        predictions: Predictions by name of the model, of the same readings in the same order.
     """
     order = sorted(predictions, key=lambda name: -float(predictions[name].elpd.sum()))
     best = predictions[order[0]]
@@ -121,7 +121,7 @@ def compare_predictions(predictions: Mapping[str, LooPrediction]) -> dict[str, E
 
 
 def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, float]:
-    r"""Weights of the mixture of the models that predicts left-out readings best.
+    r"""Return the weights of the mixture of models that best predicts left-out readings.
 
     .. math:: \max_w \sum_i \log \sum_k w_k \exp(\text{elpd}_{ik}), \quad w_k \ge 0, \quad \sum_k w_k = 1
 
@@ -129,7 +129,7 @@ def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, floa
     best model's for it, which leaves the weights as they are.
 
     Args:
-        predictions: By name of the model, of the same readings in the same order.
+        predictions: Predictions by name of the model, of the same readings in the same order.
 
     References:
         Yao, Vehtari, Simpson and Gelman 2018, "Using stacking to average Bayesian predictive distributions" (Bayesian

@@ -1,4 +1,4 @@
-"""Compiling ahead of time, with what makes it quick for functions this small."""
+"""Ahead-of-time compilation with XLA options that suit small functions."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -22,15 +22,15 @@ def compile_program(
     run_often: bool = False,
     beside: Executor | None = None,
 ) -> Callable[..., Any]:
-    """`function` compiled for arguments of the given shapes.
+    """Compile `function` for arguments of the given shapes.
 
     Args:
         run_once: Whether compiling costs more than running, so that optimization does not pay.
         run_often: Whether running costs far more than compiling.
-        beside: Compiles it while this thread goes on; the first call waits for that.
+        beside: Executor that compiles while this thread continues; the first call waits for it.
 
     Raises:
-        MemoryShortageError: There is too little memory for it, which the compiler cannot say.
+        MemoryShortageError: There is too little memory; the compiler itself would crash.
     """
     refuse_shortage()
     lowered = jax.jit(function).lower(*shapes)

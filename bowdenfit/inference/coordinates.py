@@ -31,24 +31,25 @@ from bowdenfit.parameters.space import ParameterSpace
 
 NODES = np.linspace(-6.0, 6.0, 241)
 _WIDTH = float(NODES[1] - NODES[0])
-_LEAST_CURVATURE = 1e-6  # relative change of slope below which a value is linear in z, and charting it does nothing
-_SPARE_READINGS = 4  # readings more than coefficients
-# W and z of walkers (rows), and log of the volume in z of a unit of w there: of either of them, of which it is said whether it
-# is z, and of data. NaN where w has no z.
+_LEAST_CURVATURE = 1e-6  # relative change of slope below which a value is linear in z and need not be mapped
+# readings beyond the number of coefficients from which the ridge is no longer needed; see `Conditional.is_narrow`
+_SPARE_READINGS = 4
+# Function of walkers (rows), of whether they are z (otherwise w), and of data, that gives their w and z and the log of the
+# volume in z of a unit of w; NaN where w has no z.
 CoordinateMap = Callable[[Array, Array, Any], tuple[Array, Array, Array]]
 CoordinateMaps = Sequence[tuple[CoordinateMap, float]]  # each with its share of all steps
 
 
 @dataclass(frozen=True)
 class PriorGrid:
-    """A one-to-one map from z to other coordinates: parameter by parameter, linear between nodes and beyond the last.
+    """A one-to-one map from z to parameter values: parameter by parameter, piecewise linear between nodes and beyond the last.
 
-    Any such map leaves the sampler's target what it is, because its slopes are known exactly; this one follows the priors.
+    The map need not be exact, since its slopes are known exactly: the sampled density remains the same.
 
     Args:
         size: Number of parameters.
-        which: Positions of those that are mapped; the others stay as they are.
-        values: Coordinate at `NODES` of each of those, (node, parameter), rising.
+        indices: Positions of the parameters that are mapped; the others stay as they are.
+        values: Parameter value at each of `NODES`, (node, parameter), increasing.
     """
 
     size: int
@@ -57,27 +58,27 @@ class PriorGrid:
 
     @cached_property
     def rises(self) -> np.ndarray:
-        """From one node to the next."""
+        """Increase of the value from one node to the next."""
         return np.diff(self.values, axis=0)
 
     @cached_property
     def log_slopes(self) -> np.ndarray:
-        """Log of the coordinate per z between nodes."""
+        """Log of the slope of the value between nodes."""
         return np.log(self.rises / _WIDTH)
 
     def _look_up(self, node: Array) -> Array:
-        """Coordinate at nodes, its rise to the next, and the log of the slope, of each parameter; one look for all three."""
+        """Return the value at nodes, its rise to the next node, and the log of the slope, of each parameter, by one lookup."""
         table = np.stack([self.values[:-1], self.rises, self.log_slopes], axis=-1).reshape(-1, 3)
         columns = len(self.indices)
         entries = jnp.take(jnp.asarray(table), node * columns + jnp.arange(columns), axis=0, mode="clip")
         return jnp.moveaxis(entries, -1, 0)
 
     def map_points(self, points: Array, is_z: Array) -> tuple[Array, Array, Array]:
-        """Coordinates and z, and log of the volume in z of a unit of the coordinates there, of one of the two.
+        """Return w, z and the log of the volume in z of a unit of w, given either w or z.
 
         Args:
-            given: Z or coordinates, (walker, parameter).
-            is_z: Whether it is z.
+            points: Values of z or of w, (walker, parameter).
+            is_z: Whether the points are z.
         """
         own = points[:, self.indices]
         search = jax.vmap(partial(jnp.searchsorted, side="right", method="scan"), in_axes=1, out_axes=1)
@@ -93,7 +94,7 @@ class PriorGrid:
 
 @lru_cache(maxsize=8)
 def make_prior_grid(space: ParameterSpace) -> PriorGrid:
-    """The chart of the values of free parameters, noise scales and values that are linear in z excepted."""
+    """Return the grid of all free parameters except noise scales and parameters whose values are linear in z."""
     grid = np.repeat(NODES[:, None], space.size, axis=1)
     shape = jax.ShapeDtypeStruct(grid.shape, jnp.float64)
     values = np.asarray(compile_program(jax.vmap(space.vector), shape, run_once=True)(grid))
@@ -106,17 +107,17 @@ def make_prior_grid(space: ParameterSpace) -> PriorGrid:
 
 @dataclass(frozen=True)
 class Conditional:
-    """Friction coefficients of one model given everything else.
+    """Coordinates of the friction coefficients of one model, given all other parameters.
 
     Args:
-        posterior: Its posterior.
+        posterior: The posterior.
     """
 
     posterior: LogDensity
 
     @cached_property
     def indices(self) -> np.ndarray:
-        """Positions of the coefficients."""
+        """Positions of the coefficients in z."""
         return np.flatnonzero([p.role == "friction" for p in self.posterior.model.space.free])
 
     @cached_property
@@ -125,17 +126,17 @@ class Conditional:
 
     @property
     def has_coefficients(self) -> bool:
-        """Whether any coefficient is free."""
+        """Whether any friction coefficient is free."""
         return len(self.indices) > 0
 
     @property
     def is_narrow(self) -> bool:
-        """Whether the ridge may be so narrow somewhere that walkers hardly find there without these coordinates.
+        """Whether the ridge may be so narrow that walkers hardly find into it without these coordinates.
 
-        It may where few readings tell a scatter, and where a coefficient goes with an angle of which only a guess is known. By
-        simulated funnels whose scatter has a known density: with two readings more than coefficients, walkers without these
-        coordinates put 0.5 to 1 of 100 draws below its 1 % quantile; with three 0.85 to 1.1; with four and more 0.9 to 1.1,
-        which is chance. Readings that are alike to the last digit count once: of a scatter that may be none they tell nothing.
+        That is so where few readings determine a scatter, and where an angle is known only by a guess. In simulated funnels
+        whose scatter has a known density, walkers without these coordinates put 0.5 to 1 of 100 draws below its 1 %
+        quantile with two readings more than coefficients, 0.85 to 1.1 with three, and 0.9 to 1.1 with four and more,
+        which is sampling error. Identical readings count once: they carry no information about a scatter.
         """
         model = self.posterior.model
         varying = [varying for term in model.terms for _, varying in term.residual_blocks if varying]
@@ -144,12 +145,12 @@ class Conditional:
         return any(p.role == "angle" for p in model.space.free) or informative < len(self.indices) + _SPARE_READINGS
 
     def map_point(self, point: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
-        """W and z, and log of the volume in z of a unit of w there, of one of the two; NaN where w has no z.
+        """Return w, z and the log of the volume in z of a unit of w, given either w or z; NaN where w has no z.
 
         Args:
-            given: One z or one w.
-            is_z: Whether it is z.
-            data: Of the posterior.
+            point: One z or one w.
+            is_z: Whether the point is a z.
+            data: Data of the posterior.
         """
         ridge, own = self._ridge(point, data), point[self.indices]
         z = jnp.where(is_z, own, self._to_z(own, ridge))
@@ -163,12 +164,12 @@ class Conditional:
         return self._coefficients.z_of(ridge.center + solve_triangular(ridge.root, w, trans="T", lower=True))
 
     def _log_volume(self, z: Array, ridge: "_Ridge") -> Array:
-        """Log of the volume in w of a unit of the coefficients' z."""
+        """Return the log of the volume in w of a unit of the coefficients' z."""
         _, slopes = jax.jvp(self._coefficients.vector, (z,), (jnp.ones_like(z),))
         return jnp.sum(jnp.log(slopes)) + jnp.sum(jnp.log(jnp.diagonal(ridge.root)))
 
     def _ridge(self, z: Array, data: Any) -> "_Ridge":
-        """The ridge where everything but the coefficients says; that of the priors where it cannot be computed."""
+        """Return the ridge at given values of all other parameters; the ridge of the priors where it cannot be computed."""
         own = self._coefficients
         low, middle, high = jax.vmap(own.vector)(jnp.tile(jnp.array([[-1.0], [0.0], [1.0]]), own.size))
         width = 2 / (high - low)
@@ -186,14 +187,14 @@ class Conditional:
 
 
 class _Ridge(NamedTuple):
-    """Middle of the coefficients, and the lower Cholesky factor of their precision."""
+    """Center of the coefficients, and the lower Cholesky factor of their precision."""
 
     center: Array
     root: Array
 
 
 def identity(point: Array, is_z: Array, data: Any) -> tuple[Array, Array, Array]:
-    """Of one point: z itself."""
+    """Identity map of one point: walkers move in z."""
     del is_z, data
     return point, point, jnp.zeros(())
 
@@ -202,22 +203,22 @@ z_map: CoordinateMap = jax.vmap(identity, (0, None, None))
 
 
 def value_map(grid: PriorGrid) -> CoordinateMap:
-    """Values of the parameters, as `PriorGrid` has them."""
+    """Return the map to parameter values of a `PriorGrid`."""
     return lambda points, is_z, _: grid.map_points(points, is_z)
 
 
 def ridge_map(conditional: Conditional) -> CoordinateMap:
-    """Coefficients given everything else, in units of their ridge."""
+    """Return the map to friction coefficients in units of their ridge."""
     return jax.vmap(conditional.map_point, (0, None, None))
 
 
 def coordinate_maps(posterior: LogDensity) -> CoordinateMaps:
-    """In what walkers move, and how often, whatever the posterior is like.
+    """Return the coordinates in which walkers move, and how often each is used.
 
-    By measurement on simulated on-body data, whose scatter between mountings mixes five times as fast for the ridge. Half of
-    all is done in values where there is no friction coefficient that readings tell of. Without z walkers that start far out
-    stay there: with values and the ridge alone three of 24 on-body fits took 6000 to 11,000 steps instead of 600 to 1400.
-    `walker_programs` says where the ridge is not needed.
+    Chosen on simulated on-body data, where the scatter between mountings mixes five times as fast with the ridge. Without
+    friction coefficients half of the steps are made in values. Walkers that start far out stay there unless some steps are made
+    in z: with values and the ridge alone three of 24 on-body fits took 6000 to 11,000 steps instead of 600 to 1400.
+    `compile_walkers` decides where the ridge is not needed.
 
     Args:
         posterior: The posterior.
@@ -229,6 +230,6 @@ def coordinate_maps(posterior: LogDensity) -> CoordinateMaps:
 
 
 def maps_without_ridge(space: ParameterSpace) -> CoordinateMaps:
-    """Z and values alone; also for densities that are no model's."""
+    """Return z and parameter values as coordinates; also for densities that belong to no model."""
     grid = make_prior_grid(space)
     return (z_map, 0.5), (value_map(grid) if len(grid.indices) else z_map, 0.5)

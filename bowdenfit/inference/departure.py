@@ -1,10 +1,12 @@
-"""A way in which readings depart from the model, and when that is worth saying."""
+"""Departures of readings from the model, and when they are large enough to be reported."""
 
 from dataclasses import dataclass, field
 
-FALSE_ALARM = 0.003  # chance that a healthy fit is said not to describe its readings
-NOTICEABLE_SIZE = 0.02  # of what is read, below which a departure is not worth a verdict
-NOTICEABLE_SHIFT = 0.5  # of the way from a coefficient to an end of its 90 % interval, by less than which a drift may move it
+# probability that a fit of a correct model is reported not to describe its readings; `tests/inference/test_lack_of_fit.py`
+FALSE_ALARM = 0.003
+NOTICEABLE_SIZE = 0.02  # relative size of the departure below which it is not reported
+# shift of a coefficient by a drifting zero, over half of its 90 % interval, above which the drift is reported
+NOTICEABLE_SHIFT = 0.5
 
 
 @dataclass(frozen=True)
@@ -13,16 +15,16 @@ class Departure:
 
     Args:
         table: Name of the readings.
-        group: Contact or the like that they belong to; empty where all are of one kind.
-        against: Axis label of what they depend on.
-        inside: Whether readings inside runs do; else whole runs, or single readings.
-        chance: Probability of as much by chance, times the number of departures that were asked about.
-        size: Root mean square of the departure, over that of what is read [1].
-        low, high: Where the lowest third and the highest third of the readings were taken, on average; of a zero that drifts,
-            what it was at the start and at the end of a run, against its middle [N].
-        at_low, at_high: How much more than the model says is read there, over what is read [1].
-        moved: Of a zero that drifts, whose size says little: how far it moves the coefficient of friction that it moves most,
-            over half of its 90 % interval; 0 where chance does as much. None of all others.
+        group: Contact or other group of the readings; empty where there are no groups.
+        against: Axis label of the quantity that they depend on.
+        inside: Whether these are readings inside runs; otherwise whole runs, or single readings.
+        p_value: Bonferroni-adjusted p-value: that of this departure times the number of departures that were tested.
+        size: Root mean square of the departure, relative to that of the readings [1].
+        low, high: Mean position of the lowest third and of the highest third of the readings; for a drifting zero, its value at
+            the start and at the end of a run, relative to its middle [N].
+        at_low, at_high: By how much readings there exceed the model, relative to the readings [1].
+        moved: For a drifting zero, whose size says little: the largest shift of a friction coefficient, over half of its 90 %
+            interval; 0 where the drift is not significant. None for all others.
     """
 
     table: str
@@ -39,20 +41,20 @@ class Departure:
 
     @property
     def is_noticeable(self) -> bool:
-        """Whether chance does not make it, and it matters."""
+        """Whether the departure is significant and large enough to matter."""
         matters = self.size > NOTICEABLE_SIZE if self.moved is None else self.moved > NOTICEABLE_SHIFT
         return self.p_value < FALSE_ALARM and matters
 
 
 @dataclass(frozen=True)
 class FarReading:
-    """A reading that lies farther from the fit than chance puts one of all.
+    """An outlier: a reading farther from the fit than expected of any reading.
 
     Args:
         table: Name of the readings.
-        label: Which one.
-        chance: Probability of one as far out among all readings of a healthy fit.
-        sds: How far, in standard deviations of the others.
+        label: Label of the reading.
+        p_value: Probability that any reading of a correct model lies as far out.
+        sds: Distance from the fit in standard deviations of the other readings.
     """
 
     table: str

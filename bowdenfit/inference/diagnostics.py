@@ -1,4 +1,4 @@
-"""Whether draws can be trusted: R-hat across ensembles, effective sample sizes, and how trajectories went."""
+"""Convergence diagnostics: R-hat across ensembles, effective sample sizes, drift, and trajectories of NUTS."""
 
 import warnings
 from collections.abc import Mapping
@@ -9,23 +9,23 @@ import numpy as np
 from bowdenfit.types import ChainDraws
 from bowdenfit.words import percent
 
-MAXIMUM_DRIFT = 0.08  # a Monte Carlo error of 3 % at 1000 effective draws, two and a half times over
-MOST_FINE_DIVERGED = 0.001  # share of the trajectories of fine steps, without which a corner is out of reach
-MOST_DIVERGED = 0.01  # share of all; those of ordinary steps may fail where the fine ones do not
-LEAST_ENERGY_MIXING = 0.3
+MAXIMUM_DRIFT = 0.08  # 2.5 times the Monte Carlo error of 3 % at 1000 effective draws
+MOST_FINE_DIVERGED = 0.001  # share of the trajectories with fine steps; if more diverge, a narrow region is out of reach
+MOST_DIVERGED = 0.01  # share of all trajectories; those of ordinary steps may diverge where the fine ones do not
+LEAST_ENERGY_MIXING = 0.3  # lower limit of the E-BFMI (Betancourt 2016)
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Of one quantity.
+    """Convergence diagnostics of one quantity.
 
     Args:
         r_hat: Nested R-hat, rank-normalized and split, with the ensembles as superchains.
         ess_bulk: Bulk effective sample size.
         ess_tail: Tail effective sample size (the smaller of the 5 % and 95 % quantiles').
         mcse_mean: Monte Carlo standard error of the mean.
-        drift: How far the draws of the second half lie from those of the first: by their normal scores, the shift of the mean
-            or the change of the standard deviation, whichever is larger; in standard deviations of all draws.
+        drift: How far the draws of the second half lie from those of the first, from their normal scores: the shift of the mean
+            or the change of the standard deviation, whichever is larger, in standard deviations of all draws.
     """
 
     r_hat: float
@@ -36,19 +36,19 @@ class Diagnostics:
 
 
 def diagnose_all(draws: Mapping[str, ChainDraws], n_ensembles: int) -> dict[str, Diagnostics]:
-    """Diagnostics of several quantities by name; see `diagnose`."""
+    """Return diagnostics of several quantities by name; see `diagnose`."""
     return {name: diagnose(values, n_ensembles) for name, values in draws.items()}
 
 
 def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
-    """Diagnostics of one quantity.
+    """Return diagnostics of one quantity.
 
     R-hat compares whole ensembles, because the walkers of one ensemble move by each other's positions and are not independent.
-    Effective sample sizes and the error of the mean are those of `as_chains`, which others read: of walkers that keep twenty
-    draws each, taken for chains, they would come out up to 1.3 times too large.
+    Effective sample sizes and the error of the mean are computed from `as_chains`. Computed with every walker as a chain of
+    twenty draws, they would come out up to 1.3 times too large.
 
     Args:
-        draws: One row a walker, ordered by ensemble.
+        draws: Draws, one row a walker, ordered by ensemble.
         n_ensembles: Number of independent ensembles.
 
     References:
@@ -76,7 +76,7 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
 
 
 def normal_scores(draws: np.ndarray) -> np.ndarray:
-    """Normal quantiles of the ranks of draws, those of equal draws at the middle of theirs.
+    """Return normal quantiles of the ranks of draws; equal draws share their mean rank.
 
     References:
         Vehtari et al. 2021, equation 14, with Blom's offset of 3/8.
@@ -88,24 +88,24 @@ def normal_scores(draws: np.ndarray) -> np.ndarray:
 
 
 def as_chains(draws: np.ndarray, n_ensembles: int) -> np.ndarray:
-    """Draws of walkers as those of one chain an ensemble: the path of one walker after the other.
+    """Return the draws of walkers as one chain an ensemble: the path of one walker after the other.
 
-    So autocorrelations stay those of the paths; a step of all walkers after the other would pass them off as independent, and
-    a chain for each walker is too short for the usual R-hat.
+    This keeps the autocorrelation of the paths. Ordering by steps would treat walkers as independent, and one chain a walker is
+    too short for the usual R-hat.
 
     Args:
-        draws: One row a walker, ordered by ensemble; further axes stay as they are.
+        draws: Draws, one row a walker, ordered by ensemble; further axes stay as they are.
         n_ensembles: Number of independent ensembles.
     """
     return draws.reshape(n_ensembles, -1, *draws.shape[2:])
 
 
 def _measure_drift(scores: np.ndarray) -> float:
-    """Change from the first to the second half of the draws, by their normal scores.
+    """Return the change from the first to the second half of the draws, from their normal scores.
 
-    Many walkers that still creep in from an over-dispersed start agree with each other, so that no comparison between
-    ensembles sees it; this does. Of as many draws, means and standard deviations of scores scatter by chance four fifths and
-    three quarters as much as medians and quantiles, so that a drift of the same size is told from chance sooner.
+    Walkers that are still moving in from an over-dispersed start agree with each other, so comparisons between ensembles do not
+    detect it; drift does. Means and standard deviations of scores have four fifths and three quarters of the Monte Carlo error
+    of medians and quantiles, so that a drift of the same size is detected sooner.
     """
     half = scores.shape[1] // 2
     first, second = scores[:, :half], scores[:, -half:]
@@ -118,7 +118,7 @@ def _measure_drift(scores: np.ndarray) -> float:
 def describe_convergence_shortfalls(
     diagnostics: Mapping[str, Diagnostics], target_r_hat: float, target_ess: int
 ) -> tuple[str, ...]:
-    """What keeps the draws from being trusted, in words; empty if nothing does."""
+    """Describe why the draws have not converged; empty if they have."""
     reasons = []
     for name, d in diagnostics.items():
         if not d.r_hat < target_r_hat:
@@ -134,31 +134,31 @@ def describe_convergence_shortfalls(
 
 
 def describe_low_ess(quantity: str, ess: float, target: int) -> str:
-    """That too few effective draws were made, in words.
+    """Describe a quantity whose effective sample size is too small.
 
     Args:
-        what: Of what.
-        worth: Effective sample size.
-        least: What it should be.
+        quantity: The quantity.
+        ess: Its effective sample size.
+        target: The least effective sample size that is acceptable.
     """
     return f"for {quantity} the samples are worth {ess:.0f} independent ones, and should be worth at least {target}"
 
 
 @dataclass(frozen=True)
 class Trajectories:
-    """How the trajectories of Hamiltonian Monte Carlo went.
+    """Statistics of the trajectories of Hamiltonian Monte Carlo.
 
     Args:
-        warm_up: Steps of each chain that tuned the sampler; they are not among the draws.
-        drawn: Trajectories of all chains after that.
-        diverged: How many of them broke off because their energy was not kept.
-        fine: How many of them took the fine steps that reach where the others break off.
-        fine_diverged: How many of those broke off too.
-        saturated: How many of the others were as long as trajectories may be.
-        energy_mixing: E-BFMI of the chain where it is lowest.
+        warm_up: Warm-up steps of each chain, which tune the sampler and are not among the draws.
+        total: Trajectories of all chains after warm-up.
+        diverged: Number of trajectories that diverged.
+        fine: Number of trajectories with fine steps, which reach regions where the others diverge.
+        fine_diverged: Number of these that diverged.
+        saturated: Number of the other trajectories that reached the maximum tree depth.
+        energy_mixing: Lowest E-BFMI of the chains.
         step_size: Step size after tuning, the same for all chains.
-        gradients: Gradients computed in all, those of tuning included.
-        statistics: Of every kept draw under ArviZ's names, (chain, draw).
+        gradients: Gradients computed in all, warm-up included.
+        statistics: Statistics of every kept draw under ArviZ's names, (chain, draw).
     """
 
     warm_up: int
@@ -174,10 +174,10 @@ class Trajectories:
 
 
 def compute_energy_mixing(energy: np.ndarray) -> float:
-    """E-BFMI of the chain where it is lowest: how far one step may change the energy, against how far it spreads.
+    """Return the lowest E-BFMI of the chains: how far one step may change the energy, relative to its spread.
 
     Args:
-        energy: Of every draw, (chain, draw), none left out.
+        energy: Energy of every draw, (chain, draw), none left out.
 
     References:
         Betancourt 2016, "Diagnosing suboptimal cotangent disintegrations in Hamiltonian Monte Carlo" (arXiv:1604.00695).
@@ -190,7 +190,7 @@ def compute_energy_mixing(energy: np.ndarray) -> float:
 
 
 def describe_trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...]:
-    """What keeps draws of Hamiltonian Monte Carlo from being trusted, in words; empty if nothing does."""
+    """Describe why draws of Hamiltonian Monte Carlo should not be trusted; empty if they can be."""
     reasons = []
     for diverged, total, most, kind in (
         (trajectories.fine_diverged, trajectories.fine, MOST_FINE_DIVERGED, " of fine steps"),

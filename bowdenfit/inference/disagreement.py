@@ -1,15 +1,15 @@
 r"""Do the tables of a cable agree with each other?
 
-For each table: how far it moves the parameters from where all the others put them, against how far it may. If all is right,
-the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the Gauss-Newton
-information of everything and :math:`H_{-t}` that without the table; so :math:`\delta^\top V^+ \delta` is
-chi-squared with as many degrees of freedom as V has directions, or F where few readings tell how much they scatter. A table
-of many readings is weighed by its scatter about the best that it alone allows: the scatter about a fit that it contradicts
-would hide the contradiction. Of few readings that scatter is too uncertain; theirs about the fit of all has to do.
+For each table: how far it moves the parameters from the estimate by all other tables, compared with what is expected. If the
+model is correct, the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the
+Gauss-Newton information of everything and :math:`H_{-t}` that without the table; so :math:`\delta^\top V^+ \delta` is
+chi-squared with as many degrees of freedom as V has directions, or F where few readings tell how much they scatter. A table of
+many readings is weighted by its scatter about the best fit to that table alone: the scatter about a fit that it contradicts
+would hide the contradiction. With few readings that scatter is too uncertain, and the scatter about the common fit is used.
 
-A prior is no measurement, and contradicts nobody here: only directions count in which the other tables say much more than the
-priors, whose information keeps the problem linear where nobody says anything. A parameter far out by its prior is said to be
-so in its own words (`bowdenfit.inference.prior_sensitivity.prior_conflicts`).
+Priors do not count as measurements here: only directions count in which the other tables carry much more information than the
+priors, which merely keep the problem regular. A parameter that conflicts with its prior is reported separately
+(`bowdenfit.inference.prior_sensitivity.find_prior_conflicts`).
 
 References:
     Hausman, Specification tests in econometrics, Econometrica 46 (1978), 1251.
@@ -26,11 +26,11 @@ from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 
-NOTICEABLE_SDS = 3.0  # sds; a table that is right says more than this three times in a thousand fits
-_MANY = 8  # degrees of freedom from which a table's own scatter is known well enough
-_LEAST_SCATTER = 1e-4  # readings that agree better than that, in units of their noise's prior, were not measured
-_LITTLE = 0.1  # share of the priors in what all others say of a direction, up to which it is the tables that say it
-_LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table says nothing of it
+NOTICEABLE_SDS = 3.0  # standard deviations; a table that agrees exceeds this in three of a thousand fits (two-sided normal)
+_MANY = 8  # spare degrees of freedom from which a table's own scatter is known well enough
+_LEAST_SCATTER = 1e-4  # in units of the noise prior; readings that scatter less were not measured
+_LITTLE = 0.1  # most share of the priors in the information of the other tables along a direction that counts
+_LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table carries no information about it
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Disagreement:
     """How well one table agrees with everything else.
 
     Args:
-        table: Name of its readings.
-        sds: How improbable the disagreement is, as so many standard deviations of a normal.
-        conflict: By how much the sum of squares would fall if this table had parameters of its own; what is left then is
-            the conflict among the others, so the table with the largest is the odd one out.
+        table: Name of the table.
+        sds: Improbability of the disagreement, as standard deviations of a normal.
+        conflict: By how much the sum of squares would fall if this table had parameters of its own. The remainder is the
+            conflict among the others, so the table with the largest value is the odd one out.
         parameter: The parameter that it moves farthest, in standard deviations.
-        rest, rest_sd: What everything else says of that parameter, in its shown unit.
-        together: What it is with the table.
+        others, others_sd: Estimate of that parameter by all other tables, in its shown unit, and its standard deviation.
+        together: Estimate with this table.
     """
 
     table: str
@@ -59,7 +59,7 @@ class Disagreement:
 def find_disagreements(
     terms: Sequence[Term], parameters: Sequence[Parameter], solution: Mapping[str, Any]
 ) -> tuple[Disagreement, ...]:
-    """How well each of several tables agrees with the others by what was found near the best fit; empty of one table."""
+    """Return how well each table agrees with the others near the best fit; empty for a single table."""
     residuals, z = [solution["residuals"][term.name] for term in terms], solution["z"]
     if len(terms) < 2 or not all(np.isfinite(part).all() for part in (*residuals, solution["jacobian"])):
         return ()
@@ -81,7 +81,7 @@ def find_disagreements(
 
 @dataclass(frozen=True)
 class _WeighedTable:
-    """Residuals and Jacobian of a table in units of its scatter, and the degrees of freedom that this is known to."""
+    """Residuals and Jacobian of a table in units of its scatter, and the degrees of freedom of that scatter."""
 
     residuals: np.ndarray
     jacobian: np.ndarray
@@ -109,7 +109,7 @@ def _assess_move(
     parameters: Sequence[Parameter],
     best: np.ndarray,
 ) -> Disagreement | None:
-    """What a move says; None where the table says nothing that any other table says something of."""
+    """Return what a move means; None where the table shares no information with any other table."""
     from scipy.special import chdtrc, fdtrc, ndtri
 
     covariance_of_others = np.linalg.inv(information_of_others)

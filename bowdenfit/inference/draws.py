@@ -1,4 +1,4 @@
-"""Everything that each draw of the posterior implies: named values, curves, replicated readings."""
+"""Functions of posterior draws: named values, curves, forces and replicated readings, compiled for many draws at a time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -14,7 +14,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model
 
-BATCH = 1024
+BATCH = 1024  # draws that a compiled program takes at a time
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
 DrawFunction: TypeAlias = Callable[[np.ndarray], Any]
@@ -23,21 +23,21 @@ DrawFunction: TypeAlias = Callable[[np.ndarray], Any]
 def for_each_draw(
     function: Function, size: int, *data: Any, run_once: bool = False, beside: Executor | None = None
 ) -> DrawFunction:
-    """`function` of one z (and of data that are the same for all), compiled to be applied to any number of z (rows)."""
+    """Compile `function` of one z (and of data that are the same for all) to be applied to any number of z (rows)."""
     over_rows, rows = jax.vmap(function, in_axes=(0, *(None for _ in data))), jax.ShapeDtypeStruct((BATCH, size), float)
     program = compile_program(over_rows, rows, *data, run_once=run_once, beside=beside)
     return lambda z: run_in_batches(lambda part: program(part, *data), BATCH, z)
 
 
 def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: Any) -> Any:
-    """`function` of named values (and of data that are the same for all), of many draws.
+    """Apply `function` of named values (and of data that are the same for all) to many draws.
 
-    Compiled without what leads from z to values, which often is most of it.
+    The compiled program does not contain the map from z to values, which often is most of it.
 
     Args:
-        function: Of named values [internal units].
-        values: Of all draws, by name.
-        data: What else it takes.
+        function: Function of named values [internal units].
+        values: Values of all draws, by name.
+        data: Further arguments.
     """
     over_rows = jax.vmap(function, in_axes=(0, *(None for _ in data)))
     rows = {name: jax.ShapeDtypeStruct((BATCH,), float) for name in values}
@@ -46,7 +46,7 @@ def for_each_value(function: Function, values: Mapping[str, np.ndarray], *data: 
 
 
 def run_in_batches(program: Function, batch: int, rows: Any) -> Any:
-    """What a program compiled for so many rows, of one array or of several, gives for any number of them."""
+    """Run a program that is compiled for `batch` rows, of one array or of several, on any number of rows."""
     parts, count = [], len(jax.tree.leaves(rows)[0])
     for start in range(0, count, batch):
         padded = np.minimum(np.arange(start, start + batch), count - 1)
@@ -57,12 +57,12 @@ def run_in_batches(program: Function, batch: int, rows: Any) -> Any:
 
 
 def value_function(model: Model) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
-    """Function of z: free parameters and derived curve coefficients by name, in the units they are shown in."""
+    """Return a function of z that gives free parameters and derived curve coefficients by name, in their shown units."""
     return lambda z: shown_values(model, model.space.constrain(z))
 
 
 def shown_values(model: Model, values: Mapping[str, Array]) -> dict[str, Array]:
-    """Free parameters and derived curve coefficients by name, in the units they are shown in, of values in internal ones."""
+    """Return free parameters and derived curve coefficients by name, in shown units, from values in internal units."""
     shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
     for curve in model.cable.curves.values():
         shown |= curve.derived(values)
@@ -70,15 +70,15 @@ def shown_values(model: Model, values: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def derived_units(model: Model) -> dict[str, tuple[str, str]]:
-    """Unit and symbol of every derived curve coefficient, by name."""
+    """Return unit and symbol of every derived curve coefficient, by name."""
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
 def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> DrawFunction:
-    """Compiled function of draws (rows): what each draw implies for every reading.
+    """Compile the posterior predictive distribution of draws (rows).
 
-    Its answer has, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
-    readings: named values, log likelihood of every reading, expected readings, and readings drawn anew.
+    The function returns, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
+    readings: named values, log likelihood of every reading, expected readings, and replicated readings.
     """
     model = posterior.model
     key = jax.random.key(seed)  # an argument, so that the program is the same for every seed
@@ -101,12 +101,12 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
 
 
 def curve_function(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:
-    """Function of z: wrap angle of every curved contact [deg] and the efficiency [1] at route values."""
+    """Return a function of z that gives wrap angles of curved contacts [deg] and the efficiency [1] at route values."""
     return lambda z: curves_at(model, model.space.constrain(z), route)
 
 
 def curves_at(model: Model, values: Mapping[str, Array], route: np.ndarray) -> dict[str, Array]:
-    """The same of named values of all parameters [internal units]."""
+    """Return wrap angles of curved contacts [deg] and the efficiency [1] at route values, by named values [internal units]."""
     at = jnp.asarray(route, dtype=float)
     angles = {name: jnp.rad2deg(curve.wrap_angle(values, at)) for name, curve in model.cable.curves.items()}
     return angles | {"efficiency": model.cable.efficiency_at(values, at)}
@@ -122,7 +122,7 @@ def output_force_at(
     *,
     inverse: bool = False,
 ) -> list[np.ndarray]:
-    """Output force [N] of every draw (rows) at route values (columns), at the reference speed, in each of some mountings.
+    """Return the output force [N] of draws (rows) at route values (columns), at the reference speed, for some mountings.
 
     Args:
         model: The model.
@@ -131,7 +131,7 @@ def output_force_at(
         force: Force at the motor side [N].
         stroke: +1 pulling, -1 return.
         mountings: Effect of each mounting on the friction exponent of each draw [1].
-        inverse: The input force instead, that gives the force at the load side.
+        inverse: Return the input force instead, given the force at the load side.
     """
     at = jnp.asarray(np.atleast_1d(route), dtype=float)
     function: Function = model.cable.input_force_at if inverse else model.cable.output_force_at
@@ -145,6 +145,6 @@ def output_force_at(
 
 
 def efficiency_at(model: Model, z: np.ndarray, route: np.ndarray) -> np.ndarray:
-    """Efficiency of every draw (rows) at route values (columns); any one number where the cable has no route."""
+    """Return the efficiency of every draw (rows) at route values (columns); any one number where the cable has no route."""
     curves = curve_function(model, np.atleast_1d(np.asarray(route, dtype=float)))
     return for_each_draw(lambda one: curves(one)["efficiency"], model.space.size)(z)

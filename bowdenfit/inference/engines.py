@@ -34,33 +34,33 @@ from bowdenfit.words import listed, shown
 Work = TypeVar("Work")
 Result = TypeVar("Result")
 Outcome: TypeAlias = tuple[Exception | None, Any]
-_PIECES_PER_WORKER = 2  # pieces that a worker is given at once, so that it need not wait for the next
-_PATIENCE = 30.0  # seconds without a piece done, until is looked whether anybody is left
-_MOST_ATTEMPTS = 3  # that a piece is tried when workers die of it
+_PIECES_PER_WORKER = 2  # pieces submitted per worker, so that none waits for its next one
+_PATIENCE = 30.0  # seconds without a finished piece before the engine checks that workers are left
+_MOST_ATTEMPTS = 3  # times that a piece is tried when workers die of it
 ENGINES = "local, dask://HOST:PORT or slurm"
-DATASETS_PER_JOB = 4096  # data sets of a job of Slurm at the most; each job loads and compiles all over again
-JOBS_FOLDER = "jobs"  # folder in which Slurm's jobs write
-_DEFAULT_JOBS = 16  # jobs of Slurm, if nothing else is said
-_CONNECT_SECONDS, _WORKER_SECONDS = 10, 60  # seconds
-_JOB_MINUTES = 240  # of a job of Slurm; SBATCH_TIMELIMIT says otherwise
+DATASETS_PER_JOB = 4096  # most data sets of one Slurm job; each job loads and compiles everything again
+JOBS_FOLDER = "jobs"  # folder in which Slurm jobs write
+_DEFAULT_JOBS = 16  # Slurm jobs at a time, by default
+_CONNECT_SECONDS, _WORKER_SECONDS = 10, 60  # seconds to wait for a Dask scheduler, and for its first worker
+_JOB_MINUTES = 240  # time limit of a Slurm job; SBATCH_TIMELIMIT overrides it
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 
 class EngineError(BowdenfitError):
-    """Workers died, or a cluster cannot be reached, though the request was good."""
+    """Workers died, or a cluster cannot be reached; the request itself was valid."""
 
 
 @dataclass
 class Engine(Generic[Work, Result]):
-    """An executor, and how it is used.
+    """Runs independent pieces of work by an executor.
 
     Args:
         executor: Makes the executor; called again when it is broken.
-        workers: How many pieces are done at a time.
-        name: In words.
-        most: Data sets of a piece; few, so that little is lost when it is interrupted, or many where starting costs much.
-        check: Called where nothing was done for a while; raises if nothing can be.
-        begun: The executor in use.
+        workers: Pieces done at a time.
+        name: Name for messages.
+        max_datasets: Most data sets of a piece: few, so that little is lost by an interrupt, or many where starting costs much.
+        check: Called when nothing was finished for a while; raises if nothing can be.
+        running: The executor in use.
     """
 
     executor: Callable[[], Executor]
@@ -71,14 +71,14 @@ class Engine(Generic[Work, Result]):
     running: Executor | None = field(default=None, init=False)
 
     def results(self, function: Callable[[Work], Result], pieces: Sequence[Work]) -> Iterator[Result]:
-        """What a function gives of every piece, in the order in which they are done.
+        """Yield the result of every piece, in the order in which they are finished.
 
         Args:
-            function: Of one piece; known to workers by its name.
+            function: Function of one piece; workers find it by its name.
             pieces: The work.
 
         Raises:
-            BowdenfitError: What the function refuses.
+            BowdenfitError: The function refuses a piece.
             EngineError: Workers die of the same piece again and again, or are lost.
         """
         left = [(piece, 1) for piece in reversed(pieces)]
@@ -129,7 +129,7 @@ class Engine(Generic[Work, Result]):
             ) from None
 
     def _count_attempt(self, attempts: int, error: Exception) -> int:
-        """How often a piece will have been tried, if it may be tried again."""
+        """Return the number of attempts at a piece including the next; raise if it must not be tried again."""
         why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         if isinstance(error, ImportError | AttributeError):
             raise EngineError(
@@ -143,17 +143,17 @@ class Engine(Generic[Work, Result]):
         return attempts + 1
 
     def close(self) -> None:
-        """End what was begun."""
+        """Shut the executor down."""
         if self.running is not None:
             self.running.shutdown(wait=False, cancel_futures=True)
             self.running = None
 
 
 def run_piece(function: Callable[[Any], Any], piece: Any) -> Outcome:
-    """What a function gives, or what it raises, so that no engine can take it for a fault of its own.
+    """Return what a function gives or raises, so that an engine cannot mistake its error for one of its own.
 
     Args:
-        function: Of one piece.
+        function: Function of one piece.
         piece: The work.
     """
     try:
@@ -164,7 +164,7 @@ def run_piece(function: Callable[[Any], Any], piece: Any) -> Outcome:
 
 
 class InThisProcess(Engine[Work, Result]):
-    """One piece after the other, here."""
+    """An engine that runs pieces one after the other in this process."""
 
     def __init__(self) -> None:
         super().__init__(lambda: ThreadPoolExecutor(1), 1, "this process")
@@ -175,10 +175,10 @@ class InThisProcess(Engine[Work, Result]):
 
 
 def make_waiting_executor(submit: Callable[..., Any], most: int) -> Executor:
-    """An executor of something that waits for its own answer.
+    """Return an executor whose threads wait for work that is done elsewhere.
 
     Args:
-        submit: Does a piece somewhere else, and waits.
+        submit: Runs a piece elsewhere, and waits for it.
         most: Pieces at once.
     """
 
@@ -196,12 +196,12 @@ def open_engine(
     folder: Path | None = None,
     processes: int = 1,
 ) -> Iterator[Engine[Any, Any]]:
-    """An engine, which ends with what is done inside.
+    """Open an engine that is closed at the end of the `with` block.
 
     Args:
-        engine: Its name, or an executor of one's own, which is left open.
+        engine: Its name, or an executor of the caller, which is left open.
         workers: Processes here, or jobs at a time.
-        folder: Where Slurm's jobs write; asked for by that alone.
+        folder: Where Slurm jobs write; needed for Slurm only.
         processes: Processes of this machine that "local" uses; with more than one, programs begin with
             `if __name__ == "__main__"`, as with everything that starts processes.
 
@@ -250,7 +250,7 @@ def _make_process_pool(count: int) -> Executor:
 
 @contextmanager
 def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
-    """A client of a Dask cluster that answers, and how many pieces its workers do at once."""
+    """Connect to a Dask cluster; yield its client and how many pieces its workers do at a time."""
     try:
         from distributed import Client
     except ImportError:
@@ -270,10 +270,10 @@ def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
 
 
 def _refuse_no_workers(client: Any, address: str) -> None:
-    """Wait for a worker, but not for ever.
+    """Wait for a worker for a limited time.
 
     Raises:
-        EngineError: There is none, or the scheduler is gone.
+        EngineError: There is no worker, or the scheduler is gone.
     """
     try:
         client.wait_for_workers(1, timeout=_WORKER_SECONDS)
@@ -290,11 +290,11 @@ def _refuse_no_workers(client: Any, address: str) -> None:
 
 
 def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
-    """An executor of Slurm's jobs, or of processes here that stand for them.
+    """Return an executor of Slurm jobs, or of local processes in their place.
 
     Args:
-        folder: Where they write; all nodes must see it.
-        jobs: At a time.
+        folder: Where jobs write; all nodes must see it.
+        jobs: Jobs at a time.
         cluster: "slurm", or "local" for processes here.
 
     Raises:
@@ -329,7 +329,7 @@ def _library_missing_error(library: str) -> UsageError:
 
 @cache
 def versions() -> dict[str, str]:
-    """Of bowdenfit, Python and the libraries that computed."""
+    """Return versions of bowdenfit, Python and the libraries that compute."""
     from importlib.metadata import PackageNotFoundError, distribution
 
     def version_of(package: str) -> str:
@@ -346,7 +346,7 @@ def versions() -> dict[str, str]:
 
 
 def refuse_other_versions(of_client: dict[str, str]) -> None:
-    """Refuse work of a program that is not the same as here, whose draws could be others.
+    """Refuse work that comes from other versions, whose draws could differ.
 
     Args:
         of_client: Versions where the work comes from.

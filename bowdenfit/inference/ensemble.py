@@ -1,13 +1,13 @@
 """Sampling with emcee: several independent ensembles of walkers, started apart, run until they agree.
 
-Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers; a quarter of them
-in z, a quarter in the values of the parameters, half where friction coefficients follow everything else, which are left out
-where they hardly help. Not `DESnookerMove`: the one in emcee 3.1.6 does not sample the density it is given, and every ensemble
-agrees on the wrong answer.
+Moves: emcee's stretch and differential evolution, and draws from a distribution fitted to the other walkers. A quarter of the
+moves is made in z, a quarter in parameter values, and half in coordinates of the conditional posterior of friction
+coefficients, unless these hardly help (`bowdenfit.inference.coordinates`). `DESnookerMove` is not used: in emcee 3.1.6 it does
+not sample the given density, and all ensembles agree on the wrong answer.
 
-emcee keeps the states and the random numbers; from one state to the next it makes one move, which is `THIN` steps of every
-ensemble in one compiled program. Step by step more than half of the time was Python's. Each core moves ensembles of its own,
-because one program for all of them used two cores in turns rather than at once.
+emcee keeps the states and the random numbers. From one state to the next it makes one move, which is `THIN` steps of every
+ensemble in one compiled program; with one call a step, more than half of the time was spent in Python. Each core moves
+ensembles of its own, because one program for all of them used two cores in turns rather than at once.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -27,22 +27,24 @@ from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.resources import ENSEMBLES_AT_ONCE, available_cores, linear_algebra_in_one_thread
 from bowdenfit.inference.walkers import SweepChoices, WalkerPrograms
 
-_BLOCK = 10  # stored states between two reports
-_FIRST_CHECK = 60  # stored states before the first look; of five data sets the slowest is there after half of that
-_PATIENCE = 2 * _FIRST_CHECK  # stored states after which walkers that have not settled run `WalkerPrograms.later`
-_GENERATOR_SHAPES = {"random_key": (624,), "random_place": (2,), "random_normal": ()}  # shapes of what makes random numbers
-_KEPT_PER_WALKER = 20  # draws at least that are kept of each walker, spread over the second half of its path
+_BLOCK = 10  # stored states between two progress reports
+# stored states before convergence is first checked; the slowest of five data sets has converged after half of that
+_FIRST_CHECK = 60
+_PATIENCE = 2 * _FIRST_CHECK  # stored states after which walkers that have not converged run `WalkerPrograms.later`
+# shapes of the state of the random generator
+_GENERATOR_SHAPES = {"random_key": (624,), "random_place": (2,), "random_normal": ()}
+_KEPT_PER_WALKER = 20  # least number of draws kept of each walker, spread over the second half of its path
 
 
 class EnsembleMove(emcee.moves.Move):
-    """Some steps of independent ensembles side by side: proposals stay within an ensemble.
+    """An emcee move: `THIN` steps of independent ensembles side by side; proposals stay within an ensemble.
 
-    Each ensemble is split in two at random. At each step one of the moves is made: the walkers of one half are proposed places
-    by those of the other half of their ensemble, and then the other way round.
+    Each ensemble is split in two at random. In each step the positions of one half serve to propose positions for the other
+    half, and then the other way round.
 
     Args:
-        programs: What is compiled.
-        data: Of the density.
+        programs: Compiled programs of the walkers.
+        data: Data of the density.
         n_ensembles: Number of ensembles; walkers are ordered by ensemble.
         stored: States stored so far.
     """
@@ -53,7 +55,7 @@ class EnsembleMove(emcee.moves.Move):
         self.threads = ThreadPoolExecutor(min(available_cores(), n_ensembles, ENSEMBLES_AT_ONCE))
 
     def propose(self, model: Any, state: emcee.State) -> tuple[emcee.State, np.ndarray]:
-        """`THIN` steps of every walker, and the share that was accepted."""
+        """Move every walker by `THIN` steps; return the state and the share of accepted proposals."""
         walkers, accepted = np.arange(len(state.coords)).reshape(self.n_ensembles, -1), np.zeros(len(state.coords))
         if self.programs.later is not None and self.stored >= _PATIENCE:
             self.programs = self.programs.later()
@@ -72,11 +74,11 @@ class EnsembleMove(emcee.moves.Move):
 
 
 def draw_starting_points(start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator) -> np.ndarray:
-    """Over-dispersed starts, (ensemble, walker, parameter).
+    """Draw over-dispersed starts, (ensemble, walker, parameter).
 
-    Each ensemble is drawn from the Gauss-Newton covariance about a center of its own, which is drawn from the same: twice the
-    covariance in all, and far more of a noise scale, whose start is its prior. Importance-resampled draws would begin nearer,
-    but with Pareto k at 0.5 they lack the far ends of bent ridges, and walkers spread into those no sooner than from here.
+    Each ensemble is drawn from the Gauss-Newton covariance about a center of its own, which is drawn from the same covariance:
+    twice the covariance in all, and far more for a noise scale, whose start is its prior. Importance-resampled draws would
+    start nearer, but with a Pareto k of 0.5 they lack the far ends of bent ridges, and walkers do not reach those any sooner.
     """
     root = np.linalg.cholesky(start.covariance)
     centers = generator.standard_normal((settings.n_ensembles, 1, len(start.z)))
@@ -85,18 +87,18 @@ def draw_starting_points(start: MaximumPosterior, settings: SamplerSettings, gen
 
 
 def make_initial_state(points: np.ndarray, generator: np.random.RandomState) -> emcee.State:
-    """A state of emcee that walkers begin with; a sweep finds the log densities itself."""
+    """Return the first state of emcee; a sweep computes the log densities itself."""
     return emcee.State(points, log_prob=np.zeros(len(points)), random_state=generator.get_state())
 
 
 @linear_algebra_in_one_thread()
 def sample(request: SamplingRequest, programs: WalkerPrograms, data: Any = None) -> Chain:
-    """Sample by ensembles of walkers.
+    """Sample with ensembles of walkers.
 
     Args:
-        asked: What of, how long, and so on.
-        programs: What is compiled for it.
-        data: Of the density; those of the posterior if omitted.
+        request: What to sample, and for how long.
+        programs: Compiled programs of the walkers.
+        data: Data of the density; those of the posterior if omitted.
     """
     settings, start, seed = request.settings, request.start, request.seed
     data = request.posterior.data if data is None else data
@@ -127,17 +129,17 @@ def sample(request: SamplingRequest, programs: WalkerPrograms, data: Any = None)
 
 
 def _next_check(stored: int) -> int:
-    """Stored states at the look after one at so many."""
+    """Return the number of stored states at the convergence check after one at `stored`."""
     return stored + stored // 3
 
 
 class CheckpointedBackend(emcee.backends.Backend):
-    """States in memory, and one after the other in a checkpoint.
+    """emcee's backend: states in memory, and in a checkpoint file.
 
     Args:
-        shape: Walkers and parameters.
-        checkpoint: Where; nowhere if None.
-        resume: Go on from the states there.
+        shape: Numbers of walkers and parameters.
+        checkpoint: The file; None for none.
+        resume: Whether to continue from the states in the file.
     """
 
     def __init__(self, shape: tuple[int, ...], checkpoint: Path | None, resume: bool) -> None:
@@ -157,12 +159,12 @@ class CheckpointedBackend(emcee.backends.Backend):
         self.checkpoint = checkpoint
 
     def grow(self, ngrow: int, blobs: None) -> None:
-        """Make room for more states, twice as much each time, since all that are there must move."""
+        """Make room for more states, doubling each time because all states must be copied."""
         if ngrow > len(self.chain) - self.iteration:
             super().grow(max(ngrow, self.iteration), blobs)
 
     def save_step(self, state: emcee.State, accepted: np.ndarray) -> None:
-        """Keep a state; how many proposals were accepted since the last is added up."""
+        """Store a state, and the number of proposals accepted since the last one."""
         super().save_step(state, accepted)
         if self.checkpoint is not None:
             _, key, place, has_normal, normal = state.random_state
@@ -174,7 +176,7 @@ class CheckpointedBackend(emcee.backends.Backend):
 
 
 def _summarize(request: SamplingRequest, backend: emcee.backends.Backend) -> Chain:
-    """Draws from the second half of every walker's path, with their diagnostics."""
+    """Return draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     n_kept = max(_KEPT_PER_WALKER, 2 * request.settings.target_ess // backend.shape[0])
     kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, n_kept)).round().astype(int))

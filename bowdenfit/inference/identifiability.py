@@ -1,6 +1,6 @@
-r"""Which combinations of parameters the measurements determine, and which rest on their priors.
+r"""Identifiability: which combinations of parameters the measurements determine, and which are left to their priors.
 
-In units of the prior's standard deviations the covariance S that the measurements leave has eigenvalues between 0 and 1:
+In units of the prior's standard deviations the posterior covariance S has eigenvalues between 0 and 1:
 the share of the prior variance that is left along each eigenvector. With the prior's unit information,
 :math:`S = (J^\top J + I)^{-1}`, so an eigenvalue s belongs to Fisher information 1/s - 1 in units of the prior's. An
 eigenvector v is a combination of the parameters with the weights v / (standard deviation of the prior).
@@ -18,28 +18,30 @@ import numpy as np
 
 from bowdenfit.words import significant
 
-IDENTIFIABLE = 0.25  # share of the prior variance below which a parameter may be known by itself: half the prior's sd
-PRIOR_DOMINATED = 0.8  # share above which the prior alone speaks
-UNINFORMED = 0.9  # share above which the measurements say nothing of a combination
-_DETERMINED = 0.25  # share below which a combination counts as determined
-_LEAST_WEIGHT = 0.3  # weight in a combination that rests on the prior, beyond which a parameter is not known by itself
-_INFLATED, _BOUNDED = 100.0, 0.1  # variance inflation and share beyond which a parameter is only bounded by a sum
-_PART = 0.1  # weight, in units of the prior's sd, below which a parameter does not belong to a combination
-_SHARPER = 0.5  # a combination is worth naming if it is known to less than this share of its best single parameter
+# share of the prior variance below which a parameter may be identified by itself: half the prior's standard deviation
+IDENTIFIABLE = 0.25
+PRIOR_DOMINATED = 0.8  # share of the prior variance above which the estimate is the prior's
+UNINFORMED = 0.9  # share of the prior variance above which the measurements carry no information about a combination
+_DETERMINED = 0.25  # share of the prior variance below which a combination counts as determined
+_LEAST_WEIGHT = 0.3  # weight in a combination left to the prior, beyond which a parameter is not identified by itself
+# variance inflation and share of the prior variance beyond which a parameter is only bounded by a sum
+_INFLATED, _BOUNDED = 100.0, 0.1
+_PART = 0.1  # weight, in units of the prior's standard deviation, below which a parameter is left out of a combination
+_SHARPER = 0.5  # a combination is named if its relative error is below this share of the best single parameter's
 
 
 @dataclass(frozen=True)
 class ParameterContraction:
-    """What is known of one parameter, in its shown unit.
+    """How much the measurements narrow the prior of one parameter, in its shown unit.
 
     Args:
         name: Its name.
         value: Estimate.
-        sd: Standard deviation that the measurements and the prior leave.
+        sd: Posterior standard deviation.
         prior_sd: Standard deviation of the prior, at the estimate.
-        most_alike: The parameter that it is most correlated with; empty of one alone.
-        correlation: With that.
-        inflation: How much larger its variance is than if all others were known (variance inflation factor).
+        most_correlated: The parameter that it is most correlated with; empty if there is only one.
+        correlation: Correlation with that parameter.
+        inflation: Variance inflation factor: its variance over that with all other parameters known.
     """
 
     name: str
@@ -54,12 +56,12 @@ class ParameterContraction:
 
     @property
     def share(self) -> float:
-        """Share of the prior variance that is left; 0 where the measurements decide, 1 where the prior does."""
+        """Share of the prior variance that is left: 0 where the measurements decide, 1 where the prior does."""
         return (self.sd / self.prior_sd) ** 2
 
     @property
     def contraction(self) -> float:
-        """1 less the share that is left."""
+        """Posterior contraction: 1 minus the share of the prior variance that is left."""
         return 1 - self.share
 
 
@@ -68,7 +70,7 @@ class Combination:
     """A weighted sum of parameters, in shown units.
 
     Args:
-        weights: By name, the leading one 1; two digits.
+        weights: Weights by name, rounded to two digits; the leading one is 1.
         value: Estimate.
         sd: Standard deviation.
         share: Share of the prior variance left along the direction.
@@ -88,7 +90,7 @@ class Combination:
 
     @property
     def words(self) -> str:
-        """Such as "mu2 + 0.8 mu1"."""
+        """The combination in words, such as "mu2 + 0.8 mu1"."""
         lead, *others = self.weights
         factors = {name: "" if abs(w) == 1 else f"{significant(abs(w), 2)} " for name, w in self.weights.items()}
         return " ".join([lead, *(f"{'-' if self.weights[n] < 0 else '+'} {factors[n]}{n}" for n in others)])
@@ -96,16 +98,16 @@ class Combination:
 
 @dataclass(frozen=True)
 class CovarianceAnalysis:
-    """What is known of several parameters together.
+    """What the posterior covariance says of several parameters together.
 
     Args:
-        parameters: One by one.
-        tangled: Names of those that are not known by themselves.
+        parameters: Contraction of each parameter.
+        unidentified: Names of parameters that are not identified by themselves.
         directions: All independent combinations, the best determined first.
-        determined: Combinations of parameters not known by themselves that are determined all the same.
+        determined: Combinations of parameters not identified by themselves that are determined all the same.
         sharpest: The best determined combination, where it is known much better than any single parameter.
-        collinearity: Condition number of the Fisher information of the parameters, scaled to unit diagonal: 1 where they
-            are told apart, beyond 1000 where they are not.
+        collinearity: Condition number of the Fisher information of the parameters, scaled to unit diagonal: 1 where they are
+            orthogonal, beyond 1000 where they cannot be distinguished.
     """
 
     parameters: tuple[ParameterContraction, ...]
@@ -125,22 +127,22 @@ class CovarianceAnalysis:
 
     @property
     def identified(self) -> tuple[ParameterContraction, ...]:
-        """Parameters that are known each by itself."""
+        """Parameters that are identified by themselves."""
         return tuple(p for p in self.parameters if p.name not in self.unidentified)
 
     @property
     def on_prior(self) -> tuple[ParameterContraction, ...]:
-        """Parameters that rest on their priors and belong to no combination that is determined."""
+        """Parameters left to their priors that belong to no determined combination."""
         return tuple(p for p in self._unexplained if p.share > PRIOR_DOMINATED)
 
     @property
     def sums(self) -> list[str]:
-        """Combinations that are determined, in words."""
+        """Determined combinations, in words."""
         return [combination.words for combination in self.determined]
 
     @property
     def resting(self) -> list[str]:
-        """Names of the parameters that rest on their priors."""
+        """Names of the parameters that are left to their priors."""
         return [p.name for p in self.on_prior]
 
     @property
@@ -150,13 +152,13 @@ class CovarianceAnalysis:
 
     @property
     def _unexplained(self) -> tuple[ParameterContraction, ...]:
-        """Parameters known neither by themselves nor in a combination."""
+        """Parameters identified neither by themselves nor in a combination."""
         combined = {name for combination in self.determined for name in combination.weights}
         return tuple(p for p in self.parameters if p.name in self.unidentified and p.name not in combined)
 
     @property
     def undetermined(self) -> Combination | None:
-        """The least known combination, where the measurements say nothing of it; else None."""
+        """The least determined combination, where the measurements carry no information about it; otherwise None."""
         worst = max(self.directions, key=lambda d: d.share, default=None)
         return worst if worst is not None and worst.share > UNINFORMED else None
 
@@ -164,11 +166,11 @@ class CovarianceAnalysis:
 def analyze_covariance(
     names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
 ) -> CovarianceAnalysis:
-    """What the covariance that measurements leave says of parameters, by their estimates and independent priors."""
+    """Analyze which parameters and combinations a posterior covariance determines, given estimates and independent priors."""
     scaled = covariance / np.outer(prior_sd, prior_sd)
 
     def combinations(which: np.ndarray) -> Iterator[Combination]:
-        """Independent combinations of some of the parameters, the best determined first."""
+        """Yield independent combinations of some parameters, the best determined first."""
         if len(which):
             shares, vectors = np.linalg.eigh(scaled[np.ix_(which, which)])
             for share, vector in zip(shares, vectors.T, strict=True):
@@ -190,9 +192,9 @@ def analyze_covariance(
 
 
 def _find_unidentified(scaled: np.ndarray) -> np.ndarray:
-    """Which parameters are not known by themselves: little, or as part of a sum that is known far better than its parts.
+    """Find parameters that are not identified by themselves: weakly, or only as part of a much better known sum.
 
-    The larger part of a sum is bounded by the sum, since the others cannot be negative; that does not make it known.
+    The larger part of a sum is bounded by the sum, since the other parts cannot be negative; that does not identify it.
     """
     shares, vectors = np.linalg.eigh(scaled)
     share, inflation = np.diag(scaled), np.diag(scaled) * np.diag(np.linalg.inv(scaled))
@@ -202,7 +204,7 @@ def _find_unidentified(scaled: np.ndarray) -> np.ndarray:
 
 
 def _round_weights(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of an eigenvector's parameters, small parts dropped, of two digits; and which were kept, the largest first."""
+    """Return an eigenvector's weights, small ones dropped, rounded to two digits; and the parameters kept, largest first."""
     lead = int(np.argmax(np.abs(vector)))
     weights = (vector / prior_sd) / (vector[lead] / prior_sd[lead])
     kept = np.array(sorted(np.flatnonzero(np.abs(vector) >= _PART), key=lambda i: -abs(vector[i])), dtype=int)
@@ -212,7 +214,7 @@ def _round_weights(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray
 
 
 def _find_sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: np.ndarray) -> Combination | None:
-    """The best determined combination, if it is of several parameters and known much better than each."""
+    """Return the best determined combination, if it has several parameters and is known much better than each."""
     best = directions[0] if directions else None
     if best is None or len(best.weights) < 2 or best.value <= 0:
         return None
@@ -223,6 +225,7 @@ def _find_sharpest(directions: Sequence[Combination], value: np.ndarray, covaria
 def _contract_parameters(
     names: Sequence[str], value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
 ) -> tuple[ParameterContraction, ...]:
+    """Return the contraction of each parameter."""
     sd, contractions = np.sqrt(np.diag(covariance)), []
     for i, name in enumerate(names):
         correlation = covariance[i] / np.maximum(sd[i] * sd, 1e-300)
@@ -239,7 +242,7 @@ def _contract_parameters(
 
 
 def _collinearity(scaled: np.ndarray) -> float:
-    """Condition number of the information of the measurements, each parameter scaled to 1; infinite if one has none."""
+    """Return the condition number of the information of the measurements, scaled to unit diagonal; infinite if one has none."""
     information = np.linalg.inv(scaled) - np.eye(len(scaled))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     if not len(size) or np.any(size <= 1e-6):

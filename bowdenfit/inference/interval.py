@@ -1,4 +1,4 @@
-"""A quantity with its uncertainty, as plain data."""
+"""`Interval`: a quantity with its uncertainty, as plain data."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ import numpy as np
 from bowdenfit.display import Display, Rows
 from bowdenfit.words import decimals
 
-NORMAL_90 = 1.645  # standard deviations of a normal distribution to either end of a 90 % interval
+NORMAL_90 = 1.645  # standard deviations of a normal distribution from the middle to either end of its 90 % interval
 
 
 @dataclass(frozen=True, repr=False)
 class Interval(Display):
-    """A quantity with its uncertainty: moments and the 5 % and 95 % quantiles of its draws."""
+    """A quantity with its uncertainty: moments, and the 5 %, 50 % and 95 % quantiles of its draws."""
 
     mean: float
     sd: float
@@ -22,13 +22,13 @@ class Interval(Display):
 
     @classmethod
     def of(cls, draws: np.ndarray) -> "Interval":
-        """Of draws of any shape."""
+        """Summarize draws of any shape."""
         q05, median, q95 = (float(q) for q in np.quantile(draws, (0.05, 0.5, 0.95)))
         return cls(float(np.mean(draws)), float(np.std(draws)), median, q05, q95)
 
     @property
     def digits(self) -> int:
-        """Decimals to which it is said."""
+        """Decimals to which it is printed."""
         return decimals(self.q95 - self.q05, self.median)
 
     def __str__(self) -> str:
@@ -39,5 +39,5 @@ class Interval(Display):
         return [vars(self)], {}
 
     def times(self, factor: float) -> "Interval":
-        """In a unit that makes it larger by a factor."""
+        """Return the interval multiplied by a factor, as in another unit."""
         return Interval(*(factor * value for value in vars(self).values()))

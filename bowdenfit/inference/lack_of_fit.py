@@ -1,11 +1,11 @@
-r"""Do residuals depend on where the readings were taken? Then the model does not describe them.
+r"""Lack of fit: do residuals depend on where the readings were taken? Then the model does not describe them.
 
-For each way in which a table could depart from the model (with the load, the stroke, the speed, the order, the place) the
-columns of that departure, less what the parameters can follow, are fitted to the residuals of least squares. Without a
-departure the sum of squares that they take off, over what is left, is F distributed. Where readings are many the same is
-asked with a covariance that does not trust the weights, and the weaker of the two answers counts. A zero that drifts while a
-recording is made, as s t / F_out, is small beside the loss and moves coefficients all the same, or hardly: it counts by how
-far a fit without it lies from the fit.
+For each way in which a table could depart from the model (with the load, the stroke, the speed, the order, the position) the
+columns of that departure, minus what the parameters can follow, are fitted to the residuals of least squares. Without a
+departure the sum of squares that they explain, over the remaining one, is F distributed. With many readings the test is
+repeated with a heteroskedasticity-consistent covariance, and the larger of the two p-values counts. A zero that drifts during a
+recording, as s t / F_out, is small beside the loss and may still move coefficients: it is judged by how far a refit without it
+moves them.
 
 References:
     Draper and Smith, Applied Regression Analysis, 3rd ed., Wiley 1998, chapters 2 and 6: lack of fit, extra sums of squares.
@@ -27,25 +27,25 @@ from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model
 
-_FRICTION = ("friction", "friction_model")
-_MANY = 30  # readings from which their own scatter weighs them
-_MOST_LEVELS = 24  # loads that are each asked about
-_CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials by which curves, and other readings, may depart
-_LEAST_FREEDOM = 2.0
-_LEAST_OUTLIER_FREEDOM = 5.0  # degrees of freedom from which one reading can be told from the scatter of the others
-_PLAUSIBLE_SCATTER = (1e-3, 1e3)  # scatter in units of what a prior expects
-_FOLLOWED = 1e-3  # share of a column that is left where the parameters can follow it
+_FRICTION = ("friction", "friction_model")  # roles of the parameters that a drifting zero could move
+_MANY = 30  # readings from which the heteroskedasticity-consistent test is used too
+_MOST_LEVELS = 24  # loads up to which each has a column of its own
+_CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials tested for curves, and for other readings
+_LEAST_FREEDOM = 2.0  # degrees of freedom below which nothing is tested
+_LEAST_OUTLIER_FREEDOM = 5.0  # degrees of freedom from which one reading can be distinguished from the scatter of the others
+_PLAUSIBLE_SCATTER = (1e-3, 1e3)  # limits of the scatter, relative to what its prior expects
+_FOLLOWED = 1e-3  # share of a column that must be left after the parameters have followed it
 
 
 def find_departures(
     basin: Basin, scale: np.ndarray, reach: Mapping[str, float]
 ) -> tuple[tuple[Departure, ...], tuple[FarReading, ...]]:
-    """Every departure that was asked about, the least likely by chance first; and single readings that are far out.
+    """Test every departure; return them by p-value, smallest first, and single readings that are outliers.
 
     Args:
         basin: The minimum of least squares.
-        scale: Scatter of every standardized residual about it.
-        reach: Half of the 90 % interval of each parameter that is identified, in its shown unit.
+        scale: Scatter of every standardized residual about the minimum.
+        reach: Half of the 90 % interval of each identified parameter, in its shown unit.
     """
     model = basin.problem.posterior.model
     system = group_residuals(model, _reweigh_by_scatter(basin, model, scale))
@@ -60,7 +60,7 @@ def find_departures(
 
 
 def _assess_drift(basin: Basin, reach: Mapping[str, float], system: ResidualGroups, departure: Departure) -> Departure:
-    """By how much a zero drifts, and how much that moves the coefficients: by a fit with the drift taken off the readings."""
+    """Estimate a drifting zero, and how far it moves coefficients, by a refit with the drift subtracted from the readings."""
     readings = next(r for r in system.readings if r.table == departure.table and r.inside)
     x, whole = readings.at[ZERO], np.zeros(len(system.residuals))
     whole[readings.rows] = x / (readings.unit * readings.scatter)
@@ -82,7 +82,7 @@ def _assess_drift(basin: Basin, reach: Mapping[str, float], system: ResidualGrou
 
 
 def _subtract_drift(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[str, Any]:
-    """Data of runs of which something is taken off each log ratio inside them."""
+    """Return data of runs with a correction subtracted from each log ratio inside them."""
     cell, weight = term.inside.cell, term.inside.weight
     n = len(data["mean"])
     mean = np.bincount(cell, weight * more, n) / np.maximum(np.bincount(cell, weight, n), 1e-300)
@@ -90,9 +90,9 @@ def _subtract_drift(term: Any, data: dict[str, Any], more: np.ndarray) -> dict[s
 
 
 def _find_far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
-    """By externally studentized residuals, which a reading itself does not enlarge (Draper and Smith, chapter 8).
+    """Find outliers by externally studentized residuals (Draper and Smith, chapter 8).
 
-    Not of readings inside runs, whose noise may well grow with the load.
+    Readings inside runs are left out, because their noise may grow with the load.
     """
     from scipy.special import stdtr
 
@@ -110,9 +110,9 @@ def _find_far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
 
 
 def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Solution:
-    """The minimum where each table counts by the scatter that it was found to have, not by what its prior expects.
+    """Solve again with each table weighted by the scatter that was found, not by the scatter that its prior expects.
 
-    A table that scatters far less than expected is else pulled off its own best by the others, and seems not to fit.
+    Otherwise a table that scatters far less than expected is pulled off its own best fit by the others, and seems not to fit.
     """
     problem, solution, index = basin.problem, basin.solution, model.space.index
     pin, start = np.where(problem.noise, 0.0, solution["z"]), 0
@@ -130,7 +130,7 @@ def _reweigh_by_scatter(basin: Basin, model: Model, scale: np.ndarray) -> Soluti
 
 
 def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterator[Departure]:
-    """Of the readings of one table."""
+    """Yield the tested departures of one table."""
     for group in dict.fromkeys(readings.group):
         selected = readings.used & (np.array(readings.group) == group)
         for against, x in readings.at.items():
@@ -151,7 +151,7 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
 
 
 def _departure_columns(against: str, x: np.ndarray, selected: np.ndarray, of_curve: bool) -> Iterator[np.ndarray]:
-    """Columns of the ways in which readings could depend on where they were taken, (reading, column)."""
+    """Yield columns for the ways in which readings could depend on where they were taken, (reading, column)."""
     if against == LOAD and np.all(x[selected] > 0):
         load = np.where(selected, x, 1.0)
         yield np.column_stack([np.log(load), np.min(x[selected]) / load])
@@ -173,7 +173,7 @@ def _departure_columns(against: str, x: np.ndarray, selected: np.ndarray, of_cur
 
 
 def _test_columns(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
-    """Probability of a departure as large by chance, and its size; None where it cannot be asked about."""
+    """Return the p-value of a departure and its size; None where it cannot be tested."""
     from scipy.special import fdtrc
 
     whole = np.zeros((len(system.residuals), columns.shape[1]))
@@ -198,7 +198,7 @@ def _test_columns(system: ResidualGroups, readings: ResidualGroup, columns: np.n
 
 
 def _compare_thirds(readings: ResidualGroup, x: np.ndarray, selected: np.ndarray) -> Sequence[float]:
-    """Where the lowest and the highest third were taken, and how much more is read there than the model says."""
+    """Return the mean positions of the lowest and the highest third, and by how much readings there exceed the model."""
     low, high = np.quantile(x[selected], (1 / 3, 2 / 3))
     thirds = [selected & (x <= low), selected & (x >= high)]
     return [float(np.mean(x[third])) for third in thirds] + [readings.excess(third) for third in thirds]

@@ -1,8 +1,8 @@
-"""Least squares of the residuals that the likelihood is made of: classical estimates, and the sampler's start.
+"""Least squares of the residuals of the likelihood: classical estimates, and the start of the samplers.
 
-Without priors the estimates are those a published curve fit gives; what runs to an end of its range, or has no influence
-on any residual, is reported as not identified. With priors (z itself as further residuals) they are the maximum of the
-posterior at the noise scales' prior medians.
+Without priors the estimates are those of a published curve fit; a parameter that runs to an end of its range, or does not
+affect any residual, is reported as not identified. With priors (z itself as further residuals) the solution is the maximum of
+the posterior with noise scales at their prior medians.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,12 +42,12 @@ class Estimate:
 
     Args:
         value: Estimate; NaN where not identified.
-        standard_error: From the Jacobian; NaN where not identified.
-        identified: Whether the data determine it.
-        remark: Why not, that it is fixed, or why it has no interval; empty otherwise.
-        lower, upper: 90 % interval by the profile of the sum of squares, cut off at the ends of the parameter's range;
-            infinite where nothing limits it, NaN where it was not computed.
-        at_bound: Whether the sum of squares falls all the way to the lower end of its range.
+        standard_error: Standard error from the Jacobian; NaN where not identified.
+        identified: Whether the data identify it.
+        remark: Why it is not identified, that it is fixed, or why it has no interval; empty otherwise.
+        lower, upper: 90 % profile interval, cut off at the ends of the parameter's range; infinite where there is no limit, NaN
+            where it was not computed.
+        at_bound: Whether the sum of squares falls all the way to an end of its range.
     """
 
     value: float
@@ -62,7 +62,7 @@ class Estimate:
 
     @property
     def open(self) -> list[str]:
-        """The sides on which nothing limits it."""
+        """The sides on which there is no limit."""
         return [side for side in ("lower", "upper") if np.isinf(getattr(self, side))]
 
     @property
@@ -77,19 +77,19 @@ class LeastSquares(Display):
     """Classical least squares without priors.
 
     Args:
-        estimates: By parameter name; noise scales are not among them.
+        estimates: Estimates by parameter name; noise scales are not among them.
         residual_sd: Standard deviation of the residuals by table, in the shown unit of the table's noise scale; NaN
             without degrees of freedom.
         readings: Expected readings of each table at the solution, in the table's unit.
-        condition_number: Of the Jacobian with columns in units of the prior's sd; infinite where the measurements leave
-            a direction undetermined. Parameters that ran to an end of their range do not count.
-        sum_of_squares: Of the standardized residuals.
-        z: Solution in z (noise scales at their prior median).
+        condition_number: Condition number of the Jacobian with columns in units of the prior's standard deviation; infinite
+            where a direction is undetermined. Parameters that ran to an end of their range do not count.
+        sum_of_squares: Sum of squares of the standardized residuals.
+        z: Solution in z (noise scales at their prior medians).
         converged: Whether the solver met its tolerance.
-        message: What it said.
-        disagreements: How well each table agrees with everything else; empty of one table alone.
-        departures: How residuals depend on where the readings were taken, the least likely by chance first.
-        far_readings: Single readings farther out than chance puts one, the farthest first.
+        message: Why it did not; empty if it did.
+        disagreements: How well each table agrees with everything else; empty for a single table.
+        departures: How residuals depend on where the readings were taken, the smallest p-value first.
+        far_readings: Outliers, the farthest first.
         units: Units of the estimates.
     """
 
@@ -107,7 +107,7 @@ class LeastSquares(Display):
     units: dict[str, str] | None = None
 
     def sentences(self) -> list[str]:
-        """How many estimates there are."""
+        """How many parameters are identified."""
         identified = [name for name, estimate in self.estimates.items() if estimate.identified]
         sentence = f"Least squares tell {len(identified)} of {len(self.estimates)} parameters"
         return [f"{sentence}." if self.converged else f"{sentence}, but did not converge: {self.message}."]
@@ -121,14 +121,14 @@ class LeastSquares(Display):
 
 @dataclass(frozen=True)
 class MaximumPosterior:
-    """Where the samplers start: maximum of the posterior at given noise scales, and its Gauss-Newton covariance in z."""
+    """Start of the samplers: maximum of the posterior at given noise scales, and its Gauss-Newton covariance in z."""
 
     z: np.ndarray
     covariance: np.ndarray
 
 
 def find_maximum_posterior(posterior: LogDensity, objective: Objective) -> MaximumPosterior:
-    """Maximum of the posterior with the noise scales at their prior medians, from every start that a parameter names.
+    """Find the maximum of the posterior with noise scales at their prior medians, from every start that a parameter names.
 
     Raises:
         ConvergenceError: The residuals are not finite at the start.
@@ -161,15 +161,15 @@ def _squares_with_priors(solution: Solution) -> float:
 def fit_least_squares(
     posterior: LogDensity, objective: Objective, start: np.ndarray, intervals: bool = True
 ) -> LeastSquares:
-    """Least squares without priors, from the maximum of the posterior.
+    """Fit by least squares without priors, from the maximum of the posterior.
 
-    The weights of the tables against each other are the prior medians of the noise scales, or what single readings of a run
-    each tell of these; the standard errors use the
-    scatter that is left (sandwich form), table by table; a force table scatters between its runs and within them.
+    The relative weights of the tables are the prior medians of the noise scales, or the scatter of single readings where runs
+    consist of such. The standard errors use the scatter of the residuals (sandwich form), table by table; a force table
+    scatters between its runs and within them.
 
     Args:
         posterior: The posterior.
-        objective: Its compiled solve.
+        objective: Its compiled objective.
         start: z to start from.
         intervals: Whether to compute the profile intervals, which take some twenty solves a parameter.
     """
@@ -199,7 +199,7 @@ def fit_least_squares(
 
 
 def _describe_failure(solution: Solution, profiled: ProfileIntervals) -> str:
-    """Why the solver has found no minimum; empty where it has."""
+    """Say why the solver has found no minimum; empty where it has."""
     if not solution["succeeded"]:
         return "the solver stopped before it met its tolerance"
     if profiled.stuck:
@@ -208,7 +208,7 @@ def _describe_failure(solution: Solution, profiled: ProfileIntervals) -> str:
 
 
 def _solve_pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solution]:
-    """Solutions with one parameter of the elastic side, or of friction beside it, pinned away from the minimum."""
+    """Return solutions with one elastic parameter, or one friction parameter beside it, pinned away from the minimum."""
     parameters = problem.posterior.model.space.free
     roles = ["friction", "elastic"] if any(p.role == "elastic" for p in parameters) else []
     masks = [np.arange(len(start)) == i for i, p in enumerate(parameters) if p.role in roles]
@@ -218,7 +218,7 @@ def _solve_pinned_elsewhere(problem: Problem, start: np.ndarray) -> list[Solutio
 def _make_estimates(
     minimum: LocalMinimum, rivals: Sequence[Solution], profiled: Mapping[str, tuple[float, float]]
 ) -> dict[str, Estimate]:
-    """Estimates of the free parameters but for noise scales, from their standard errors in z and their limits."""
+    """Return estimates of the free parameters other than noise scales, from standard errors in z and limits."""
     basin, error, determined = minimum.basin, minimum.error, minimum.determined
     solution, estimates = basin.solution, {}
     for i, p in enumerate(basin.parameters):
@@ -243,7 +243,7 @@ def _make_estimates(
 
 
 def _describe_bound(value: float, limit: tuple[float, float], at_upper_end: bool) -> str:
-    """What is known of a parameter whose sum of squares falls all the way to an end of its range."""
+    """Describe a parameter whose sum of squares falls all the way to an end of its range."""
     lower, upper = limit
     if at_upper_end:
         least = "" if np.isnan(lower) else f"; at least {significant(lower)}"
@@ -255,7 +255,7 @@ def _describe_bound(value: float, limit: tuple[float, float], at_upper_end: bool
 
 
 def predict_posterior(posterior: LogDensity, z: np.ndarray) -> MaximumPosterior:
-    """True values z, and the covariance that readings without noise would leave there, at the noise scales of that point."""
+    """Return the posterior that readings without noise would give at true values z, in the Gauss-Newton approximation."""
 
     def residuals(at: Array, data: Any) -> Array:
         return jnp.concatenate(list(posterior.residuals(at, data).values()))

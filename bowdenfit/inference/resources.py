@@ -19,23 +19,24 @@ from typing import Any
 
 from bowdenfit.errors import MemoryShortageError
 
-COMPILATION_BYTES = 64 << 20  # bytes; what compiling a program, or a block of sampling, takes at a time
-ENSEMBLES_AT_ONCE = 4  # threads at most that move ensembles of walkers
-_NEEDED = 768 << 20  # bytes; a small fit by NUTS takes so much beside what is loaded by then
-_BUFFER = 32 << 20  # bytes; OpenBLAS, behind NumPy, SciPy and XLA, takes one for each thread that calls it
-_ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20  # bytes; of threads and their heaps most is never used
+COMPILATION_BYTES = 64 << 20  # bytes that compiling a program, or a block of sampling, takes at a time
+ENSEMBLES_AT_ONCE = 4  # most threads that move ensembles of walkers
+_NEEDED = 768 << 20  # bytes that a small fit by NUTS takes beside what is loaded by then
+_BUFFER = 32 << 20  # bytes; OpenBLAS, behind NumPy, SciPy and XLA, allocates one buffer for each calling thread
+# bytes of address space; most of what threads and their heaps reserve is never used
+_ADDRESSES, _ADDRESSES_PER_CORE = 1500 << 20, 150 << 20
 _THREADS_VARIABLE = "OPENBLAS_NUM_THREADS"
 _changing = Lock()
-_limits: list[Any] = []  # the limit that is set, once for each that wants it
+_limits: list[Any] = []  # the limit in force, once for each caller that wants it
 
 
 def available_cores() -> int:
-    """That this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def start_worker() -> None:
-    """Prepare a new process: interrupts are for the one that started it, and it ends with that one, however that ends."""
+    """Prepare a worker process: it ignores interrupts, and ends when the process that started it ends, however that ends."""
     from multiprocessing import connection, parent_process
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -53,7 +54,7 @@ def start_worker() -> None:
 
 @cache
 def keep_compiled_programs() -> None:
-    """Have JAX keep compiled programs in the user's cache folder, for the next process; a setting of this whole process.
+    """Make JAX keep compiled programs in the user's cache folder for later processes. This is a setting of the whole process.
 
     JAX_COMPILATION_CACHE_DIR names another folder, and JAX_ENABLE_COMPILATION_CACHE=false turns this off; so does what the
     program has set by `jax.config`.
@@ -70,11 +71,11 @@ def keep_compiled_programs() -> None:
 
 
 def refuse_shortage(size: int = COMPILATION_BYTES, addresses: bool = False) -> None:
-    """Stop where memory cannot be had.
+    """Raise an error where memory cannot be had.
 
     Args:
-        size: How much [bytes].
-        addresses: Whether it is addresses alone that are asked for, which take no memory.
+        size: How much is needed [bytes].
+        addresses: Whether only address space is needed, which takes no memory.
 
     Raises:
         MemoryShortageError: The system refuses it.
@@ -93,7 +94,7 @@ def refuse_shortage(size: int = COMPILATION_BYTES, addresses: bool = False) -> N
 
 @cache
 def refuse_low_memory() -> None:
-    """Stop before a process begins to compute for long, where a small fit would run out of memory.
+    """Raise an error before a long computation starts where a small fit would run out of memory.
 
     Raises:
         MemoryShortageError: The system refuses that much.
@@ -104,9 +105,9 @@ def refuse_low_memory() -> None:
 
 @contextmanager
 def linear_algebra_in_one_thread() -> Iterator[None]:
-    """Meanwhile NumPy, SciPy and what is compiled call it so, in the whole process.
+    """Restrict BLAS of NumPy, SciPy and compiled programs to one thread, in the whole process, during a `with` block.
 
-    Afterwards it is as before; of several at a time the first sets the limit and the last takes it away.
+    Blocks may overlap: the first sets the limit and the last removes it.
     """
     if os.environ.get(_THREADS_VARIABLE) == "1":  # as the command line has it, from the start
         yield

@@ -47,29 +47,29 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.resources import linear_algebra_in_one_thread
 from bowdenfit.words import percent
 
-_FIRST_CHECK = 3  # rounds of walkers before the first look
-_KEPT_PER_WALKER, _KEPT_PER_WALKER_FOR_SDS = 20, 100
-ESS_PER_WALKER = 2  # effective draws that each walker makes by itself, so that where it started is forgotten
-_ESS_PER_START = 2  # effective draws for every walker that the starts of ensembles are drawn from, at the least
+_FIRST_CHECK = 3  # rounds of walkers before convergence is first checked
+_KEPT_PER_WALKER, _KEPT_PER_WALKER_FOR_SDS = 20, 100  # draws kept; standard deviations in long tails need more
+ESS_PER_WALKER = 2  # effective draws per walker, so that the start of each is forgotten
+_ESS_PER_START = 2  # least effective draws per walker among the weighted draws that ensembles start from
 _NOT_COMPUTABLE = (
     "the model cannot be computed at the prior medians or anywhere near; the usual cause is a prior or a fixed value that is "
     "orders of magnitude off"
 )
-_ENOUGH = 1000.0  # effective draws
-Argument, Result = TypeVar("Given"), TypeVar("Found")
+_ENOUGH = 1000.0  # effective draws beyond which drift is no longer judged more strictly
+Argument, Result = TypeVar("Argument"), TypeVar("Result")
 
 
 @dataclass(frozen=True)
 class BatchFit:
-    """What came of one data set.
+    """The fit of one data set.
 
     Args:
         z: Draws of the posterior, equally weighted, (draw, parameter); none where nothing could be computed.
         engine: "laplace" (weighted draws), "ensembles" or "nuts".
-        pareto_k: Of the importance weights; infinite where there are none.
-        diagnostics: By parameter; weighted draws have no R-hat and no drift.
-        reasons: Why the draws should not be trusted; empty if they may.
-        steps: Of each walker or chain; 0 of weighted draws.
+        pareto_k: Pareto k of the importance weights; infinite where there are none.
+        diagnostics: Diagnostics by parameter; weighted draws have no R-hat and no drift.
+        reasons: Why the draws should not be trusted; empty if they can be.
+        steps: Steps of each walker or chain; 0 for weighted draws.
     """
 
     z: np.ndarray
@@ -81,12 +81,12 @@ class BatchFit:
 
 
 class DatasetStart(NamedTuple):
-    """A data set.
+    """A data set that is ready to be sampled.
 
     Args:
         data: Its data.
         seed: Its seed.
-        first: What is drawn from first; None where nothing can be computed.
+        first: Mixture that the first draws are proposed from; None where the density cannot be computed.
     """
 
     data: Any
@@ -95,12 +95,12 @@ class DatasetStart(NamedTuple):
 
 
 class DatasetOutcome(NamedTuple):
-    """What weighted draws and walkers made of a data set.
+    """A data set after weighted draws and walkers.
 
     Args:
-        begun: The data set.
-        fit: What came of it.
-        start: Where NUTS may start; None where draws are good, or nothing can be computed.
+        dataset: The data set.
+        fit: Its fit so far.
+        start: Where NUTS can start; None where the draws are good, or nothing can be computed.
     """
 
     dataset: DatasetStart
@@ -109,7 +109,7 @@ class DatasetOutcome(NamedTuple):
 
 
 def start_chunk(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[DatasetStart]:
-    """What draws of a chunk of data sets with their seeds are proposed from first."""
+    """Fit the first proposals of a chunk of data sets with their seeds."""
     seeds, data = np.array([seed for _, seed in parts]), stack_data([data for data, _ in parts], CHUNK)
     padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
     mixtures = fit_mixtures(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
@@ -117,7 +117,7 @@ def start_chunk(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[D
 
 
 def sample_dataset(programs: BatchPrograms, dataset: DatasetStart, stopped: Callable[[], bool]) -> DatasetOutcome:
-    """Weighted draws of a data set or, where these are not enough, those of walkers.
+    """Draw from a data set's posterior by importance sampling or, where that is not good enough, by walkers.
 
     Raises:
         CancelledError: It is stopped.
@@ -141,13 +141,13 @@ def sample_dataset(programs: BatchPrograms, dataset: DatasetStart, stopped: Call
 
 
 def _nuts_start(programs: BatchPrograms, near: WeightedDraws) -> MaximumPosterior:
-    """Where NUTS may start."""
+    """Return where NUTS can start."""
     weights = np.exp(_even_log_weights(programs, near))
     return MaximumPosterior(weights @ near.z, np.cov(near.z.T, aweights=weights).reshape(near.z.shape[1], -1))
 
 
 def _fit_by_weights(programs: BatchPrograms, weighted: WeightedDraws | None) -> BatchFit:
-    """What weighted draws say, as draws of equal weight."""
+    """Resample weighted draws to equal weights, with their diagnostics."""
     settings = programs.settings
     least = _ESS_PER_START * programs.n_walkers * settings.sampler.n_ensembles
     if weighted is None or np.isfinite(weighted.log_density).sum() < least:
@@ -162,7 +162,7 @@ def _fit_by_weights(programs: BatchPrograms, weighted: WeightedDraws | None) -> 
 def _fit_by_walkers(
     programs: BatchPrograms, dataset: DatasetStart, near: WeightedDraws, stopped: Callable[[], bool]
 ) -> BatchFit:
-    """What the second half of the walkers' paths says, looked at until it is enough or they have gone as far as they may."""
+    """Return the second half of the walkers' paths, checked for convergence until they pass or have reached the step limit."""
     limit = max(programs.settings.sampler.max_steps // STEPS_PER_ROUND, _FIRST_CHECK)
     with programs.compiling:  # by the first that needs it
         walk = programs.ensembles
@@ -188,7 +188,7 @@ def _fit_by_walkers(
 
 
 def _choose_starts(programs: BatchPrograms, near: WeightedDraws, seed: int) -> np.ndarray:
-    """Different ones of weighted draws, (ensemble, walker, parameter)."""
+    """Choose different weighted draws as starts, (ensemble, walker, parameter)."""
     n_ensembles, generator = programs.settings.sampler.n_ensembles, np.random.default_rng([seed, 2])
     log_weights = _even_log_weights(programs, near)
     # The largest of weights times exponential numbers are a sample without replacement.
@@ -197,20 +197,20 @@ def _choose_starts(programs: BatchPrograms, near: WeightedDraws, seed: int) -> n
 
 
 def _even_log_weights(programs: BatchPrograms, weighted: WeightedDraws) -> np.ndarray:
-    """Log weights, more even where draws are worth too few to start walkers from."""
+    """Return log weights, made more even where too few effective draws are left to start walkers from."""
     return even_weights(
         weighted.log_weights, _ESS_PER_START * programs.settings.sampler.n_ensembles * programs.n_walkers
     )
 
 
 def _summarize_walkers(programs: BatchPrograms, late: np.ndarray, short_before: list[str], last: bool) -> BatchFit:
-    """What states of walkers say, (state, ensemble, walker, parameter).
+    """Return draws and diagnostics of walker states, (state, ensemble, walker, parameter).
 
     Args:
-        programs: What is compiled.
+        programs: The compiled programs.
         late: The states.
-        asked_before: What asked for more at the last look.
-        last: Whether no walkers go on; else diagnostics end with the first parameter that asks for more.
+        short_before: Parameters that had not converged at the last check; they are checked first.
+        last: Whether the walkers stop here; otherwise the check ends with the first parameter that has not converged.
     """
     sampler = programs.settings.sampler
     strict = bool(np.isfinite(programs.settings.target_sd_error))
@@ -234,7 +234,7 @@ def _summarize_walkers(programs: BatchPrograms, late: np.ndarray, short_before: 
 
 
 def sample_by_nuts(programs: BatchPrograms, outcome: DatasetOutcome, start: MaximumPosterior) -> BatchFit:
-    """What NUTS makes of it."""
+    """Sample a data set by NUTS."""
     from bowdenfit.inference.nuts import sample
 
     posterior = replace(programs.posterior, data_override=outcome.dataset.data)
@@ -249,11 +249,11 @@ def sample_by_nuts(programs: BatchPrograms, outcome: DatasetOutcome, start: Maxi
 
 
 def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
-    """Diagnostics of a few hundred effective draws.
+    """Return diagnostics of a few hundred effective draws.
 
     Two halves of n effective draws differ by 2 / sqrt(n) of their spread by chance alone. `MAXIMUM_DRIFT` is 2.5 / sqrt(n) at a
-    thousand; here twice that is allowed, with no more than a thousand: else those that had to go on for one reason would be
-    judged more strictly for another.
+    thousand. Here twice that is allowed, computed with at most a thousand effective draws, so that fits that had to continue
+    for another reason are not judged more strictly.
     """
     diagnostics = diagnose_all(draws, n_ensembles)
     allowed = {
@@ -265,7 +265,7 @@ def diagnose_few_draws(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dic
 
 
 def describe_remembered_starts(diagnostics: Mapping[str, Diagnostics], least: int) -> tuple[str, ...]:
-    """Where too few effective draws were made for walkers to have forgotten where they started, in words."""
+    """Describe parameters with too few effective draws for walkers to have forgotten their starts."""
     return tuple(
         describe_low_ess(f"the middle of {name}", d.ess_bulk, least)
         for name, d in diagnostics.items()
@@ -274,7 +274,7 @@ def describe_remembered_starts(diagnostics: Mapping[str, Diagnostics], least: in
 
 
 def estimate_sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Monte Carlo error of each standard deviation as a share of it; draws are (walker, draw)."""
+    """Return the Monte Carlo error of each standard deviation, relative to it, from draws (walker, draw)."""
     from arviz_stats.base import array_stats
 
     return {
@@ -285,7 +285,7 @@ def estimate_sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
 
 
 def describe_uncertain_sds(errors: Mapping[str, float], most: float) -> tuple[str, ...]:
-    """Which standard deviations are not known well enough, in words."""
+    """Describe standard deviations that are not known well enough; empty if all are."""
     return tuple(
         f"the standard deviation of {name} is known to {percent(error)} and should be to {percent(most)}"
         for name, error in errors.items()
@@ -301,14 +301,14 @@ def fit_batch(
     settings: BatchSettings | None = None,
     programs: BatchPrograms | None = None,
 ) -> list[BatchFit]:
-    """Fit data sets of one shape.
+    """Fit data sets of one shape; return one fit for each, in order.
 
     Args:
-        posterior: The posterior, whose model is that of all of them.
-        data: What `posterior.data` is, for every data set; all arrays of the same shapes.
-        seeds: One for every data set, which with its data decides what it draws.
-        settings: How carefully.
-        programs: What was compiled for another batch of the same shape and model; its settings count.
+        posterior: The posterior, whose model is shared by all data sets.
+        data: `posterior.data` of every data set; all arrays of the same shapes.
+        seeds: One seed for every data set, which with its data determines its draws.
+        settings: Sampler settings and targets.
+        programs: Programs compiled for another batch of the same shape and model; their settings are used.
     """
     programs = programs or BatchPrograms(posterior, settings or BatchSettings())
     parts, pool, stop = list(zip(data, seeds, strict=True)), ThreadPoolExecutor(programs.threads), Event()
@@ -331,7 +331,7 @@ def fit_batch(
 
 
 def _in_64_bits(function: Callable[[Argument], Result], argument: Argument) -> Result:
-    """What a function gives in a thread, where the setting is the thread's own."""
+    """Call a function with 64-bit floats enabled, a JAX setting of each thread."""
     with jax.enable_x64(True):
         return function(argument)
 

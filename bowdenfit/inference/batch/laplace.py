@@ -19,14 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-_DEGREES_OF_FREEDOM = 5  # of the Student-t's
-_EM_STEPS = 4  # in which a mixture is moved
-_LEAST_PART_SHARE = 1e-3  # of a part that draws have left
-_SHRINKAGE = 0.5  # of the covariance of all draws, which is what a part has that few draws are near
+_DEGREES_OF_FREEDOM = 5  # of the Student t distributions: tails wide enough that importance weights stay bounded
+_EM_STEPS = 4  # steps of expectation and maximization that refine a mixture
+_LEAST_PART_SHARE = 1e-3  # share below which a component keeps its center, since hardly any draw is near
+_SHRINKAGE = 0.5  # factor on the covariance of all draws, toward which a component with few draws is shrunk
 Gradients = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-N_STARTS = 4  # places that each density is climbed from: the prior medians, and draws of the prior
-# Standard deviations from its maximum at which each noise scale is held, as many as starts; the highest are where everything
-# else is widest, which decides how well standard deviations are known.
+N_STARTS = 4  # starts of each climb: the prior medians, and draws of the prior
+# Offsets from its maximum, in standard deviations, at which each noise scale is held, as many as there are starts. At the
+# highest everything else is widest, which decides how well standard deviations are known.
 _NOISE_OFFSETS = (-2.0, 2.0, 4.0, 6.0)
 _FRICTION_OFFSETS = (
     -0.5,
@@ -34,23 +34,23 @@ _FRICTION_OFFSETS = (
     -1.7,
     -2.5,
 )  # from its maximum, where a coefficient is held; in standard deviations of its prior
-_FRICTION_WIDTH = 0.4  # of the draws about these places, in the same
+_FRICTION_WIDTH = 0.4  # spread of the draws about these offsets, in standard deviations of the prior
 _MOST_STEPS, _DIFFERENCE = 30, 1e-5
-_LEAST_CURVATURE = 0.2  # least curvature that is believed; the prior's is 1
-_LONGEST_STEP = 3.0  # step, in standard deviations of the prior
-_LEAST_GAIN = 1e-4  # gain that a step promises at which the top is near enough to draw about it
+_LEAST_CURVATURE = 0.2  # lower limit of a curvature; the prior's is 1
+_LONGEST_STEP = 3.0  # longest step, in standard deviations of the prior
+_LEAST_GAIN = 1e-4  # predicted gain of log density below which a climb has arrived
 _MOST_DAMPING = 1e8  # damping at which no step gains anything
-_LEAST_SHARE, _LEAST_FRICTION_SHARE = 0.1, 0.05  # of each part in the draws, before they are made to sum to 1
+_LEAST_SHARE, _LEAST_FRICTION_SHARE = 0.1, 0.05  # least share of each component in the draws, before shares are normalized
 
 
 @dataclass(frozen=True)
 class StudentMixture:
-    """Student-t's.
+    """A mixture of multivariate Student t distributions.
 
     Args:
-        center: Of every part, (part, parameter).
-        root: A root R of its scale matrix R R^T.
-        share: Of the draws.
+        center: Centers, (component, parameter).
+        root: Roots R of the scale matrices R R^T, (component, parameter, parameter).
+        share: Weights of the components, which sum to 1.
     """
 
     center: np.ndarray
@@ -62,7 +62,7 @@ class StudentMixture:
         return np.linalg.inv(self.root)
 
     def draw(self, generator: np.random.Generator, count: int) -> np.ndarray:
-        """So many, one a row; each part gets its share, and parts follow each other."""
+        """Draw `count` points, one a row; each component gets its share, one component after the other."""
         part = np.searchsorted(np.cumsum(self.share), (np.arange(count) + generator.uniform()) / count)
         part = np.minimum(part, len(self.share) - 1)
         rows = generator.standard_normal((count, self.center.shape[1]))
@@ -73,18 +73,18 @@ class StudentMixture:
         return rows
 
     def log_density(self, rows: np.ndarray) -> np.ndarray:
-        """Of every row."""
+        """Return the log density at every row."""
         return _log_sum(self._log_components(self._squared_distances(rows)))
 
     def _squared_distances(self, rows: np.ndarray) -> np.ndarray:
-        """Distance from every part in its own units, squared, (row, part)."""
+        """Return squared Mahalanobis distances from every component, (row, component)."""
         count, size = self.center.shape
         flat = self._inverse.reshape(-1, size)
         apart = (rows @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(-1, count, size)
         return np.einsum("nki,nki->nk", apart, apart)
 
     def _log_components(self, squares: np.ndarray) -> np.ndarray:
-        """Log of share times density of every part, (row, part)."""
+        """Return the log of weight times density of every component, (row, component)."""
         size = self.center.shape[1]
         constant = (
             lgamma((_DEGREES_OF_FREEDOM + size) / 2)
@@ -95,7 +95,7 @@ class StudentMixture:
         return of_part - (_DEGREES_OF_FREEDOM + size) / 2 * np.log1p(squares / _DEGREES_OF_FREEDOM)
 
     def refined(self, rows: np.ndarray) -> "StudentMixture":
-        """The mixture that is likelier to have given draws, some steps of expectation and maximization away.
+        """Return the mixture after some steps of expectation and maximization toward draws.
 
         Args:
             rows: Draws, one a row.
@@ -122,12 +122,12 @@ class StudentMixture:
         return mixture
 
     def with_wide_component(self, rows: np.ndarray, times: float, share: float) -> "StudentMixture":
-        """The same with one more part, about all of many draws.
+        """Return the mixture with one more, wide component about all draws.
 
         Args:
             rows: Draws, one a row.
-            times: How much wider than they.
-            share: Of the draws.
+            times: How much wider than the draws it is.
+            share: Weight of the new component.
         """
         root = times * np.linalg.cholesky(regularized_covariance(rows))
         return StudentMixture(
@@ -138,11 +138,11 @@ class StudentMixture:
 
 
 def start_mixture(rows: np.ndarray, parts: int) -> StudentMixture:
-    """Student-t's about some of many draws, to be moved.
+    """Return a mixture centered at some of many draws, to be refined.
 
     Args:
         rows: Draws, one a row.
-        parts: How many.
+        parts: Number of components.
     """
     some = ((np.arange(parts) + 0.5) / parts * len(rows)).astype(int)
     root = np.linalg.cholesky(_SHRINKAGE * regularized_covariance(rows))
@@ -150,7 +150,7 @@ def start_mixture(rows: np.ndarray, parts: int) -> StudentMixture:
 
 
 def regularized_covariance(rows: np.ndarray) -> np.ndarray:
-    """Of draws, with a little more in each direction, so that it always has a root."""
+    """Return the covariance of draws, plus a little in each direction so that it always has a Cholesky factor."""
     sample_covariance = np.cov(rows.T).reshape(rows.shape[1], -1)
     return sample_covariance + (
         1e-9 * np.trace(sample_covariance) / len(sample_covariance) + np.finfo(float).tiny
@@ -158,7 +158,7 @@ def regularized_covariance(rows: np.ndarray) -> np.ndarray:
 
 
 def _log_sum(logs: np.ndarray) -> np.ndarray:
-    """Logarithm of the sum of each row's exponentials; minus infinity where all are 0."""
+    """Return the logarithm of the sum of exponentials of each row; minus infinity where all are 0."""
     top = np.maximum(logs.max(axis=1), np.finfo(float).min)
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(np.sum(np.exp(logs - top[:, None]), axis=1)) + top)
@@ -166,7 +166,7 @@ def _log_sum(logs: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Maxima:
-    """Where climbs ended: z (cable, climb, parameter), log densities (cable, climb), and minus their second derivatives."""
+    """Ends of climbs: z (cable, climb, parameter), log densities (cable, climb), and minus their second derivatives."""
 
     z: np.ndarray
     value: np.ndarray
@@ -174,13 +174,13 @@ class Maxima:
 
 
 class HeldMaxima(NamedTuple):
-    """Places at which one parameter is held.
+    """Maxima with one parameter held at some values.
 
     Args:
         unit: 1 for that parameter, 0 for the others.
-        tops: Of all the rest.
-        width: With which it spreads about each place, by cable.
-        least: Least share of each place in the draws.
+        maxima: Maxima over all other parameters.
+        width: Spread of that parameter about each value, by cable.
+        least: Least share of each value in the draws.
     """
 
     unit: np.ndarray
@@ -190,17 +190,17 @@ class HeldMaxima(NamedTuple):
 
 
 def count_climb_points(size: int) -> int:
-    """Gradients of one density that a step of all its climbs asks for."""
+    """Return how many gradients of one density a step of all its climbs needs."""
     return N_STARTS * (2 * size + 1)
 
 
 def climb_to_maxima(gradients: Gradients, z: np.ndarray, free: np.ndarray) -> Maxima:
-    """Newton's method, damped, with differences of gradients; each climb by itself.
+    """Climb to maxima by damped Newton steps with differences of gradients, each climb independently.
 
     Args:
-        gradients: Log densities and their gradients, at `points_of_climb` points (cable, point, parameter).
+        gradients: Log densities and their gradients, at `count_climb_points` points (cable, point, parameter).
         z: Starts, (cable, climb, parameter).
-        free: 1 for what moves, 0 for what is held, (climb, parameter).
+        free: 1 for parameters that move, 0 for those held, (climb, parameter).
     """
     held = np.eye(z.shape[2]) * (1 - free)[:, None, :]
     z, (value, slope, curvature) = z, _differentiate(gradients, z)
@@ -227,7 +227,7 @@ def climb_to_maxima(gradients: Gradients, z: np.ndarray, free: np.ndarray) -> Ma
 
 
 def _differentiate(gradients: Gradients, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Log densities, gradients and minus second derivatives; where they cannot be computed, minus infinity and 0."""
+    """Return log densities, gradients and minus second derivatives; minus infinity and 0 where they cannot be computed."""
     cables, climbs, size = z.shape
     moves = _DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
     value, slope = (np.asarray(part) for part in gradients((z[:, :, None] + moves).reshape(cables, -1, size)))
@@ -242,7 +242,7 @@ def _differentiate(gradients: Gradients, z: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def draw_starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
-    """Where to climb from, (cable, climb, parameter)."""
+    """Return starts of the climbs, (cable, climb, parameter)."""
     others = [np.random.default_rng([int(seed), 0]).standard_normal((N_STARTS - 1, size)) for seed in seeds]
     return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(others)], axis=1)
 
@@ -250,13 +250,13 @@ def draw_starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
 def fit_mixtures(
     gradients: Gradients, noise: np.ndarray, friction: np.ndarray, seeds: np.ndarray
 ) -> list[StudentMixture | None]:
-    """For every cable what its draws are proposed from first; None where its density cannot be computed from any start.
+    """Fit the first proposal of every cable; None where its density cannot be computed from any start.
 
     Args:
-        gradients: See `climb`.
+        gradients: See `climb_to_maxima`.
         noise: Which parameters are noise scales.
-        friction: Which are friction coefficients.
-        seeds: Of every cable.
+        friction: Which parameters are friction coefficients.
+        seeds: Seed of every cable.
     """
     size = len(noise)
     maxima = climb_to_maxima(gradients, draw_starting_points(size, seeds), np.ones((N_STARTS, size)))
@@ -285,7 +285,7 @@ def _standard_deviations(maxima: Maxima, cable: int) -> np.ndarray:
 
 
 def _make_mixture(maxima: Maxima, held_maxima: list[HeldMaxima], cable: int) -> StudentMixture:
-    """The tops of a cable and the places aside of the best, by how much mass is about each."""
+    """Combine the maxima of a cable and its held maxima, weighted by the mass about each."""
     parts = [
         (maxima.z[cable, i], _covariance_root(maxima.curvature[cable, i]), maxima.value[cable, i], _LEAST_SHARE)
         for i in range(N_STARTS)
@@ -304,13 +304,13 @@ def _make_mixture(maxima: Maxima, held_maxima: list[HeldMaxima], cable: int) -> 
 
 
 def _covariance_root(curvature: np.ndarray) -> np.ndarray:
-    """Root of the covariance of a curvature, no wider in any direction than the least that is believed."""
+    """Return a root of the covariance that belongs to a curvature, with the curvature limited from below."""
     sizes, axes = np.linalg.eigh(curvature)
     return axes / np.sqrt(np.maximum(sizes, _LEAST_CURVATURE))
 
 
 def _held_root(curvature: np.ndarray, unit: np.ndarray, width: float) -> np.ndarray:
-    """The same where one coordinate is held at a place and spreads by a width: the others follow it."""
+    """Return such a root where one coordinate spreads by a given width and the others follow it."""
     which, free = int(np.argmax(unit)), np.flatnonzero(unit == 0)
     root = np.zeros_like(curvature)
     free_root = _covariance_root(curvature[np.ix_(free, free)])

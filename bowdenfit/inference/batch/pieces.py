@@ -28,15 +28,15 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
-_IRRELEVANT_KEYS = {"name", "source", "license", "file", "files"}  # keys of a description that no fit depends on
-_DATA_FIELDS = ("cable", "data", "labels", "rows")  # of a term: what is data, or named in the key by itself
-DRAWS = 2048  # of each data set, of equal weight
-_SHUFFLE_STREAM = 3  # stream of random numbers that puts draws in no order
+_IRRELEVANT_KEYS = {"name", "source", "license", "file", "files"}  # keys of a description that do not affect a fit
+_DATA_FIELDS = ("cable", "data", "labels", "rows")  # fields of a term that are data, or enter the key by themselves
+DRAWS = 2048  # draws of each data set, of equal weight
+_SHUFFLE_STREAM = 3  # stream of random numbers that shuffles draws
 
 
 @dataclass(frozen=True)
 class ScaledDensity(LogDensity):
-    """The posterior of data whose last array has the scales of the priors that are in proportion to measurements."""
+    """A posterior whose data end with the scales of the priors that are proportional to measurements."""
 
     def values(self, z: Array, data: Any) -> dict[str, Array]:
         """See `LogDensity.values`."""
@@ -46,12 +46,12 @@ class ScaledDensity(LogDensity):
 
 @dataclass(frozen=True)
 class ShapedDataset:
-    """A data set as one of many that a program serves.
+    """A data set in a form that one program shares with others.
 
     Args:
-        posterior: Of unit scale, the same program for all of one key.
+        posterior: Posterior with priors of unit scale, the same program for all data sets with one key.
         data: Its own data.
-        key: What the program depends on; the same for all that it serves.
+        key: Everything the program depends on; equal keys share a program.
     """
 
     posterior: ScaledDensity
@@ -60,7 +60,7 @@ class ShapedDataset:
 
 
 def shape_dataset(dataset: Dataset) -> ShapedDataset:
-    """A data set with its scales as data.
+    """Return a data set with the scales of its priors as data.
 
     Args:
         dataset: What was measured.
@@ -78,23 +78,23 @@ def shape_dataset(dataset: Dataset) -> ShapedDataset:
 
 
 def _has_angles(model: Model) -> bool:
-    """Whether every row has its own angle wherever else the mean angle of all rows would serve."""
+    """Return whether every row has its own angle wherever the mean angle of all rows would be used otherwise."""
     nominal = [c.name in model.cable.nominal for c in model.description.contact]
     return all("is_own" in term.data and np.all(term.data["is_own"][..., nominal]) for term in model.terms)
 
 
 def _with_cable(cable: Cable, space: ParameterSpace, terms: Sequence[Term]) -> Model:
-    """The model of the same terms with another cable."""
+    """Return a model of the same terms with another cable."""
     return Model(cable, space, tuple(replace(term, cable=cable) for term in terms))  # type: ignore[type-var]
 
 
 def _scaled_names(space: ParameterSpace) -> list[str]:
-    """Parameters whose priors the data scale."""
+    """Return names of parameters whose priors the data scale."""
     return [p.name for p in space.free if p.scaled_by and _scale_of(p.prior) is not None]
 
 
 def _to_unit_scale(parameter: Parameter) -> tuple[Parameter, float | None]:
-    """A parameter with the prior of a unit scale, and the scale; None where it is not scaled by measurements."""
+    """Return a parameter with a prior of unit scale, and the scale; None where measurements do not scale it."""
     scale = _scale_of(parameter.prior) if parameter.scaled_by else None
     if scale is None:
         return parameter, None
@@ -104,7 +104,7 @@ def _to_unit_scale(parameter: Parameter) -> tuple[Parameter, float | None]:
 
 
 def _scale_of(prior: Prior) -> float | None:
-    """The factor between a prior and that of unit scale; None where it is more than a factor."""
+    """Return the factor between a prior and that of unit scale; None where they differ by more than a factor."""
     match prior:
         case HalfCauchy(scale=scale):
             return float(scale)
@@ -118,7 +118,7 @@ def _scale_of(prior: Prior) -> float | None:
 
 
 def _program_key(posterior: ScaledDensity) -> str:
-    """What its program depends on: shapes, parameters, description, and conditions where they matter."""
+    """Return a digest of what a program depends on: shapes, parameters, description, and conditions where they matter."""
     shapes = jax.tree.map(lambda array: (np.shape(array), str(np.asarray(array).dtype)), posterior.data)
     terms = [_describe_term(term) for term in posterior.model.terms]
     description = _relevant_parts(posterior.model.description.to_json())
@@ -128,29 +128,29 @@ def _program_key(posterior: ScaledDensity) -> str:
 
 
 def _conditions_matter(model: Model) -> bool:
-    """Whether the density depends on the loads and speeds measured at; it does unless every term says that it does not."""
+    """Return whether the density depends on measured loads and speeds: yes, unless every term says that it does not."""
     return any(getattr(term, "depends_on_conditions", True) for term in model.terms)
 
 
 def input_hash(dataset: Dataset) -> str:
-    """What was measured and how it is described, whatever it is called and wherever it lies.
+    """Return a digest of what was measured and how it is described, independent of its name and folder.
 
     Args:
-        dataset: Read from files.
+        dataset: A data set read from files.
     """
     read = [checksum for name, checksum in dataset.sha256.items() if name != DESCRIPTION_FILE]
     return _digest(f"{_relevant_parts(dataset.description.to_json())} {read}")
 
 
 def _relevant_parts(page: Any) -> Any:
-    """A description without what no fit depends on."""
+    """Return a description without the keys that do not affect a fit."""
     if isinstance(page, Mapping):
         return {key: _relevant_parts(value) for key, value in page.items() if key not in _IRRELEVANT_KEYS}
     return [_relevant_parts(item) for item in page] if isinstance(page, list | tuple) else page
 
 
 def _describe_term(term: Term) -> str:
-    """What a term is beside its data; arrays by what is in them."""
+    """Describe a term apart from its data; arrays by their content."""
     parts = [f"{type(term).__name__} {len(term.labels)}"]
     for term_field in fields(term):  # type: ignore[arg-type]
         if term_field.name not in _DATA_FIELDS:
@@ -169,11 +169,11 @@ def _digest(text: str) -> str:
 
 @dataclass(frozen=True)
 class Example:
-    """A data set that a program can be compiled for; any of one key will do.
+    """A data set that a program can be compiled for; any data set of one key will do.
 
     Args:
-        key: See `Shaped`.
-        dataset: One of those of this key.
+        key: See `ShapedDataset`.
+        dataset: One of the data sets with this key.
     """
 
     key: str
@@ -182,15 +182,15 @@ class Example:
 
 @dataclass(frozen=True)
 class Piece:
-    """Data sets of one shape.
+    """Data sets of one shape, a unit of work.
 
     Args:
-        example: What is compiled for.
-        settings: How carefully they are fitted.
-        names: Of each.
-        data: Of each, see `Shaped`.
-        seeds: Of each.
-        versions: Where the work comes from.
+        example: Data set that the program is compiled for.
+        settings: Sampler settings and targets.
+        names: Name of each data set.
+        data: Data of each, see `ShapedDataset`.
+        seeds: Seed of each.
+        versions: Versions of the libraries where the work comes from.
     """
 
     example: Example
@@ -203,16 +203,16 @@ class Piece:
 
 @dataclass(frozen=True)
 class PieceFit:
-    """What came of one data set.
+    """The fit of one data set of a piece.
 
     Args:
-        name: Of it.
-        values: Draws of equal weight in no order by quantity in shown units, (quantity, draw); none where nothing can be
+        name: Name of the data set.
+        values: Shuffled draws of equal weight by quantity in shown units, (quantity, draw); empty where nothing can be
             computed.
         engine: "laplace", "ensembles" or "nuts".
         pareto_k: See `BatchFit`.
-        n_effective: Effective number of the draws, of the worst parameter.
-        reasons: Why the draws should not be trusted; empty if they may.
+        n_effective: Effective sample size of the worst parameter.
+        reasons: Why the draws should not be trusted; empty if they can be.
     """
 
     name: str
@@ -224,10 +224,10 @@ class PieceFit:
 
 
 def fit_piece(piece: Piece) -> list[PieceFit]:
-    """What comes of each data set; depends on its own data, its seed and the settings alone.
+    """Fit each data set of a piece; each fit depends on its own data, its seed and the settings alone.
 
     Args:
-        piece: The work.
+        piece: The data sets.
 
     Raises:
         UsageError: The work comes from a program of other versions.
@@ -242,7 +242,7 @@ def fit_piece(piece: Piece) -> list[PieceFit]:
 
 @lru_cache(maxsize=8)
 def _compile(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, Callable[..., Any]]:
-    """What serves all pieces of one shape."""
+    """Compile the programs that serve all pieces of one shape."""
     posterior = shape_dataset(example.dataset).posterior
     model = posterior.model
 
@@ -256,7 +256,7 @@ def _compile(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, 
 
 
 def _make_piece_fit(name: str, data: Any, seed: int, fit: BatchFit, values_of: Callable[..., Any]) -> PieceFit:
-    """A fit as the named values of as many draws as every data set has."""
+    """Return a fit as named values of a fixed number of draws."""
     known = min((min(d.ess_bulk, d.ess_tail) for d in fit.diagnostics.values()), default=0.0)
     if not len(fit.z):
         return PieceFit(name, np.zeros((0, 0)), fit.engine, fit.pareto_k, known, fit.reasons)

@@ -31,19 +31,19 @@ STATES_PER_ROUND = (
     20  # states of a round that are stored, `THIN` steps from one to the next, all in the same coordinates
 )
 STEPS_PER_ROUND = STATES_PER_ROUND * THIN
-_STREAM = 1
-CHUNK = 16  # data sets that climb at once, always as many, so that rounding is the same
-# Of threads that share one interpreter: 96 fits of the on-body cable took 27 s with 4 on 16 cores, and 41 s with 17.
+_STREAM = 1  # stream of random numbers of the walkers
+CHUNK = 16  # data sets that climb together, always the same number so that rounding is the same
+# Threads that share one interpreter: 96 fits of the on-body cable took 27 s with 4 threads on 16 cores, and 41 s with 17.
 MOST_AT_ONCE = 4
 
 
 def compile_round(posterior: LogDensity, n_ensembles: int, n_walkers: int) -> Callable[..., Any]:
-    """Compiled: a round, from a seed, the number of the round, z by ensemble and walker, and data.
+    """Compile a round of walkers: a function of seed, number of the round, z by ensemble and walker, and data.
 
     Args:
         posterior: The posterior.
-        n_ensembles: Independent ensembles.
-        n_walkers: Of each ensemble; a power of two.
+        n_ensembles: Number of independent ensembles.
+        n_walkers: Walkers of each ensemble; a power of two.
     """
     run_round = walker_round(posterior.log_density, weighted_moves(), coordinate_maps(posterior))
     seed = number = jax.ShapeDtypeStruct((), jnp.uint32)
@@ -54,12 +54,12 @@ def compile_round(posterior: LogDensity, n_ensembles: int, n_walkers: int) -> Ca
 def walker_round(
     log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps
 ) -> Callable[..., Any]:
-    """Stored z of a round of one cable, of seed, number of the round, z and data.
+    """Return a function of seed, round number, z and data that gives the stored z of a round of one cable.
 
     Args:
-        log_density: Of one z and data.
-        moves: What the walkers do.
-        frames: In which coordinates.
+        log_density: Log density of one z and data.
+        moves: Moves of the walkers with their shares.
+        frames: Coordinates they move in, with their shares.
     """
     sweep = make_walker_sweep(log_density, moves, frames)
     ends = [jnp.asarray(np.cumsum([share for _, share in weighted])[:-1]) for weighted in (moves, frames)]
@@ -91,28 +91,28 @@ def walker_round(
 
 
 def _random_bits(key: Array, shape: tuple[int, ...]) -> Array:
-    """Random; along one axis first, because XLA takes ten seconds to compile them along five."""
+    """Return random bits, generated along one axis, because XLA takes ten seconds to compile them along five."""
     return jax.random.bits(key, (int(np.prod(shape)),), jnp.uint32).reshape(shape)
 
 
 def _shuffle_walkers(bits: Array, n_walkers: int) -> Array:
-    """An order of the walkers of every ensemble at random; their halves move one after the other."""
+    """Return a random order of the walkers of every ensemble; its halves move in turns."""
     order = ((2 * bits[0] + 1) * jnp.arange(n_walkers, dtype=jnp.uint32) + bits[1]) % n_walkers
     return order.astype(jnp.int32)
 
 
 @dataclass(frozen=True)
 class BatchSettings:
-    """How carefully a batch is fitted.
+    """Sampler settings and targets of a batch.
 
     Args:
-        sampler: Ensembles, their walkers at the least (a power of two), most steps, and targets; those of NUTS where it is
-            needed.
-        target_sd_error: Largest Monte Carlo error of a standard deviation, as a share of it; a tenth is hardly ever exceeded.
+        sampler: Ensembles, their least number of walkers (a power of two), maximum steps, and targets; also those of NUTS where
+            it is needed.
+        target_sd_error: Largest Monte Carlo error of a standard deviation, relative to it; a tenth is hardly ever exceeded.
             Long tails need many more draws for it than for a mean or a rank.
-        n_kept: Draws of equal weight that are made of weighted ones.
-        nuts: Whether NUTS takes what the ensembles leave.
-        threads: How many data sets at once; if omitted one more than there are cores, for while one is not computing, but
+        n_kept: Number of equally weighted draws that weighted ones are resampled to.
+        nuts: Whether NUTS samples what the ensembles leave.
+        threads: Data sets sampled at a time; if omitted one more than there are cores, because threads wait for each other, but
             `MOST_AT_ONCE` at most.
     """
 
@@ -134,12 +134,12 @@ class BatchSettings:
 
 @dataclass(frozen=True)
 class BatchPrograms:
-    """What is compiled for data of one shape; may serve several batches.
+    """Programs compiled for data of one shape; they may serve several batches.
 
     Args:
-        posterior: Its model is that of all data sets.
-        settings: How carefully they are fitted.
-        compiling: Held by the thread that compiles what all need.
+        posterior: Posterior whose model is shared by all data sets.
+        settings: Sampler settings and targets.
+        compiling: Lock held by the thread that compiles a shared program.
     """
 
     posterior: LogDensity
@@ -148,14 +148,14 @@ class BatchPrograms:
 
     @cached_property
     def gradients(self) -> Callable[..., Any]:
-        """Log density and gradient, for climbing."""
+        """Log density and gradient, for climbing to maxima."""
         size, gradient = self.posterior.model.space.size, jax.value_and_grad(self.posterior.log_density)
         shape = jax.ShapeDtypeStruct((CHUNK, count_climb_points(size), size), np.dtype(float))
         return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack_data([self.posterior.data], CHUNK))
 
     @cached_property
     def evaluate_points(self) -> Callable[..., Any]:
-        """`ProposedPoints` of a block of points of one data set, of each of which it is said whether it is a z."""
+        """Function that gives `ProposedPoints` of a block of points, each of them a z or a w, of one data set."""
         conditional, posterior = Conditional(self.posterior), self.posterior
         coordinate_map = conditional.map_point if conditional.has_coefficients else identity
 
@@ -172,17 +172,17 @@ class BatchPrograms:
 
     @cached_property
     def ensembles(self) -> Callable[..., Any]:
-        """A round of all walkers."""
+        """Compiled round of all walkers."""
         return compile_round(self.posterior, self.settings.sampler.n_ensembles, self.n_walkers)
 
     @property
     def threads(self) -> int:
-        """How many data sets at once."""
+        """Data sets sampled at a time."""
         return self.settings.threads or min(len(os.sched_getaffinity(0)) + 1, MOST_AT_ONCE)
 
     @property
     def n_walkers(self) -> int:
-        """Of each ensemble: enough for a covariance to be fitted to half of them, doubled until they are."""
+        """Walkers of each ensemble, doubled until a covariance can be fitted to half of them."""
         walkers = self.settings.sampler.walkers(0)
         while walkers < WALKERS_PER_PARAMETER * self.posterior.model.space.size:
             walkers *= 2
@@ -190,7 +190,7 @@ class BatchPrograms:
 
     @cached_property
     def nuts(self) -> Callable[..., Any]:
-        """NUTS of one data set."""
+        """Compiled NUTS of one data set."""
         from bowdenfit.inference.nuts import compile_nuts
 
         return compile_nuts(self.posterior, self.settings.sampler)
@@ -202,16 +202,16 @@ class BatchPrograms:
 
     @cached_property
     def friction(self) -> np.ndarray:
-        """Which are friction coefficients."""
+        """Which parameters are friction coefficients."""
         return np.array([p.role == "friction" for p in self.posterior.model.space.free], dtype=bool)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the parameters, in the order of z."""
+        """Names of the parameters, in the order of z."""
         return tuple(p.name for p in self.posterior.model.space.free)
 
 
 def stack_data(trees: Sequence[Any], count: int) -> Any:
-    """Data of several data sets, along a new first axis, and the last again up to a count."""
+    """Stack data of several data sets along a new first axis, repeating the last up to a count."""
     padded = [*trees, *[trees[-1]] * (count - len(trees))]
     return jax.tree.map(lambda *leaves: np.stack(leaves), *padded)

@@ -23,15 +23,15 @@ from bowdenfit.inference.batch.laplace import StudentMixture, start_mixture
 from bowdenfit.inference.diagnostics import Diagnostics, describe_low_ess
 from bowdenfit.inference.psis import reliable_k, smooth_weights
 
-_PRIOR_SHARE = 0.05  # of the draws about the maxima that the prior has
-_MAXIMA_SHARE = 0.1  # of learnt ones that these have
-_PARTS, _FRICTION_PARTS = 6, 2
-_WIDE, _WIDE_SHARE = 2.5, 0.2  # of one more part: by how much wider than the draws, and its share
-BLOCK = 2048  # draws at once
-_LEARNING_STEPS = 2  # proposals, one after the other
-_MOST_BLOCKS = 16  # blocks, where draws are good and not yet enough
-_LEAST_EFFICIENCY = 0.1  # effective draws a draw; of fewer, no more are drawn
-_LEAST_TO_LEARN_FROM = (
+_PRIOR_SHARE = 0.05  # share of the prior in the first proposal, which bounds the weights
+_MAXIMA_SHARE = 0.1  # share of the first proposal in learnt ones
+_PARTS, _FRICTION_PARTS = 6, 2  # components of learnt mixtures
+_WIDE, _WIDE_SHARE = 2.5, 0.2  # one more component: how much wider than the draws, and its share
+BLOCK = 2048  # draws made at a time
+_LEARNING_STEPS = 2  # proposals learnt, one after the other
+_MOST_BLOCKS = 16  # blocks drawn at most, where draws are good and more are needed
+_LEAST_EFFICIENCY = 0.1  # effective draws per draw below which drawing stops
+_LEAST_TO_LEARN_FROM = (  # effective draws needed to learn a proposal; weights are evened out until there are as many
     60  # effective draws at the least that say where to draw next; weights are made as even as that takes
 )
 _TAILS = (0.05, 0.95)
@@ -41,9 +41,9 @@ class ProposedPoints(NamedTuple):
     """The same points in two coordinates: z, and w, in which friction coefficients follow everything else.
 
     Args:
-        w, z: One point a row; 0 where one has no other.
-        log_volume: Log of the volume in z of a unit of w there; infinite where z has no w.
-        log_density: Of the posterior in z; minus infinity where there is none.
+        w, z: One point a row; 0 where a point does not exist in the other coordinates.
+        log_volume: Log of the volume in z of a unit of w; infinite where z has no w.
+        log_density: Log density of the posterior in z; minus infinity where it does not exist.
     """
 
     w: Any
@@ -54,34 +54,34 @@ class ProposedPoints(NamedTuple):
 
 @dataclass(frozen=True)
 class MaximaProposal:
-    """Student-t's in z, and the prior, a standard normal.
+    """A mixture of Student t distributions in z, and the prior, a standard normal.
 
     Args:
-        students: About the maxima.
+        students: Student t distributions about the maxima.
     """
 
     students: StudentMixture
 
     def draw(self, generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """So many points, and of each whether it is a z, and a w otherwise."""
+        """Draw points; return them and whether each is a z (True) or a w."""
         of_prior = round(_PRIOR_SHARE * count)
         prior = generator.standard_normal((of_prior, self.students.center.shape[1]))
         z = np.concatenate([prior, self.students.draw(generator, count - of_prior)])
         return z, np.ones(count, dtype=bool)
 
     def log_density(self, at: ProposedPoints) -> np.ndarray:
-        """In z."""
+        """Return the log density of the proposal in z."""
         prior = -0.5 * (np.einsum("ni,ni->n", at.z, at.z) + at.z.shape[1] * np.log(2 * np.pi))
         return np.logaddexp(self.students.log_density(at.z) + np.log1p(-_PRIOR_SHARE), prior + np.log(_PRIOR_SHARE))
 
 
 @dataclass(frozen=True)
 class LearntProposal:
-    """Student-t's in w, of friction coefficients and of everything else apart, and some draws of the first proposal.
+    """Student t mixtures in w, one of friction coefficients and one of everything else, and draws of the first proposal.
 
     Args:
-        first: About the maxima.
-        groups: Which parameters are drawn together, and from what.
+        first: The first proposal, about the maxima.
+        groups: Parameters that are drawn together, and their mixture.
     """
 
     first: MaximaProposal
@@ -109,11 +109,11 @@ Proposal: TypeAlias = MaximaProposal | LearntProposal
 
 
 def learn_proposal(previous: Proposal, w: np.ndarray, friction: np.ndarray) -> LearntProposal:
-    """A proposal nearer to a posterior.
+    """Fit a proposal that is nearer to the posterior.
 
     Args:
-        before: The one before.
-        w: Draws of the posterior, about, one a row.
+        previous: The proposal before it.
+        w: Approximate draws of the posterior, one a row.
         friction: Which parameters are friction coefficients.
     """
     first = previous.first if isinstance(previous, LearntProposal) else previous
@@ -129,12 +129,12 @@ def learn_proposal(previous: Proposal, w: np.ndarray, friction: np.ndarray) -> L
 
 @dataclass(frozen=True)
 class WeightedDraws:
-    """Weighted draws.
+    """Weighted draws of one posterior.
 
     Args:
-        w, z: One a row, in two coordinates; see `ProposedPoints`.
-        log_density: Of the posterior; minus infinity where there is no z, or no density.
-        log_proposed: Of what they were drawn from.
+        w, z: One draw a row, in two coordinates; see `ProposedPoints`.
+        log_density: Log density of the posterior; minus infinity where it does not exist.
+        log_proposed: Log density of the proposal.
     """
 
     w: np.ndarray
@@ -148,12 +148,12 @@ class WeightedDraws:
 
     @property
     def log_weights(self) -> np.ndarray:
-        """Of sum 1; minus infinity where the density cannot be computed."""
+        """Smoothed log weights, whose exponentials sum to 1; minus infinity where the density cannot be computed."""
         return np.where(np.isfinite(self.log_density), self._smooth[0], -np.inf)
 
     @property
     def pareto_k(self) -> float:
-        """Of the weights."""
+        """Pareto k of the weights."""
         return self._smooth[1]
 
     @property
@@ -162,12 +162,12 @@ class WeightedDraws:
         return self.pareto_k <= reliable_k(len(self.z))
 
     def joined_with(self, other: "WeightedDraws") -> "WeightedDraws":
-        """These and more from the same proposal."""
+        """Return these draws and more of the same proposal."""
         both = zip(*map(_fields, (self, other)), strict=True)
         return WeightedDraws(*(np.concatenate([own, more]) for own, more in both))
 
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
-        """Diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
+        """Return diagnostics by parameter; weighted draws have no R-hat and no drift (section 3.2.3 for the errors)."""
         weights = np.exp(self.log_weights)
         squares, apart = weights**2, (self.z - weights @ self.z) ** 2
         error, ends = squares @ apart, np.quantile(self.z[resample(weights, BLOCK, 0.5)], _TAILS, axis=0)
@@ -182,7 +182,7 @@ class WeightedDraws:
         }
 
     def estimate_sd_errors(self, names: tuple[str, ...]) -> dict[str, float]:
-        """Monte Carlo error of each standard deviation as a share of it (section 3.2.3, of the square deviations)."""
+        """Return relative errors of standard deviations (section 3.2.3, of the squared deviations)."""
         weights = np.exp(self.log_weights)
         squares = (self.z - weights @ self.z) ** 2
         variance = weights @ squares
@@ -190,7 +190,7 @@ class WeightedDraws:
         return dict(zip(names, errors.tolist(), strict=True))
 
     def describe_shortfalls(self, diagnostics: Mapping[str, Diagnostics], target_ess: int) -> tuple[str, ...]:
-        """What keeps the draws from being trusted, in words; empty if nothing does."""
+        """Describe why the draws should not be trusted; empty if they can be."""
         reasons = []
         if not self.is_reliable:
             reasons.append(
@@ -210,12 +210,12 @@ def _fields(of: WeightedDraws) -> tuple[np.ndarray, ...]:
 
 @dataclass(frozen=True)
 class ImportanceSampler:
-    """What is to be drawn.
+    """Importance sampling of one posterior.
 
     Args:
-        evaluate: Of `BLOCK` points, of each of which it is said whether it is a z.
+        evaluate: Function that evaluates `BLOCK` points, each of them a z (True) or a w.
         friction: Which parameters are friction coefficients.
-        enough: Whether draws are enough.
+        enough: Function that says whether draws are enough.
     """
 
     evaluate: Callable[[np.ndarray, np.ndarray], ProposedPoints]
@@ -223,11 +223,11 @@ class ImportanceSampler:
     enough: Callable[[WeightedDraws], bool]
 
     def draw_enough(self, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
-        """Draws that are enough, or as many as promise to be.
+        """Draw until the draws are enough, or until more would not help.
 
         Args:
-            first: What they are drawn from.
-            generator: Of everything random here.
+            first: The proposal.
+            generator: Random generator.
         """
         draws = self._draw_blocks(first, generator, 1)
         while _is_promising(draws) and not self.enough(draws):
@@ -235,7 +235,7 @@ class ImportanceSampler:
         return draws
 
     def draw_nearer(self, draws: WeightedDraws, first: MaximaProposal, generator: np.random.Generator) -> WeightedDraws:
-        """Draws nearer to the posterior than those found, for walkers to start at."""
+        """Return draws of learnt proposals, nearer to the posterior, for walkers to start from."""
         proposal: Proposal = first
         for _ in range(_LEARNING_STEPS):
             chosen = resample(np.exp(even_weights(draws.log_weights, _LEAST_TO_LEARN_FROM)), BLOCK, 0.5)
@@ -254,20 +254,20 @@ class ImportanceSampler:
 
 
 def _is_promising(draws: WeightedDraws) -> bool:
-    """Whether more draws from the same proposal may be enough."""
+    """Return whether more draws from the same proposal may be enough."""
     return len(draws.z) < _MOST_BLOCKS * BLOCK and effective_sample_size(draws.log_weights) >= _LEAST_EFFICIENCY * len(
         draws.z
     )
 
 
 def effective_sample_size(log_weights: np.ndarray) -> float:
-    """How many draws of equal weight weighted ones are worth."""
+    """Return how many draws of equal weight the weighted ones are worth."""
     weights = np.exp(log_weights - log_weights.max())
     return float(weights.sum() ** 2 / np.sum(weights**2))
 
 
 def even_weights(log_weights: np.ndarray, wanted: float) -> np.ndarray:
-    """Log weights of sum 1, to a power at which the draws are worth so many, where they are worth fewer."""
+    """Return log weights raised to a power at which at least `wanted` effective draws are left; their exponentials sum to 1."""
     power = 1.0
     while effective_sample_size(power * log_weights) < min(wanted, 0.5 * np.isfinite(log_weights).sum()):
         power *= 0.9
@@ -277,6 +277,9 @@ def even_weights(log_weights: np.ndarray, wanted: float) -> np.ndarray:
 
 
 def resample(weights: np.ndarray, count: int, offset: float) -> np.ndarray:
-    """Systematic, from a place between 0 and 1: every draw as often as its weight says, to less than one."""
+    """Return indices of a systematic resample: every draw as often as its weight says, to less than one.
+
+    `offset` lies between 0 and 1.
+    """
     positions = (np.arange(count) + offset) / count
     return np.minimum(np.searchsorted(np.cumsum(weights), positions), len(weights) - 1)

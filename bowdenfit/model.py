@@ -45,11 +45,11 @@ class Model(Display):
 
     @property
     def description(self) -> Description:
-        """What was said about the cable."""
+        """The description of the cable."""
         return self.cable.description
 
     def sentences(self) -> list[str]:
-        """What it is made of."""
+        """Free parameters and readings by table."""
         terms = listed([f"{len(term.labels)} of {term.name.replace('_', ' ')}" for term in self.terms])
         return [f"Model of {self.description.name}: {self.space.size} free parameters; readings: {terms}."]
 
@@ -60,7 +60,7 @@ class Model(Display):
 
 
 def build_model(dataset: Dataset) -> Model:
-    """The model of a data set.
+    """Build the model of a data set.
 
     Raises:
         DescriptionError: A curve family, contact law or parameter that the description names is unknown.
@@ -77,7 +77,7 @@ def build_model(dataset: Dataset) -> Model:
 
 
 def _build_space(cable: Cable, measurements: Measurements) -> ParameterSpace:
-    """All parameters, as the user wants them; their order is that of z."""
+    """Return all parameters as the user has set them; their order is that of z."""
     description, defaults = cable.description, PriorDefaults()
     requested = parameters_asked_for(cable, measurements)
     parameters = [
@@ -124,7 +124,7 @@ def _make_friction_parameter(description: Description, name: str, prior: LogNorm
 
 
 def _make_angle_parameters(description: Description) -> list[Parameter]:
-    """Constant wrap angles with a standard deviation: one value for all rows, so one parameter each."""
+    """Return parameters for constant wrap angles with a standard deviation: one value for all rows."""
     parameters = []
     for contact in description.contact:
         constant = contact.wrap_angle.constant
@@ -147,7 +147,7 @@ def _make_angle_parameters(description: Description) -> list[Parameter]:
 
 
 def _apply_setting(default: Parameter, setting: ParameterSetting) -> Parameter:
-    """The parameter as the user wants it; numbers are in its shown unit."""
+    """Return a parameter as the user has set it; numbers are in its shown unit."""
     parameter, scale = replace(default, scaled_by=""), default.shown_scale
     if setting.fixed is not None:
         return replace(parameter, fixed=setting.fixed / scale, prior_words="")
@@ -176,7 +176,7 @@ def _make_prior(choice: PriorChoice, scale: float) -> Prior:
 
 
 def _check_support(parameter: Parameter, choice: PriorChoice) -> None:
-    """A parameter that cannot be negative must not be given a prior that can be."""
+    """Refuse a prior that can be negative for a parameter that cannot."""
     may_be_negative = choice.normal is not None or (choice.uniform is not None and choice.uniform.low < 0)
     if may_be_negative and not isinstance(parameter.prior, Normal):
         raise DescriptionError(

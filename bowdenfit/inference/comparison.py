@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from scipy.optimize import minimize
 
 from bowdenfit.inference.psis import RELIABLE_K, weighted_elpd
 
@@ -135,8 +136,6 @@ def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, floa
         Yao, Vehtari, Simpson and Gelman 2018, "Using stacking to average Bayesian predictive distributions" (Bayesian
         Analysis 13), equation 5.
     """
-    from scipy.optimize import minimize
-
     elpd = np.column_stack([p.elpd for p in predictions.values()])
     density = np.exp(elpd - elpd.max(axis=1, keepdims=True))
     n = len(predictions)
@@ -146,8 +145,8 @@ def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, floa
         return -float(np.mean(np.log(mixed))), -np.mean(density / mixed[:, None], axis=0)
 
     whole = {"type": "eq", "fun": lambda w: np.sum(w) - 1, "jac": np.ones_like}
-    found = minimize(
+    optimum = minimize(
         loss, np.full(n, 1 / n), jac=True, method="SLSQP", bounds=[(0, 1)] * n, constraints=[whole], tol=1e-10
     )
-    weights = np.clip(found.x, 0.0, 1.0)
+    weights = np.clip(optimum.x, 0.0, 1.0)
     return {name: float(w) for name, w in zip(predictions, weights / weights.sum(), strict=True)}

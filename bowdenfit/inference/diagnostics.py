@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -55,8 +56,6 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
         Vehtari et al. 2021, "Rank-normalization, folding, and localization" (Bayesian Analysis 16); Margossian et al.
         2024, "Nested R-hat" (Bayesian Analysis).
     """
-    from arviz_stats.base import array_stats
-
     if not np.all(np.isfinite(draws)):
         return Diagnostics(np.nan, 0.0, 0.0, np.nan, np.nan)
     if np.ptp(draws) == 0.0:  # a quantity that cannot vary, such as an optimum always at the edge
@@ -67,12 +66,19 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # ties of an optimum at the edge divide by zero inside
         return Diagnostics(
-            max(float(array_stats.rhat_nested(s, superchain_ids=superchains, method="split", **axes)) for s in scores),
-            float(array_stats.ess(as_chains(scores[0], n_ensembles), method="mean", **axes)),
-            float(array_stats.ess(chains, method="tail", prob=(0.05, 0.95), **axes)),
-            float(array_stats.mcse(chains, method="mean", **axes)),
+            max(float(array_stats().rhat_nested(s, superchain_ids=superchains, method="split", **axes)) for s in scores),
+            float(array_stats().ess(as_chains(scores[0], n_ensembles), method="mean", **axes)),
+            float(array_stats().ess(chains, method="tail", prob=(0.05, 0.95), **axes)),
+            float(array_stats().mcse(chains, method="mean", **axes)),
             _measure_drift(scores[0]),
         )
+
+
+def array_stats() -> Any:
+    """Return ArviZ's statistics of arrays, imported when first needed because ArviZ takes a second to load."""
+    from arviz_stats.base import array_stats as functions
+
+    return functions
 
 
 def normal_scores(draws: np.ndarray) -> np.ndarray:
@@ -81,10 +87,9 @@ def normal_scores(draws: np.ndarray) -> np.ndarray:
     References:
         Vehtari et al. 2021, equation 14, with Blom's offset of 3/8.
     """
-    from scipy.special import ndtri
-    from scipy.stats import rankdata
+    from scipy import special, stats  # as long as ArviZ to load
 
-    return np.asarray(ndtri((rankdata(draws) - 3 / 8) / (draws.size + 1 / 4))).reshape(draws.shape)
+    return np.asarray(special.ndtri((stats.rankdata(draws) - 3 / 8) / (draws.size + 1 / 4))).reshape(draws.shape)
 
 
 def as_chains(draws: np.ndarray, n_ensembles: int) -> np.ndarray:
@@ -182,11 +187,9 @@ def compute_energy_mixing(energy: np.ndarray) -> float:
     References:
         Betancourt 2016, "Diagnosing suboptimal cotangent disintegrations in Hamiltonian Monte Carlo" (arXiv:1604.00695).
     """
-    from arviz_stats.base import array_stats
-
     if not np.all(np.isfinite(energy)) or np.any(np.ptp(energy, axis=1) == 0):
         return float("nan")
-    return float(np.min(array_stats.bfmi(energy, chain_axis=0, draw_axis=1)))
+    return float(np.min(array_stats().bfmi(energy, chain_axis=0, draw_axis=1)))
 
 
 def describe_trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...]:

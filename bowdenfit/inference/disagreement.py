@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc, fdtrc, ndtri
 
 from bowdenfit.inference.linearized import estimate_scatter
 from bowdenfit.inference.scalar_priors import value_at
@@ -110,8 +111,6 @@ def _assess_move(
     best: np.ndarray,
 ) -> Disagreement | None:
     """Return what a move means; None where the table shares no information with any other table."""
-    from scipy.special import chdtrc, fdtrc, ndtri
-
     covariance_of_others = np.linalg.inv(information_of_others)
     allowed = np.diag(covariance_of_others) - np.diag(covariance)
     # In units of what the rest leaves open, directions that the table says nothing of have no variance.

@@ -22,6 +22,7 @@ from concurrent.futures import (
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, distribution
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -330,8 +331,6 @@ def _library_missing_error(library: str) -> UsageError:
 @cache
 def versions() -> dict[str, str]:
     """Return versions of bowdenfit, Python and the libraries that compute."""
-    from importlib.metadata import PackageNotFoundError, distribution
-
     def version_of(package: str) -> str:
         try:
             installed = distribution(package)

@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.special import fdtrc, stdtr
 
 from bowdenfit.inference.departure import FALSE_ALARM, Departure, FarReading
 from bowdenfit.inference.objective import Solution
@@ -94,8 +95,6 @@ def _find_far_readings(system: ResidualGroups) -> tuple[FarReading, ...]:
 
     Readings inside runs are left out, because their noise may grow with the load.
     """
-    from scipy.special import stdtr
-
     whole = [r for r in system.readings if not r.inside and r.freedom >= _LEAST_OUTLIER_FREEDOM]
     far_readings, among = [], sum(int(np.sum(readings.used)) for readings in whole)
     for readings in whole:
@@ -174,8 +173,6 @@ def _departure_columns(against: str, x: np.ndarray, selected: np.ndarray, of_cur
 
 def _test_columns(system: ResidualGroups, readings: ResidualGroup, columns: np.ndarray) -> tuple[float, float] | None:
     """Return the p-value of a departure and its size; None where it cannot be tested."""
-    from scipy.special import fdtrc
-
     whole = np.zeros((len(system.residuals), columns.shape[1]))
     whole[readings.rows] = columns / (readings.unit * readings.scatter)[:, None]
     whole /= np.maximum(np.linalg.norm(whole, axis=0), 1e-300)

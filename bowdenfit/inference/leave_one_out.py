@@ -1,4 +1,4 @@
-"""Leave-one-out with what importance sampling cannot do done otherwise: moment matching, then a fit without the reading."""
+"""Leave-one-out cross-validation: importance sampling, where that fails moment matching, and then a fit without the reading."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,27 +19,28 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import maps_without_ridge
 from bowdenfit.inference.diagnostics import Diagnostics, diagnose_all
 from bowdenfit.inference.draws import run_in_batches
+from bowdenfit.inference.ensemble import sample
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.psis import match_moments, reliable_k, smooth_weights
 from bowdenfit.inference.walkers import WalkerPrograms, compile_density_walkers
 from bowdenfit.kinds.run_parts import RunParts
 
-# A refit is asked for one number, to a few hundredths: fewer walkers than for the answers of a fit.
+# A refit computes one number to a few hundredths, so it needs fewer walkers than a fit.
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
 _RATIO = "likelihood"
-_ROWS = 128  # that a compiled program takes at once
-_LARGEST_ERROR = 0.3  # Monte Carlo error of a log density beyond which it is called rough
+_ROWS = 128  # draws that a compiled program takes at a time
+_LARGEST_ERROR = 0.3  # Monte Carlo error of an elpd beyond which it is called rough
 
 
 @dataclass(frozen=True)
 class LooDensity:
-    """The readings of a posterior, any of which may be left out of its density; compiled once for all of them.
+    """Posterior density from which any one reading can be left out; compiled once for all readings.
 
     Args:
         posterior: The posterior.
-        settings: Of the fits without a reading.
-        parts: Parts of runs that stand in for the readings of a term, by its name.
+        settings: Sampler settings of the fits without a reading.
+        parts: Parts of runs that take the place of a term's readings, by name of the term.
     """
 
     posterior: LogDensity
@@ -55,7 +56,7 @@ class LooDensity:
     def _reading_likelihoods(
         self, z: Float[Array, " free"], data: Any, without: Any
     ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
-        """Log likelihood of everything, and of each reading given all others of its mounting."""
+        """Return the log likelihood of all data, and of each reading given all others of its mounting."""
         values, by_term = self.posterior.model.space.constrain(z), self.posterior.log_likelihoods(z, data)
         readings = []
         for term in self.posterior.model.terms:
@@ -72,7 +73,7 @@ class LooDensity:
 
     @property
     def refits(self) -> SamplerSettings:
-        """Settings, with more than twice as many walkers as there are parameters."""
+        """Sampler settings with more than twice as many walkers as parameters."""
         size = self.posterior.model.space.size
         walkers = max(self.settings.walkers(size), WALKERS_PER_PARAMETER * size)
         return self.settings.model_copy(update={"n_walkers": walkers})
@@ -80,7 +81,7 @@ class LooDensity:
     def _density(
         self, z: Float[Array, " free"], arguments: tuple[Any, Any, Float[Array, " readings"]]
     ) -> tuple[Float[Array, ""], Float[Array, " readings"]]:
-        """Log density of what is counted, and log likelihood of every reading."""
+        """Return the log density without the readings that are left out, and the log likelihood of every reading."""
         data, without, counts = arguments
         everything, readings = self._reading_likelihoods(z, data, without)
         total = everything - jnp.sum(jnp.where(counts > 0, 0.0, readings)) - 0.5 * jnp.sum(z**2)
@@ -93,7 +94,7 @@ class LooDensity:
 
     @cached_property
     def programs(self) -> WalkerPrograms:
-        """Of fits without any of the readings."""
+        """Compiled walkers of fits without a reading."""
         space = self.posterior.model.space
         arguments, frames = self.data_without(None), maps_without_ridge(space)
         return compile_density_walkers(
@@ -101,15 +102,15 @@ class LooDensity:
         )
 
     def data_without(self, reading: int | None) -> tuple[Any, Any, np.ndarray]:
-        """Data of the density without a reading, or with all."""
+        """Return data of the density without one reading, or with all."""
         counts = np.array([float(i != reading) for i in range(len(self.names))])
         return self.posterior.data, {name: parts.data for name, parts in self.parts.items()}, counts
 
     def evaluate(self, z: np.ndarray, without: int | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Log posterior density, up to a constant, and log likelihood of every reading, at any number of z (rows).
+        """Return the log posterior density, up to a constant, and log likelihoods of all readings, at any number of z (rows).
 
         Args:
-            z: Where.
+            z: Points, one a row.
             without: Position of a reading that the density leaves out; none if omitted.
         """
         arguments = self.data_without(without)
@@ -119,13 +120,13 @@ class LooDensity:
 
 @dataclass(frozen=True)
 class LooRefits:
-    """Draws of the posterior with all readings, and what finds out how it predicts one of them without it.
+    """Draws of the posterior with all readings, and how to predict one reading without it.
 
     Args:
-        readings: The readings.
+        density: Density from which readings can be left out.
         z: The draws, one a row.
-        each: Log likelihood of every reading at every draw, (draw, reading).
-        share: Effective draws a draw.
+        log_likelihood: Log likelihood of every reading at every draw, (draw, reading).
+        share: Effective draws per draw.
         seed: Seed of the refits.
     """
 
@@ -136,7 +137,7 @@ class LooRefits:
     seed: int
 
     def predict_without(self, reading: int, limit: float) -> tuple[float, float, LooMethod]:
-        """Expected log density of a reading whose importance weights fail, its Monte Carlo error, and how it was found.
+        """Return the elpd of a reading whose importance weights fail, its Monte Carlo error, and the method used.
 
         Args:
             reading: Its position.
@@ -154,7 +155,7 @@ class LooRefits:
         return elpd, error, "refit" if converged else "rough"
 
     def refit_without(self, reading: int) -> tuple[float, float, bool]:
-        """Expected log density of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
+        """Return the elpd of a reading by a fit without it, its Monte Carlo error, and whether that fit converged."""
         top = float(np.max(self.log_likelihood[:, reading]))
 
         def likelihood(z: np.ndarray) -> dict[str, np.ndarray]:
@@ -168,14 +169,12 @@ class LooRefits:
     def chain_without(
         self, reading: int, quantities: Callable[[np.ndarray], Mapping[str, np.ndarray]] = lambda _: {}
     ) -> Chain:
-        """Draws of a fit without a reading.
+        """Return draws of a fit without one reading.
 
         Args:
             reading: Its position.
-            quantities: Of many z, which must converge too.
+            quantities: Derived quantities at many z, which must converge too.
         """
-        from bowdenfit.inference.ensemble import sample
-
         density = self.density
         weights = np.exp(smooth_weights(-self.log_likelihood[:, reading], self.share)[0])
         start = MaximumPosterior(weights @ self.z, np.atleast_2d(np.cov(self.z.T)))
@@ -195,18 +194,18 @@ def leave_one_out(
     wanted: Sequence[int] | None = None,
     report: Callable[[str], None] = lambda _: None,
 ) -> LooPrediction:
-    """Leave-one-out, with readings whose importance weights cannot be trusted treated one by one.
+    """Compute leave-one-out; readings whose importance weights cannot be trusted are treated one by one.
 
-    Pareto k above the limit calls for moment matching; where that does not bring it down, the model is fitted again
-    without the reading. What even that cannot settle is called rough.
+    Where Pareto k exceeds its limit, moments are matched; where that does not bring it down, the model is fitted again without
+    the reading. If that fit does not converge, the result is called rough.
 
     Args:
-        readings: The readings of the posterior.
-        z: Its draws, (chain, draw, parameter).
-        log_likelihood: Of every reading by table, (chain, draw, reading).
+        density: Density from which readings can be left out.
+        z: Draws of the posterior, (chain, draw, parameter).
+        log_likelihood: Log likelihood of every reading by table, (chain, draw, reading).
         n_effective: Effective number of the draws.
         seed: Seed of the refits.
-        wanted: Positions of the readings in question among `readings.names`; all if omitted.
+        wanted: Positions of the readings in question among `density.names`; all if omitted.
         report: Called with a sentence before each reading that takes longer.
     """
     if density.parts:
@@ -226,5 +225,5 @@ def leave_one_out(
 
 
 def _diagnose_without_drift(draws: Mapping[str, np.ndarray], n_ensembles: int) -> dict[str, Diagnostics]:
-    """Diagnostics without drift, which cannot be told from chance with as few effective draws as a refit needs."""
+    """Return diagnostics without drift, which cannot be measured with the few effective draws of a refit."""
     return {name: replace(diagnostics, drift=0.0) for name, diagnostics in diagnose_all(draws, n_ensembles).items()}

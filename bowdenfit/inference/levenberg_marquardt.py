@@ -1,12 +1,11 @@
 """Levenberg-Marquardt composed of optimistix's parts: a descent that scales parameters, and a search by MINPACK's rules.
 
-Optimistix's own method damps all parameters alike, and ends where a step changes little, which every heavily damped step does.
-Here a step is damped in units of each parameter's own column, and no longer than a radius; the radius follows how well the
-last step did; and the end is where little is left of the residuals along the tangent plane.
+Optimistix's own method damps all parameters alike, and stops when a step changes little, as every heavily damped step does.
+Here a step is damped in units of each parameter's column and limited by a trust radius, which adapts to the success of the last
+step; the solve ends when little is left of the residuals along the tangent plane.
 
-The model is no part of the program: who steps the solver evaluates it, and a linear function with the same residuals and
-Jacobian at that point takes its place, which is all that a step asks for. So one small program of the shapes alone serves
-every model.
+The model is not part of the compiled program: the caller evaluates it, and a linear function with the same residuals and
+Jacobian takes its place, which is all that a step needs. So one small program of the shapes alone serves every model.
 
 References:
     Moré, The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630 (1978), 105.
@@ -27,16 +26,16 @@ from jax import Array
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.padding import rounded_up
 
-_SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
-_UNCOMPUTABLE = 1e100  # stands for a residual that cannot be computed, so that no step goes there
-_BISECTIONS = 40
-_LONGER = 1.1  # an undamped step may be longer than the radius by this factor
-_ACCEPTED = 1e-4  # part of the predicted fall of the sum of squares that a step must reach
+_SINGULAR = 1e-13  # relative size of scaled singular values below which a direction takes no step
+_UNCOMPUTABLE = 1e100  # replaces a residual that cannot be computed, so that no step goes there
+_BISECTIONS = 40  # of the damping, on a logarithmic scale
+_LONGER = 1.1  # factor by which an undamped step may exceed the radius
+_ACCEPTED = 1e-4  # part of the predicted decrease of the sum of squares that a step must reach
 _SUCCESS: Any = optx.RESULTS.successful
 
 
 class _Tangent(eqx.Module):
-    """The tangent plane: sizes of its columns, singular values of the scaled ones, and what of the residuals lies along."""
+    """The tangent plane: column norms, singular values of the scaled Jacobian, directions, and residuals along them."""
 
     size: Array
     singular: Array
@@ -45,15 +44,15 @@ class _Tangent(eqx.Module):
 
 
 class ScaledDescent(optx.AbstractDescent):
-    """Damped steps up to a length to which each parameter counts by the largest size that its column has had."""
+    """Damped steps of limited length, in which each parameter is scaled by the largest norm that its column has had."""
 
     def init(self, y: Array, f_info_struct: Any) -> _Tangent:
-        """Nothing yet."""
+        """Return an empty state."""
         rank = min(len(f_info_struct.residual), len(y))
         return _Tangent(jnp.zeros_like(y), jnp.zeros(rank), jnp.zeros((rank, len(y))), jnp.zeros(rank))
 
     def query(self, y: Array, f_info: Any, state: _Tangent) -> _Tangent:  # noqa: ARG002
-        """Singular values at an accepted point, after which a step of any radius is a division."""
+        """Compute singular values at an accepted point; a step of any radius is then a division."""
         jacobian = f_info.jac.as_matrix()
         size = _largest_norms(jacobian, state.size)
         left, singular, directions = jnp.linalg.svd(_scaled(jacobian, size), full_matrices=False)
@@ -63,7 +62,7 @@ class ScaledDescent(optx.AbstractDescent):
         )
 
     def step(self, step_size: Array, state: _Tangent) -> tuple[Array, Any]:
-        """The undamped step, or where that is too long the one that is damped to the radius."""
+        """Return the undamped step, or where it is too long the step that is damped to the radius."""
         slope = state.singular * state.along
 
         def damped(by: Array | float) -> Array:
@@ -81,7 +80,7 @@ class ScaledDescent(optx.AbstractDescent):
 
 
 class _Radius(eqx.Module):
-    """How long the next step may be, and by which parts the last one was to lower the sum of squares, and did."""
+    """Trust radius of the next step, and the predicted and actual relative decrease of the last."""
 
     radius: Array
     size: Array
@@ -90,22 +89,22 @@ class _Radius(eqx.Module):
 
 
 class RadiusSearch(optx.AbstractSearch):
-    """MINPACK's rules for the radius, with both changes of the sum of squares computed so that nothing cancels.
+    """MINPACK's rules for the trust radius, with both decreases computed without cancellation.
 
     Args:
-        first: Radius of the first step, as part of the length of the scaled parameters.
+        first: Radius of the first step, relative to the norm of the scaled parameters.
     """
 
     first: Any
 
     def init(self, y: Array, f_info_struct: Any) -> _Radius:  # noqa: ARG002
-        """Nothing yet."""
+        """Return an empty state."""
         return _Radius(jnp.ones(()), jnp.zeros_like(y), jnp.ones(()), jnp.ones(()))
 
     def step(
         self, first_step: Array, y: Array, y_eval: Array, f_info: Any, f_eval_info: Any, state: _Radius
     ) -> tuple[Array, Array, Any, _Radius]:
-        """Whether to go there, and how far to go next."""
+        """Return the next radius, and whether the step is accepted."""
         before, after, moved = f_info.residual, f_eval_info.residual, y_eval - y
         linear, total = f_info.jac.mv(moved), jnp.maximum(before @ before, 1e-300)
         slope = linear @ before / total
@@ -126,12 +125,12 @@ class RadiusSearch(optx.AbstractSearch):
 
 
 class LevenbergMarquardt(optx.AbstractGaussNewton):
-    """Both, to an end by the gradient, or where neither parameters nor the sum of squares change any more.
+    """The solver: ends by the gradient, or when neither parameters nor the sum of squares change any more.
 
     Args:
-        change: Relative change of parameters and of the sum of squares that is none.
-        gradient: Part of the residuals along the tangent plane that is none.
-        radius: Of the first step, as part of the length of the scaled parameters.
+        change: Relative change of parameters and of the sum of squares that counts as none.
+        gradient: Share of the residuals along the tangent plane that counts as none.
+        radius: Radius of the first step, relative to the norm of the scaled parameters.
     """
 
     rtol: Any
@@ -146,7 +145,7 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
         self.descent, self.search = ScaledDescent(), RadiusSearch(radius)
 
     def terminate(self, fn: Any, y: Array, args: Any, options: Any, state: Any, tags: Any) -> tuple[Array, Any]:  # noqa: ARG002
-        """Whether this is the end."""
+        """Return whether the solve has ended."""
         last = state.search_state
         smooth = _norm(state.descent_state.along) <= self.atol * _norm(state.f_info.residual)
         flat = (jnp.abs(last.actual) <= self.rtol) & (last.predicted <= self.rtol) & (last.actual <= 2 * last.predicted)
@@ -156,11 +155,11 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
 
 @cache
 def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
-    """The compiled step of a solve, and its state before the first.
+    """Compile the step of a solve; return it and the initial state.
 
-    A step takes what the solver does, whether it is the first, the accepted parameters, the state, and residuals
-    and Jacobian where the step before has asked for them; it gives the accepted parameters, the state, where to evaluate
-    next, and whether this is the end. Rows of zeros, which change nothing, let one program serve many tables.
+    A step takes the solver's settings, whether it is the first, the accepted parameters, the state, and residuals and Jacobian
+    at the point that the last step returned. It returns the accepted parameters, the state, the next point to evaluate, and
+    whether the solve has ended. Padding with rows of zeros, which change nothing, lets one program serve many tables.
     """
     (program, state), more = _compile_step(rounded_up(rows), columns), rounded_up(rows) - rows
     none, flat = np.zeros(more), np.zeros((more, columns))
@@ -173,7 +172,7 @@ def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[n
 
 @cache
 def _compile_step(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
-    """The same of so many rows."""
+    """Compile the step for a padded number of rows."""
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))
     flag, settings = jax.ShapeDtypeStruct((), jnp.bool_), (number, number, number)
     state = jax.eval_shape(lambda *arguments: _array_leaves(_initialize(*arguments)[2]), settings, *arrays)
@@ -184,7 +183,7 @@ def _compile_step(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.
 def _step(
     settings: tuple[Array, ...], first: Array, y: Array, leaves: list[Array], residuals: Array, jacobian: Array
 ) -> tuple[Array, list[Array], Array, Array]:
-    """One step of the solver."""
+    """Take one step of the solver."""
     solver, linear, state = _initialize(settings, y, residuals, jacobian)
     tree, static = jax.tree.structure(eqx.filter(state, eqx.is_array)), eqx.filter(state, eqx.is_array, inverse=True)
     held = [jnp.where(first, *pair) for pair in zip(_array_leaves(state), leaves, strict=True)]
@@ -195,7 +194,7 @@ def _step(
 
 
 def _initialize(settings: tuple[Array, ...], y: Array, residuals: Array, jacobian: Array) -> tuple[Any, Any, Any]:
-    """The solver, the linear function in the model's place, and the state before the first step."""
+    """Return the solver, the linear function in the model's place, and the initial state."""
     values = jnp.where(jnp.isfinite(residuals), residuals, _UNCOMPUTABLE)
     slopes = jnp.where(jnp.isfinite(jacobian), jacobian, 0.0)
 
@@ -207,17 +206,17 @@ def _initialize(settings: tuple[Array, ...], y: Array, residuals: Array, jacobia
 
 
 def _array_leaves(state: Any) -> list[Array]:
-    """What of a state changes from step to step."""
+    """Return the arrays of a state."""
     return jax.tree.leaves(eqx.filter(state, eqx.is_array))
 
 
 def _largest_norms(jacobian: Array, before: Array) -> Array:
-    """The largest length that each column has had."""
+    """Return the largest norm that each column has had."""
     return jnp.maximum(before, jnp.sqrt(jnp.sum(jacobian**2, axis=0)))
 
 
 def _scaled(x: Array, size: Array) -> Array:
-    """Over the sizes of columns; zero where a column has always been."""
+    """Divide by the norms of columns; zero where a column has always been zero."""
     return x / jnp.where(size > 0, size, jnp.inf)
 
 
@@ -226,4 +225,4 @@ def _norm(x: Array) -> Array:
 
 
 def _silent(**_: Any) -> None:
-    """What the solver would print."""
+    """Print nothing."""

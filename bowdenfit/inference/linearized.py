@@ -1,4 +1,4 @@
-"""What the Jacobian and the residuals at a minimum say: which parameters the readings determine, and how readings scatter."""
+"""Linearization about a least-squares minimum: which parameters the readings determine, leverage, and scatter."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,9 +8,10 @@ import numpy as np
 from bowdenfit.inference.solver import orthogonalize
 from bowdenfit.kinds.term import Term
 
-_SINGULAR = 1e-8  # singular values below this fraction of the largest carry no information
+_SINGULAR = 1e-8  # relative singular value below which a direction carries no information
 _LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of a table cannot be estimated
-_LEAST_LEVERAGE = 1e-6  # leverage from which a residual is that of a reading
+# leverage from which a zero residual belongs to a reading that is fitted exactly, not to a bound that holds
+_LEAST_LEVERAGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -18,10 +19,10 @@ class Linearized:
     """The least-squares problem about its minimum.
 
     Args:
-        readings: Orthonormal columns: the directions of the readings that move parameters.
-        parameters: How far a unit error along each of those moves the parameters.
-        determined: Whether the readings determine a parameter.
-        condition_number: Of the Jacobian; infinite where a direction is undetermined.
+        readings: Orthonormal columns: directions of the readings that move parameters.
+        parameters: Change of the parameters by a unit error along each of those directions.
+        determined: Whether the readings determine each parameter.
+        condition_number: Condition number of the Jacobian; infinite where a direction is undetermined.
     """
 
     readings: np.ndarray
@@ -31,21 +32,21 @@ class Linearized:
 
     @property
     def leverage(self) -> np.ndarray:
-        """How much each reading decides about its own fit, 0 to 1."""
+        """Leverage of each reading, 0 to 1."""
         return np.sum(self.readings**2, axis=1)
 
     @property
     def unit_error(self) -> np.ndarray:
-        """Standard errors of the parameters by readings of unit scatter."""
+        """Standard errors of the parameters if readings have unit scatter."""
         return np.linalg.norm(self.parameters, axis=1)
 
     def moves(self, scale: np.ndarray) -> np.ndarray:
-        """How far each reading moves each parameter by one standard deviation of its scatter."""
+        """Return how far one standard deviation of each reading's scatter moves each parameter."""
         return self.parameters @ (self.readings.T * scale)
 
 
 def linearize(jacobian: np.ndarray) -> Linearized:
-    """The problem about its minimum: by QR, or by singular values where these find directions undetermined."""
+    """Linearize the problem: by QR, or by singular values where these find directions undetermined."""
     rows, n = jacobian.shape
     if n == 0:
         return Linearized(np.zeros((rows, 0)), np.zeros((0, 0)), np.zeros(0, dtype=bool), 1.0)
@@ -61,7 +62,7 @@ def linearize(jacobian: np.ndarray) -> Linearized:
 def estimate_scatter(
     terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
 ) -> tuple[np.ndarray, dict[str, float]]:
-    """Scatter of the standardized residuals about the fit: for each residual, and by table (of its first block)."""
+    """Return the scatter of the standardized residuals: for each residual, and by table (of its first block)."""
     scale = np.ones(len(leverage))
     by_table: dict[str, float] = {}
     for name, rows, values, freedom in iterate_blocks(terms, residuals, leverage):
@@ -74,10 +75,10 @@ def estimate_scatter(
 def iterate_blocks(
     terms: Sequence[Term], residuals: Mapping[str, np.ndarray], leverage: np.ndarray
 ) -> Iterator[tuple[str, slice, np.ndarray, float]]:
-    """Table, rows, residuals and degrees of freedom of every block of residuals that scatter alike.
+    """Yield table, rows, residuals and degrees of freedom of every block of residuals with a common scatter.
 
-    A block whose residuals are all used up by parameters has no scatter of its own; its weight stands, to infinitely many
-    degrees of freedom.
+    A block without spare degrees of freedom has no scatter of its own; its prior weight is used, with infinitely many degrees
+    of freedom.
     """
     start = 0
     for term in terms:

@@ -15,14 +15,14 @@ from bowdenfit.model import Model
 
 @dataclass(frozen=True)
 class LogDensity:
-    """Log density and residuals of one model; least squares and every sampler use this same object.
+    """Log density and residuals of one model, used by least squares and every sampler.
 
     Data are arguments of its functions, not constants inside them, so that other data of the same shape need no new
     compilation. Needs 64-bit floats: `jax.enable_x64(True)`.
 
     Args:
         model: The model.
-        given: Data of all terms in place of the model's own, of the same shapes.
+        data_override: Data of all terms in place of the model's own, of the same shapes.
     """
 
     model: Model
@@ -42,32 +42,32 @@ class LogDensity:
 
     @cached_property
     def padded(self) -> tuple[dict[str, Any], ...]:
-        """The same data in shapes that hardly depend on what was read, for one program to serve many tables.
+        """Data padded to shapes that hardly depend on the number of readings, so that one program serves many tables.
 
-        The log density is the same to rounding; what is said of single readings and residuals has other places.
+        The log density is the same to rounding; single readings and residuals stand at other positions.
         """
         return tuple(getattr(term, "padded", term.data) for term in self.model.terms)
 
     def values(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
-        """Named values of all parameters [internal units] at z; `data` may say more than the model of them."""
+        """Return named values of all parameters [internal units] at z; a subclass may scale them by `data`."""
         del data
         return self.model.space.constrain(z)
 
     def log_likelihoods(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
-        """Log likelihood of every reading, by term."""
+        """Return the log likelihood of every reading, by term."""
         values = self.values(z, data)
         return {t.name: t.log_likelihood(values, d) for t, d in zip(self.model.terms, data, strict=False)}
 
     def log_density(self, z: Float[Array, " free"], data: Any) -> Float[Array, ""]:
-        """Log posterior density in z, up to the evidence; minus infinity where it cannot be computed."""
+        """Return the log posterior density in z, up to the evidence; minus infinity where it cannot be computed."""
         log_prior = -0.5 * jnp.sum(z**2 + jnp.log(2 * jnp.pi))
         total = log_prior + sum(jnp.sum(term) for term in self.log_likelihoods(z, data).values())
         return jnp.where(jnp.isnan(total), -jnp.inf, total)
 
     def residuals(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
-        """Standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
+        """Return standardized residuals by term; half their sum of squares is minus log likelihood, up to a constant."""
         return self.residuals_at(self.values(z, data), data)
 
     def residuals_at(self, values: Mapping[str, Array], data: Any) -> dict[str, Array]:
-        """The same at named values of all parameters [internal units]."""
+        """Return standardized residuals by term at named values of all parameters [internal units]."""
         return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}

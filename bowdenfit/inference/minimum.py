@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtrit
 
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.inference.linearized import Linearized, estimate_scatter, linearize
@@ -21,29 +22,30 @@ from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.parameters.priors import HalfCauchy, Uniform
 from bowdenfit.parameters.space import Parameter
 
-_NEAR_END = -2.0  # below this z an estimate may be on its way to the lower end, above its negative to the upper
-_FAR = 50.0  # standard error in units of the prior's sd beyond which data say nothing of a parameter
+_NEAR_END = -2.0  # z below which an estimate may run to the lower end of its range, and above its negative to the upper
+# standard error, relative to the prior's standard deviation, beyond which data carry no information about a parameter
+_FAR = 50.0
 _MOST_FOLLOWED = 3  # times that a profile is followed to a lower minimum
-_RESTARTS = 12  # from which the solver starts again where it is stuck
-_FARTHEST_RESTART = 1.0  # of each from there [z]
+_RESTARTS = 12  # further starts where the solver is stuck
+_FARTHEST_RESTART = 1.0  # largest change of each z at such a start
 PINS = (-2.5, 2.5)  # z at which a parameter is pinned
-_AS_WELL = 0.97725  # probability up to which a deviation counts as chance: two standard errors of a normal reading
-_EXACT = 1e-6  # scatter of readings that fit without any
-_APART = 4.0  # standard errors beyond which it is another answer; were the errors normal, 2 could not be passed
+_AS_WELL = 0.97725  # probability below two standard errors of a normal: a rival within it fits about as well
+_EXACT = 1e-6  # scatter assigned to readings that are fitted exactly
+_APART = 4.0  # standard errors beyond which a rival is another solution; normal errors would not exceed 2
 
 
 @dataclass(frozen=True)
 class LocalMinimum:
-    """A minimum, and what residuals and Jacobian say there.
+    """A minimum with its linearization.
 
     Args:
         basin: The minimum.
-        about: Its Jacobian by what is free and at no end.
-        active: Which parameters these are.
+        linearized: Linearization by parameters that are free and not at an end of their range.
+        active: Positions of these parameters.
         scale: Scatter of each standardized residual.
-        residual_sd: The same by table.
-        error: Standard errors of z; not numbers at an end.
-        determined: Whether readings determine a parameter.
+        residual_sd: Scatter by table.
+        error: Standard errors of z; NaN at an end of the range.
+        determined: Whether readings determine each parameter.
     """
 
     basin: Basin
@@ -56,12 +58,12 @@ class LocalMinimum:
 
     @property
     def is_stuck(self) -> bool:
-        """Whether another start is worth its time: the table that scatters least would limit a parameter by not much more."""
+        """Whether a further start is worthwhile, judged by the table that scatters least."""
         return is_stuck(self.basin.solution["fall"], (NORMAL_90 * float(np.min(self.scale, initial=1.0))) ** 2)
 
 
 def find_lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) -> tuple[LocalMinimum, ProfileIntervals]:
-    """The minimum and its limits, if `intervals`; where a profile leads to a lower one it is followed there."""
+    """Find the minimum and, if `intervals`, its profile intervals; where a profile leads to a lower minimum, follow it."""
     minimum = _find_minimum(problem, start)
     if not intervals:
         return minimum, ProfileIntervals()
@@ -75,7 +77,7 @@ def find_lowest_minimum(problem: Problem, start: np.ndarray, intervals: bool) ->
 
 
 def _find_minimum(problem: Problem, start: np.ndarray) -> LocalMinimum:
-    """The minimum; where the solver is stuck, the lowest that it finds from where other scatter would have led it."""
+    """Solve from a start; where the solver is stuck, solve from further starts and return the lowest minimum."""
     minimum = _describe_minimum(_reweigh(_solve_to_minimum(problem, start)))
     if not minimum.is_stuck:
         return minimum
@@ -96,6 +98,7 @@ def _find_minimum(problem: Problem, start: np.ndarray) -> LocalMinimum:
 
 
 def _describe_minimum(basin: Basin) -> LocalMinimum:
+    """Linearize about a minimum; return it with scatter and standard errors."""
     solution = basin.solution
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
     linearized = linearize(solution["jacobian"][:, active])
@@ -111,7 +114,7 @@ def _describe_minimum(basin: Basin) -> LocalMinimum:
 
 
 def _solve_to_minimum(problem: Problem, start: np.ndarray) -> Basin:
-    """The minimum without priors, and which parameters have run to an end of their range there."""
+    """Solve without priors; return the minimum and which parameters have run to an end of their range."""
     parameters, n = problem.posterior.model.space.free, len(start)
     pin, at_end, solution = np.zeros(n), np.zeros(n, dtype=bool), problem.solve(start)
     for i in np.flatnonzero(_may_be_at_end(parameters, solution["z"]) & ~problem.noise):
@@ -130,9 +133,9 @@ def _solve_to_minimum(problem: Problem, start: np.ndarray) -> Basin:
 
 
 def _reweigh(basin: Basin) -> Basin:
-    """The minimum with the noise scales that single readings of a run each tell; the same where there are no such runs.
+    """Solve again with noise scales estimated from single readings of runs; unchanged where there are no such runs.
 
-    Their prior medians say how much more readings scatter at low loads than at high ones, which nothing else corrects.
+    Otherwise their prior medians would decide how much more readings scatter at low loads than at high ones.
     """
     problem, space = basin.problem, basin.problem.posterior.model.space
     values = dict(zip((p.name for p in space.free), basin.solution["values"], strict=True))
@@ -154,22 +157,20 @@ def _reweigh(basin: Basin) -> Basin:
 
 
 def _may_be_at_end(parameters: tuple[Parameter, ...], z: np.ndarray) -> np.ndarray:
-    """Which parameters may be on their way to an end of their range."""
+    """Return which parameters may run to an end of their range."""
     limited = np.array([isinstance(p.prior, Uniform) for p in parameters], dtype=bool)
     return (has_lower_end(parameters) & (z < _NEAR_END)) | (limited & (z > -_NEAR_END))
 
 
 def find_rivals(solution: Solution, trials: Sequence[Solution], scale: np.ndarray, n_informed: int) -> list[Solution]:
-    """Those of the trials that fit about as well as what was found.
+    """Return the trial solutions that fit about as well as the minimum.
 
     Args:
-        found: The minimum; its residuals by table.
+        solution: The minimum; its residuals by table.
         trials: Solutions with a parameter pinned elsewhere.
         scale: Scatter of each standardized residual about the minimum [1].
-        n_informed: Number of directions that the residuals determine; scatter about few spare readings is known badly.
+        n_informed: Number of directions that the residuals determine; with few spare readings the scatter is uncertain.
     """
-    from scipy.special import stdtrit
-
     # Readings without any scatter fit nothing else, whatever their weight.
     exact = np.concatenate([np.full(len(r), not np.any(r)) for r in solution["residuals"].values()])
     scale = np.where(exact, _EXACT, scale)
@@ -179,7 +180,7 @@ def find_rivals(solution: Solution, trials: Sequence[Solution], scale: np.ndarra
 
 
 def range_of_minima(value: float, error: float, rivals: Sequence[float]) -> tuple[float, float] | None:
-    """Lowest and highest value that fit about as well, where one lies further off than the error allows; else None."""
+    """Return the lowest and highest value that fit about as well, if one lies farther off than the error allows; else None."""
     if all(abs(rival - value) <= _APART * error for rival in rivals):
         return None
     return min(value, *rivals), max(value, *rivals)

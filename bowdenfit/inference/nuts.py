@@ -3,9 +3,9 @@
 One compiled program takes every chain some steps further. While tuning, each chain adapts its step size, and between
 windows the mass matrix becomes the covariance of all chains' draws; the first is that of the maximum of the posterior.
 
-Posteriors of few readings are funnels: where the scatter is small, so are the coefficients' ranges, and a step size that
-suits the rest is too long to get in there, and once in to get out. So every tenth trajectory takes steps sixteen times
-finer; only if such trajectories diverge is a corner out of reach.
+Posteriors of few readings are funnels: where the scatter is small, so are the ranges of the coefficients, and a step size that
+suits other regions is too long to enter and leave this one. So every tenth trajectory takes steps sixteen times finer; a region
+is out of reach only if these trajectories diverge too.
 
 References:
     Hoffman and Gelman 2014, "The No-U-Turn sampler" (Journal of Machine Learning Research 15); Betancourt 2017, "A
@@ -33,28 +33,26 @@ from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import noise_scales
 
-BLOCK = 50  # steps between two reports
-WINDOWS = (1, 1, 2, 4, 2)  # blocks of warm-up with one mass matrix each; the last leaves only its step size
+BLOCK = 50  # steps between two progress reports
+WINDOWS = (1, 1, 2, 4, 2)  # blocks of warm-up with one mass matrix each, doubling as in Stan; the last tunes the step size only
 WARM_UP = sum(WINDOWS)
-MOST_DOUBLINGS = 10  # of a trajectory
-FINE_EVERY, FINE_FACTOR = (
-    10,
-    16,
-)  # every so many trajectories one with so much shorter steps; a block has a whole number
-_FIRST_CHECK = 5  # blocks of draws before the first look
-_KEPT = 20_480  # draws of all chains that are kept at least, spread evenly; as many as of emcee's walkers by default
+MOST_DOUBLINGS = 10  # largest tree depth of a trajectory, blackjax's and Stan's default
+# One trajectory in FINE_EVERY takes steps FINE_FACTOR times finer; FINE_EVERY divides BLOCK.
+FINE_EVERY, FINE_FACTOR = 10, 16
+_FIRST_CHECK = 5  # blocks of draws before convergence is first checked
+_KEPT = 20_480  # least number of draws kept of all chains, evenly spread; as many as emcee keeps by default
 _FIRST_STEP, _STREAM = 0.1, 3
 _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
 
-Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of its steps, and the tuning at its end
+Block: TypeAlias = dict[str, np.ndarray]  # positions and statistics of the steps, and the tuning at the end
 
 
 def compile_nuts(posterior: LogDensity, settings: SamplerSettings) -> Callable[..., Any]:
-    """Compiled: `BLOCK` steps of every chain; what it makes depends on the seed and the number of the block alone.
+    """Compile `BLOCK` steps of every chain; the result depends on the seed and the number of the block alone.
 
     Args:
         posterior: The posterior.
-        settings: Number of chains and the acceptance that their step sizes aim at.
+        settings: Number of chains, and target acceptance of their step sizes.
     """
     size = posterior.model.space.size
     return compile_block(posterior.log_density, (size, size), posterior.data, settings)
@@ -67,13 +65,13 @@ def compile_block(
     settings: SamplerSettings,
     fine: bool = True,
 ) -> Callable[..., Any]:
-    """The same of any density.
+    """Compile `BLOCK` steps of every chain for any density.
 
     Args:
-        log_density: Of z and data.
+        log_density: Log density of z and data.
         mass: Shape of the inverse mass matrix; of one dimension where it is diagonal.
-        data: Or its shapes.
-        settings: Number of chains and the acceptance that their step sizes aim at.
+        data: Data, or their shapes.
+        settings: Number of chains, and target acceptance of their step sizes.
         fine: Whether every tenth trajectory takes finer steps.
     """
     chains, finer = settings.n_chains, _is_fine(BLOCK) & fine
@@ -112,17 +110,17 @@ def compile_block(
 
 
 def _is_fine(steps: int) -> np.ndarray:
-    """Which of the steps are fine."""
+    """Return which of the steps are fine."""
     return np.arange(steps) % FINE_EVERY == FINE_EVERY - 1
 
 
 def draw_starting_points(
     posterior: LogDensity, start: MaximumPosterior, settings: SamplerSettings, generator: np.random.Generator
 ) -> np.ndarray:
-    """Over-dispersed starts, (chain, parameter).
+    """Draw over-dispersed starts, (chain, parameter).
 
-    Noise scales start above their prior median: where hardly any noise is left the density is so narrow that the first
-    trajectories would have to be very short.
+    Noise scales start above their prior median: with hardly any noise the density is so narrow that the first trajectories
+    would have to be very short.
     """
     spread = np.sqrt(2) * generator.standard_normal((settings.n_chains, len(start.z)))
     z = start.z + spread @ np.linalg.cholesky(start.covariance).T
@@ -130,11 +128,11 @@ def draw_starting_points(
 
 
 def sample(request: SamplingRequest, program: Callable[..., Any]) -> Chain:
-    """Sample by chains of trajectories.
+    """Sample with several chains of NUTS.
 
     Args:
-        asked: What of, how long, and so on.
-        program: What `make_program` made for it.
+        request: What to sample, and for how long.
+        program: The program of `compile_nuts`.
     """
     posterior, settings, seed = request.posterior, request.settings, request.seed
     points = draw_starting_points(posterior, request.start, settings, np.random.default_rng([seed, _STREAM]))
@@ -167,25 +165,25 @@ def sample(request: SamplingRequest, program: Callable[..., Any]) -> Chain:
 
 
 def _record_shapes(chains: int, size: int) -> dict[str, tuple[int, ...]]:
-    """Of what a block is kept as."""
+    """Return shapes of the arrays of a stored block."""
     steps = dict.fromkeys(_STATISTICS, (BLOCK, chains))
     return {"z": (BLOCK, chains, size), "tuning": (5, chains), "inverse_mass": (size, size), **steps}
 
 
 def _next_check(blocks: int) -> int:
-    """Blocks at the look after one at so many."""
+    """Return the number of blocks at the convergence check after one at `blocks`."""
     return blocks + (blocks - WARM_UP + 2) // 3
 
 
 def next_block_state(
     blocks: Sequence[Block], points: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, tuning and inverse mass matrix that the next block starts with.
+    """Return positions, tuning and inverse mass matrix at the start of the next block.
 
     Args:
-        blocks: All before it.
-        points: Where chains start.
-        covariance: That the first inverse mass matrix is; of one dimension where that is diagonal.
+        blocks: All blocks before it.
+        points: Starts of the chains.
+        covariance: The first inverse mass matrix; one-dimensional if it is diagonal.
     """
     if not blocks:
         return points, _initial_tuning(_FIRST_STEP, len(points)), covariance
@@ -206,25 +204,25 @@ def next_block_state(
 
 
 def _initial_tuning(step_size: float, chains: int) -> np.ndarray:
-    """Tuning of every chain (columns) at the start of a window: the fields of blackjax's state, in their order."""
+    """Return the tuning of every chain (columns) at the start of a window: the fields of blackjax's state, in their order."""
     init, _, _ = dual_averaging_adaptation(0.8)
     return np.repeat(np.asarray([float(x) for x in init(step_size)])[:, None], chains, axis=1)
 
 
 def _shrink_covariance(draws: np.ndarray) -> np.ndarray:
-    """Covariance of draws (rows), shrunk toward a small multiple of the identity as Stan does."""
+    """Return the covariance of draws (rows), shrunk toward a small multiple of the identity as Stan does."""
     n, size = draws.shape
     return n / (n + 5) * np.cov(draws.T).reshape(size, size) + 1e-3 * 5 / (n + 5) * np.eye(size)
 
 
 def _shrink_variances(draws: np.ndarray) -> np.ndarray:
-    """The same of variances alone, in coordinates that are about standard normal, to which they are shrunk."""
+    """Return variances of draws (rows), shrunk toward 1, for coordinates that are about standard normal."""
     n = len(draws)
     return n / (n + 5) * draws.var(axis=0, ddof=1) + 5 / (n + 5)
 
 
 def _summarize(request: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain, bool]:
-    """The draws after warm-up, with their diagnostics, and whether more of them could change what those say."""
+    """Return the draws after warm-up with their diagnostics, and whether more draws could improve these."""
     samples = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
     steps, chains = samples["energy"].shape
     fine = _is_fine(steps)

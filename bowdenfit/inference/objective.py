@@ -1,4 +1,4 @@
-"""The residuals of a posterior as the solver sees them: which parameters are pinned, and whether priors count."""
+"""The least-squares objective: residuals of a posterior with some parameters pinned, with or without priors."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -20,19 +20,19 @@ from bowdenfit.parameters.space import Parameter
 Solution = dict[str, Any]
 Objective = Callable[..., Solution]
 
-_TIE = 1e-6  # weight of z that keeps what no reading tells from wandering off, and moves nothing else
-_CACHE_SIZE = 4  # evaluations, the last of which is mostly where a solve ends
+_TIE = 1e-6  # weight of z that keeps undetermined parameters from drifting, without moving any other
+_CACHE_SIZE = 4  # evaluations cached; the last is usually where a solve ends
 LOWER_END = -38.0  # z at which a quantile reaches the lower end of its support in double precision
 
 
 def make_objective(posterior: LogDensity) -> Objective:
-    """One compiled program for every solve: which parameters are pinned and whether priors count are arguments.
+    """Compile one objective for every solve: pinned parameters and whether priors count are arguments.
 
-    The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of
-    its own (1 with the priors, 0 without), the data, and with which precision. It gives z, values and their slope by z,
-    residuals and expected readings by term, all residuals with those of the priors stacked, the Jacobian of the residuals
-    (zero for pinned parameters; `sensitivity` has theirs too), whether the solver succeeded, and by how much the tangent plane
-    says that the sum of squares would yet fall.
+    The objective takes the z to start from, which parameters are pinned and where, the weight of each z as a residual of its
+    own (1 with the priors, 0 without), the data, and the precision. It returns a dictionary: z, values and their slope by z,
+    residuals and expected readings by term, all residuals stacked with those of the priors, the Jacobian of the residuals (zero
+    for pinned parameters; `sensitivity` has theirs too), whether the solver succeeded, and the decrease of the sum of squares
+    that the tangent plane still predicts (`fall`).
     """
     space = posterior.model.space
     vector = jax.ShapeDtypeStruct((space.size,), jnp.float64)
@@ -66,7 +66,7 @@ def make_objective(posterior: LogDensity) -> Objective:
 
 
 def _evaluation_program(posterior: LogDensity) -> Callable[..., Solution]:
-    """Everything that one z gives."""
+    """Return a function of z that gives values, residuals, Jacobian and expected readings."""
     space = posterior.model.space
 
     def evaluated(z: Array, weight: Array, data: Any) -> Solution:
@@ -92,13 +92,13 @@ def _evaluation_program(posterior: LogDensity) -> Callable[..., Solution]:
 
 @dataclass(frozen=True)
 class Problem:
-    """Least squares of one posterior, whose noise scales stay at their prior medians.
+    """A least-squares problem of one posterior, with noise scales held at their prior medians.
 
     Args:
         posterior: The posterior.
-        objective: What `make_objective` compiled for data of its shape.
+        objective: The objective that `make_objective` compiled for data of its shape.
         with_priors: Whether the priors count as measurements of the parameters.
-        noise_z: z of the noise scales, where they do not stay at their prior medians.
+        noise_z: z of the noise scales, where they are not at their prior medians.
     """
 
     posterior: LogDensity
@@ -113,12 +113,12 @@ class Problem:
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """Of each z as a residual of its own."""
+        """Weight of each z as a residual of its own."""
         return np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
 
     @cached_property
     def data(self) -> Any:
-        """The posterior's data where the compiled program wants them; putting them there costs as much as some evaluations."""
+        """The posterior's data on the device; moving them there costs as much as some evaluations."""
         return jax.device_put(self.posterior.data)
 
     def solve(
@@ -128,28 +128,28 @@ class Problem:
         pin: np.ndarray | None = None,
         precision: Precision = PRECISE,
     ) -> Solution:
-        """The minimum with further parameters pinned; without priors z weighs so little that it only breaks ties."""
+        """Return the minimum with further parameters pinned; without priors z has so little weight that it only breaks ties."""
         pin = np.zeros(len(start)) if pin is None else pin
         at = np.where(self.noise & (pin == 0), self.noise_z, pin)
         return self.objective(start, self.noise | pinned, at, self.weight, self.data, precision)
 
 
 def sum_of_squares(solution: Solution) -> float:
-    """Sum of squares of the standardized residuals, without those of the priors."""
+    """Return the sum of squares of the standardized residuals, without those of the priors."""
     return float(sum(np.sum(r**2) for r in solution["residuals"].values()))
 
 
 def total_squares(solution: Solution) -> float:
-    """Sum of squares of everything that counts, priors too where they do."""
+    """Return the sum of squares of all residuals, including those of the priors where these count."""
     return float(solution["stacked"] @ solution["stacked"])
 
 
 def noise_scales(posterior: LogDensity) -> np.ndarray:
-    """Which free parameters are noise scales."""
+    """Return which free parameters are noise scales."""
     return np.array([p.role == "noise" for p in posterior.model.space.free], dtype=bool)
 
 
 def has_lower_end(parameters: tuple[Parameter, ...]) -> np.ndarray:
-    """Which parameters have a lower end that an estimate can run to."""
+    """Return which parameters have a lower end that an estimate can run to."""
     bounded = LogNormal | HalfNormal | HalfCauchy | TruncatedNormal | Uniform
     return np.array([isinstance(p.prior, bounded) for p in parameters], dtype=bool)

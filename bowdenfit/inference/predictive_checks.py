@@ -1,8 +1,8 @@
-"""What a fit would have said of each reading, had that reading been left out; and whether such predictions are right.
+"""Leave-one-out predictive checks: what a fit predicts for each reading without it, and whether that is calibrated.
 
 The draws are weighted by the inverse of the reading's own likelihood (Pareto-smoothed), so nothing is fitted again. Where
-the Pareto k of a reading is large, the weights cannot take out all that the reading did: its deviation is then rather
-understated, and differs from seed to seed; draws of a fit without it tell.
+the Pareto k of a reading is large, the weights cannot remove all of its influence: its deviation is understated, and differs
+from seed to seed. Then draws of a fit without the reading replace them.
 
 References:
     Vehtari, Gelman and Gabry, Practical Bayesian model evaluation using leave-one-out cross-validation and WAIC,
@@ -17,24 +17,24 @@ import numpy as np
 
 from bowdenfit.inference.psis import smooth_weights
 
-_TAIL = 0.02  # share of the weight on either side that a Pareto distribution is fitted to
-_LEAST_TAIL = 20  # draws that such a fit takes
-_LEAST = 1e-12  # probability below which no difference is made
-_DRAWS = 10_000  # of a prediction that are enough to place a reading in
-_FARTHEST = 1e100  # as which a reading counts that a wandering walker puts beyond all numbers
-_SIMULATIONS = 1000  # of the band that a distribution of uniform numbers stays in
+_TAIL = 0.02  # share of the weight on either side to which a Pareto distribution is fitted
+_LEAST_TAIL = 20  # least number of draws for that fit
+_LEAST = 1e-12  # probability below which differences do not matter
+_DRAWS = 10_000  # draws of a prediction that suffice
+_FARTHEST = 1e100  # value that replaces overflows of a walker far out
+_SIMULATIONS = 1000  # simulations of the band of uniform numbers
 
 
 @dataclass(frozen=True)
 class LooPredictive:
-    """Predictions of readings from everything but the reading itself, and where the reading lies in each.
+    """Leave-one-out predictive distribution of each reading, and where the reading lies in it.
 
     Args:
-        mean, sd: Of the reading drawn anew.
-        q05, median, q95: Its quantiles.
-        below, up_to: Probability of a lower reading, and of one no higher; they differ where a reading is but a bound.
-        tail: Probability of a reading as far out as this one or farther, on either side.
-        pareto_k: How far the fit leans on the reading; beyond 0.7 the weights are not to be trusted.
+        mean, sd: Mean and standard deviation of the replicated reading.
+        q05, median, q95: Quantiles of the replicated reading.
+        below, up_to: Probability of a lower reading, and of one no higher; they differ where a reading is only a bound.
+        tail: Two-sided probability of a reading as far out as this one.
+        pareto_k: Pareto k: influence of the reading on the fit; beyond 0.7 the weights cannot be trusted.
     """
 
     mean: np.ndarray
@@ -51,12 +51,12 @@ class LooPredictive:
 def predict_left_out(
     log_likelihood: np.ndarray, replicated: np.ndarray, observed: np.ndarray, at_most: np.ndarray, n_effective: float
 ) -> LooPredictive:
-    """Predictions of the readings of one table, each from everything else.
+    """Return leave-one-out predictions of the readings of one table.
 
     Args:
-        log_likelihood: Of every reading at every draw, (draw, reading).
-        replicated: Readings drawn anew, (draw, reading).
-        observed: The readings, or the bound of those that are only known to be at most so.
+        log_likelihood: Log likelihood of every reading at every draw, (draw, reading).
+        replicated: Posterior predictive draws, (draw, reading).
+        observed: The readings, or the bound where only an upper limit is known.
         at_most: Whether a reading is such a bound.
         n_effective: Effective number of the draws.
     """
@@ -72,13 +72,13 @@ def predict_left_out(
 def replace_by_refit(
     predictions: LooPredictive, index: int, replicates: np.ndarray, reading: float, at_most: bool
 ) -> LooPredictive:
-    """The predictions with one from a fit without its reading; how far the fit with it leans on it stays.
+    """Replace one prediction by that of a fit without the reading; its Pareto k remains.
 
     Args:
-        found: The predictions of a table.
-        place: Which of its readings is meant.
-        drawn: The reading drawn anew, by draws of the fit without it.
-        reading, at_most: See `loo_predictive`.
+        predictions: The predictions of a table.
+        index: Position of the reading.
+        replicates: Replicated reading at the draws of the fit without it.
+        reading, at_most: See `predict_left_out`.
     """
     row = (
         *_locate_reading(replicates, np.full(len(replicates), 1 / len(replicates)), reading, at_most),
@@ -91,7 +91,7 @@ def replace_by_refit(
 
 
 def _locate_reading(replicates: np.ndarray, weights: np.ndarray, reading: float, at_most: bool) -> tuple[float, ...]:
-    """The fields of `LooPredictive` of one reading, but for its Pareto k."""
+    """Return the fields of `LooPredictive` for one reading, except its Pareto k."""
     within = np.clip(np.nan_to_num(replicates, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
     order = np.argsort(within)
     x, w = within[order], weights[order]
@@ -107,7 +107,7 @@ def _locate_reading(replicates: np.ndarray, weights: np.ndarray, reading: float,
 
 
 def _tail_probability(x: np.ndarray, weights: np.ndarray, reading: float) -> float:
-    r"""Probability of a value as large as the reading, beyond the draws by a Pareto distribution fitted to their tail.
+    r"""Return the probability of a value as large as the reading, by a Pareto tail beyond the draws.
 
     .. math:: P(X > y) = P(X > u) \left(1 + \xi \frac{y - u}{s}\right)^{-1/\xi}
 
@@ -132,28 +132,28 @@ def _tail_probability(x: np.ndarray, weights: np.ndarray, reading: float) -> flo
 
 
 def _pareto_survival(excess: float, shape: float) -> float:
-    """Probability beyond an excess, in units of the scale; never bounded, because the tail of a reading's noise is not."""
+    """Return the probability beyond an excess in units of the scale; the shape is not negative, as noise is unbounded."""
     shape = max(shape, 0.0)
     return float(np.exp(-excess) if shape < 1e-6 else (1 + shape * excess) ** (-1 / shape))
 
 
 def draw_randomized_pit(predictions: LooPredictive, generator: np.random.Generator) -> np.ndarray:
-    """Where each reading lies in its prediction, as a number that is uniform between 0 and 1 if all is right.
+    """Return the probability integral transform (PIT) of each reading, uniform between 0 and 1 if predictions are calibrated.
 
-    Of a bound only an interval is known; it takes a place at random inside.
+    For a bound only an interval is known, in which a value is drawn at random.
     """
     return np.clip(generator.uniform(predictions.below, np.maximum(predictions.up_to, predictions.below)), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Uniformity:
-    """Whether numbers are uniform between 0 and 1, by their distribution function.
+    """Whether numbers are uniform between 0 and 1, by their empirical distribution function.
 
     Args:
-        at: Where it was looked at.
-        share: Share of the numbers up to there.
-        low, high: Band that all of it stays in with the stated probability.
-        probability: That probability.
+        at: Positions at which it is evaluated.
+        share: Share of the numbers up to each position.
+        low, high: Simultaneous band for uniform numbers.
+        probability: Probability with which uniform numbers stay in the band.
     """
 
     at: np.ndarray
@@ -164,7 +164,7 @@ class Uniformity:
 
     @property
     def holds(self) -> bool:
-        """Whether it stays in the band."""
+        """Whether the distribution function stays in the band."""
         return bool(np.all((self.low <= self.share) & (self.share <= self.high)))
 
     @property
@@ -179,10 +179,10 @@ class Uniformity:
 
 
 def check_uniformity(pit: np.ndarray, probability: float) -> Uniformity:
-    """The distribution function of numbers between 0 and 1 beside the band that uniform ones would stay in.
+    """Compare the distribution function of numbers between 0 and 1 with the simultaneous band of uniform ones.
 
     Args:
-        places: The numbers; at least two.
+        pit: The numbers; at least two.
         probability: Probability that uniform numbers stay in the whole band.
     """
     from arviz_stats.ecdf_utils import ecdf_pit

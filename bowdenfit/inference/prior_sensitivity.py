@@ -1,9 +1,11 @@
-r"""Would other priors, or other weight on the readings, change what was found? Without another fit, by weighted draws.
+r"""Prior sensitivity: would other priors, or another weight of the readings, change the results?
 
-Power scaling says which prior counts: the prior of every parameter is a standard normal in z, so that its share of the log
-prior is :math:`-z^2/2`, and raised to the power alpha it is the same normal, :math:`1/\sqrt\alpha` times as wide. It looks at
-small changes of the whole distribution and can overlook that an interval's width follows a prior's scale one to one. So the
-width is looked at by itself, with the scale of each prior doubled and halved and the draws weighted accordingly.
+All answers come from weighted draws, without a refit.
+
+Power scaling finds the priors that matter: the prior of every parameter is a standard normal in z, so its part of the log prior
+is :math:`-z^2/2`, and raised to the power alpha it is a normal :math:`1/\sqrt\alpha` times as wide. Power scaling measures
+small changes of the whole distribution and can miss that the width of an interval is proportional to the scale of a prior. So
+the width is checked separately, with the scale of each prior doubled and halved and the draws weighted accordingly.
 
 References:
     Kallioinen, Paananen, Bürkner and Vehtari, Detecting and diagnosing prior and likelihood sensitivity with
@@ -16,18 +18,19 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from bowdenfit.inference.diagnostics import array_stats
 from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
 
 if TYPE_CHECKING:  # another process works this out, without JAX
     from bowdenfit.parameters.priors import Prior
     from bowdenfit.parameters.space import Parameter
 
-SENSITIVE = 0.05  # from which a quantity is said to be sensitive
-FOLLOWS = 1.15  # factor by which a doubled or halved scale changes a width that is said to follow a prior
+SENSITIVE = 0.05  # sensitivity above which a quantity counts as sensitive (Kallioinen and others 2024)
+FOLLOWS = 1.15  # factor on a width, by a doubled or halved scale of a prior, above which the width is said to follow the prior
 # Prior standard deviations from the prior's median beyond which a prior that counts conflicts with the readings.
 _CONFLICT_SDS = 2.0
-FAR_SDS = 3.0  # the same, beyond which any prior is
-_POWERS = (0.99, 1.01)
+FAR_SDS = 3.0  # such standard deviations beyond which any prior conflicts
+_POWERS = (0.99, 1.01)  # priorsense's default
 _TAILS = (0.05, 0.5, 0.95)
 
 
@@ -37,8 +40,8 @@ class WidthSensitivity:
 
     Args:
         parameter: The parameter whose prior it is.
-        doubled, halved: Width with the scale of that prior doubled or halved, over the width; NaN where the draws cannot
-            tell.
+        doubled, halved: Width with the scale of that prior doubled or halved, relative to the width; NaN where the weights are
+            unreliable.
         k_doubled, k_halved: Pareto k of the weights.
     """
 
@@ -50,7 +53,7 @@ class WidthSensitivity:
 
     @property
     def size(self) -> float:
-        """Factor by which it changes, whichever way; NaN where nothing can be told."""
+        """Larger of the two factors by which the width changes; NaN where the weights are unreliable."""
         known = [abs(np.log(ratio)) for ratio in (self.doubled, self.halved) if ratio > 0]
         return float(np.exp(max(known))) if known else float("nan")
 
@@ -63,8 +66,8 @@ class Sensitivity:
         quantity: Name of the quantity.
         parameter: The parameter whose prior matters most to it.
         prior, likelihood: Sensitivities to that prior, and to the weight of all readings together.
-        median, sd: Of the quantity.
-        wider: Its median were the scale of that prior doubled; NaN where the draws cannot tell.
+        median, sd: Median and standard deviation of the quantity.
+        wider: Its median if the scale of that prior were doubled; NaN where the weights are unreliable.
         prior_sds: How far the posterior mean of that parameter lies from the prior's median, in the prior's own
             standard deviations (in z); 0 at an end of its range that the prior allows.
         widths: How the width of its interval follows every prior.
@@ -84,7 +87,7 @@ class Sensitivity:
 
     @property
     def diagnosis(self) -> str:
-        """What it means: "readings decide", "prior decides", "conflict", "both count" or "prior sets the width"."""
+        """The conclusion: "readings decide", "prior decides", "conflict", "both count" or "prior sets the width"."""
         if not self.prior > SENSITIVE:
             return "prior sets the width" if self.followed or self.undetermined else "readings decide"
         if not self.likelihood > SENSITIVE:
@@ -93,18 +96,18 @@ class Sensitivity:
 
     @property
     def followed(self) -> list[WidthSensitivity]:
-        """Priors that its width follows, the strongest first."""
+        """Priors that the width of its interval follows, the strongest first."""
         return sorted((w for w in self.widths if w.size > FOLLOWS), key=lambda w: -w.size)
 
     @property
     def undetermined(self) -> list[str]:
-        """Parameters of which the draws cannot tell whether its width follows their priors."""
+        """Parameters for which the draws cannot show whether the width follows their priors."""
         return [w.parameter for w in self.widths if np.isnan(w.size)]
 
 
 @dataclass(frozen=True)
 class PriorConflict:
-    """A parameter that the readings put where its prior hardly allows it.
+    """A parameter whose posterior lies where its prior hardly allows it.
 
     Args:
         parameter: Its name.
@@ -118,7 +121,7 @@ class PriorConflict:
 def find_prior_conflicts(
     z: Mapping[str, np.ndarray], parameters: Mapping[str, "Parameter"]
 ) -> tuple[PriorConflict, ...]:
-    """Parameters beyond 3 standard deviations of their priors, but for those at an end that the prior allows.
+    """Return parameters beyond 3 standard deviations of their priors, except those at an end that the prior allows.
 
     Args:
         z: Draws of each parameter in z, by name.
@@ -138,7 +141,7 @@ def find_prior_conflicts(
 
 @dataclass(frozen=True)
 class RescaledPrior:
-    """What other scales of one prior would do to every draw.
+    """Effect of other scales of one prior on the prior density of every draw.
 
     Args:
         doubled, halved: Log of the prior's density with its scale doubled or halved over its own, up to a constant.
@@ -151,7 +154,7 @@ class RescaledPrior:
 
 
 def rescale_prior(prior: "Prior", values: np.ndarray) -> RescaledPrior:
-    """Of draws of a parameter [internal units]."""
+    """Rescale a prior, given draws of its parameter [internal units]."""
     doubled, halved = (np.asarray(prior.widening(values.ravel(), factor)) for factor in (2.0, 0.5))
     return RescaledPrior(doubled, halved, prior.allowed_ends)
 
@@ -162,13 +165,13 @@ def compute_sensitivities(
     log_likelihood: np.ndarray,
     priors: Mapping[str, RescaledPrior],
 ) -> tuple[Sensitivity, ...]:
-    """How much each quantity depends on the priors and on the readings.
+    """Return how much each quantity depends on the priors and on the readings.
 
     Args:
         quantities: Draws by name, (chain, draw).
         z: Draws of each parameter in z, by name, (chain, draw).
-        log_likelihood: Sum over all readings, (chain, draw).
-        priors: Of each parameter, by name.
+        log_likelihood: Log likelihood summed over all readings, (chain, draw).
+        priors: Rescaled prior of each parameter, by name.
     """
     of_readings = _make_power_scaling(log_likelihood)
     of_priors = {name: _make_power_scaling(-(values**2) / 2) for name, values in z.items()}
@@ -197,14 +200,14 @@ def compute_sensitivities(
 
 
 def _z_unless_at_end(allowed_ends: tuple[bool, bool], z: float) -> float:
-    """Z, and 0 at an end of the range that the prior allows."""
+    """Return z, or 0 at an end of the range that the prior allows."""
     lower, upper = allowed_ends
     return 0.0 if (lower and z < 0) or (upper and z > 0) else z
 
 
 @dataclass(frozen=True)
 class _ScaleWeights:
-    """Weights of the draws with the scale of one prior doubled and halved; NaN where they lean on few draws."""
+    """Weights of the draws with the scale of one prior doubled and halved; NaN where few draws carry most of the weight."""
 
     doubled: np.ndarray
     halved: np.ndarray
@@ -213,12 +216,12 @@ class _ScaleWeights:
 
     @classmethod
     def of(cls, prior: RescaledPrior) -> "_ScaleWeights":
-        """By what other scales do."""
+        """Compute the weights of a rescaled prior."""
         (doubled, k_doubled), (halved, k_halved) = (_reliable_weights(ratio) for ratio in (prior.doubled, prior.halved))
         return cls(doubled, halved, k_doubled, k_halved)
 
     def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> WidthSensitivity:
-        """What it does to the width of a quantity's interval."""
+        """Return the effect on the width of a quantity's interval."""
         wide, narrow = (_quantiles(values, order, weights) for weights in (self.doubled, self.halved))
         whole = plain[2] - plain[0]  # none of an optimum that nine of ten draws have at the end of the range
         doubled, halved = (float((q[2] - q[0]) / whole) if whole > 0 else float("nan") for q in (wide, narrow))
@@ -226,13 +229,14 @@ class _ScaleWeights:
 
 
 def _reliable_weights(log_ratio: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return importance weights, NaN where Pareto k is too large, and Pareto k."""
     log_weights, pareto_k = smooth_weights(log_ratio)
     reliable = pareto_k <= RELIABLE_K
     return (np.exp(log_weights - log_weights.max()) if reliable else np.full(len(log_weights), np.nan)), pareto_k
 
 
 def _quantiles(values: np.ndarray, order: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """5 %, 50 % and 95 % quantiles of weighted draws, given the order that sorts them; NaN without weights."""
+    """Return 5 %, 50 % and 95 % quantiles of weighted draws, given the order that sorts them; NaN without weights."""
     if np.isnan(weights[0]):
         return np.full(len(_TAILS), np.nan)
     share = (np.cumsum(weights[order]) - weights[order] / 2) / np.sum(weights)
@@ -240,12 +244,10 @@ def _quantiles(values: np.ndarray, order: np.ndarray, weights: np.ndarray) -> np
 
 
 def _make_power_scaling(part: np.ndarray) -> Callable[[np.ndarray], float]:
-    """Function that gives a quantity's sensitivity to one part of the log density."""
-    from arviz_stats.base import array_stats
-
+    """Return a function that gives a quantity's sensitivity to one part of the log density."""
     lower, upper = (power_weights(part, alpha) for alpha in _POWERS)
 
     def sense(draws: np.ndarray) -> float:
-        return float(array_stats.power_scale_sense(draws, lower, upper, *_POWERS))
+        return float(array_stats().power_scale_sense(draws, lower, upper, *_POWERS))
 
     return sense

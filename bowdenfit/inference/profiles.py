@@ -9,8 +9,8 @@ gives it, table by table. Where all readings scatter alike, V/C is their varianc
 textbooks; of a model that is linear in all its parameters it is the estimate plus and minus t standard errors. The degrees
 of freedom are Satterthwaite's: those of the tables in proportion to what they contribute to V. Limits at the end of a
 parameter's range belong to the interval: it is cut off there, not moved. Where the errors of a row's own angles enter by the
-effective variance, the sum of squares has each value's own weights, so that the interval leans toward the solution with the
-true angles as unknowns; it holds nine in ten truths there, when the standard error's no longer does.
+effective variance, the weights change along the profile, so that the interval approximates the solution with the true angles as
+parameters; it covers nine in ten true values there, when the interval by the standard error no longer does.
 
 References:
     Bates and Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1.
@@ -24,6 +24,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import stdtrit
 
 from bowdenfit.inference.linearized import iterate_blocks, linearize
 from bowdenfit.inference.log_density import LogDensity
@@ -33,31 +34,32 @@ from bowdenfit.parameters.priors import Uniform
 from bowdenfit.parameters.space import Parameter
 
 UNKNOWN_LIMITS = (float("nan"), float("nan"))
-_STUCK = 0.05  # part of what limits a parameter by which the sum of squares yet falls where the solver is stuck
-_ROUNDING = 1e-12  # of a sum of squares, which all of it is without scatter
-_ALWAYS = ("friction", "friction_model")  # roles whose intervals are worth their time in large problems
-_SMALL = 20_000  # entries of the Jacobian up to which every parameter's interval is
-_AT_END = 6.0  # size of z so near to the end of a range that the others, fitted to its end, need not follow
-_INSIDE = 2.0  # size of z a little inside the range of a parameter that is at an end of it
-_FAR = 1.0  # step of another parameter that is not foretold [z]
-_LOWER = 0.01  # the same by which another minimum is a lower one
+_STUCK = 0.05  # predicted decrease at which the solver counts as stuck, relative to the level that limits a parameter
+_ROUNDING = 1e-12  # decrease of a sum of squares that is rounding, for readings without scatter
+_ALWAYS = ("friction", "friction_model")  # roles whose intervals are computed in large problems too
+_SMALL = 20_000  # entries of the Jacobian up to which all intervals are computed
+_AT_END = 6.0  # z so near to the end of a range that other parameters, fitted at the end, need not be fitted again
+_INSIDE = 2.0  # z a little inside the range, for a parameter that is at an end of it
+_FAR = 1.0  # largest extrapolated step of another parameter [z]
+_LOWER = 0.01  # relative decrease, on the same level, from which another minimum is a lower one
 PROBABILITY = 0.9
 FARTHEST = -LOWER_END
-_PRECISION = 3e-4  # of a limit, in the steps that lead to it
-_BEYOND = 1.5  # how far the second step goes, in parts of the way that is left by the first
+_PRECISION = 3e-4  # precision of a limit, relative to the step that leads to it
+_BEYOND = 1.5  # length of the second step, relative to the linear extrapolation
 _MOST_STEPS = 50
-_LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0  # first step from the minimum, and all others [z]
+# limits of the first step from the minimum, and the longest of the others [z]
+_LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0
 
 
 @dataclass(frozen=True)
 class Profile:
-    """How the sum of squares rises on both sides of the minimum.
+    """Profile of the sum of squares on both sides of the minimum.
 
     Args:
         name: Name of the parameter.
-        values: Its values, in its shown unit, rising.
-        rise: By how much the sum of squares of the standardized residuals is larger there than at the minimum, the other
-            parameters fitted again; noise scales at their prior median.
+        values: Values at which it is pinned, in its shown unit, increasing.
+        rise: Increase of the sum of squares of the standardized residuals over the minimum, the other parameters fitted again;
+            noise scales at their prior medians.
     """
 
     name: str
@@ -67,12 +69,12 @@ class Profile:
 
 @dataclass(frozen=True)
 class Basin:
-    """A minimum, from which one of its parameters is moved.
+    """A minimum from which profiles are computed.
 
     Args:
-        problem: What it is the minimum of.
-        found: The minimum.
-        at_end: Parameters at an end of their range, which may leave it when another is moved.
+        problem: The least-squares problem.
+        solution: The minimum.
+        at_end: Parameters at an end of their range, which may leave it when another parameter is pinned.
     """
 
     problem: Problem
@@ -85,11 +87,11 @@ class Basin:
         return self.problem.posterior.model.space.free
 
     def solve_pinned(self, index: int, z: float, near: Solution) -> Solution:
-        """The minimum with one parameter pinned at z; others leave the end of their range where that is better.
+        """Return the minimum with one parameter pinned at z; others leave the end of their range where that is better.
 
         Args:
-            index: Of the parameter.
-            z: Where it is pinned.
+            index: Position of the parameter.
+            z: Value at which it is pinned.
             near: The minimum with it pinned elsewhere, or free.
         """
         mask = np.arange(len(near["z"])) == index
@@ -104,7 +106,7 @@ class Basin:
         return min(solution, self._solve(np.where(ended, side * _INSIDE, solution["z"]), mask, pin), key=total_squares)
 
     def _extrapolate(self, near: Solution, mask: np.ndarray, z: float) -> np.ndarray:
-        """Where the others follow it to in a straight line; where they are, if that is far, since few lines stay straight."""
+        """Return where the other parameters follow linearly; unchanged where that is far."""
         others = ~(self.problem.noise | self.at_end | mask)
         jacobian = np.concatenate([near["sensitivity"], np.diag(self.problem.weight)])
         residuals = near["stacked"] + jacobian @ np.where(mask, z - near["z"], 0.0)
@@ -118,12 +120,12 @@ class Basin:
         return self.problem.solve(start, pinned, pin, QUICK)
 
     def _gradient(self, z: np.ndarray) -> np.ndarray:
-        """Of half the sum of squares."""
+        """Return the gradient of half the sum of squares."""
         there = self._solve(z, True, z)
         return there["stacked"][: -len(z)] @ there["sensitivity"]
 
     def value(self, index: int, z: float) -> float:
-        """Value of a parameter at z, in its shown unit; infinite where its range has no end."""
+        """Return the value of a parameter at z, in its shown unit; infinite where its range has no end."""
         parameter = self.parameters[index]
         if z > 0 and not (isinstance(parameter.prior, Uniform) or np.isfinite(z)):
             return float("inf")
@@ -135,13 +137,13 @@ class Basin:
 
 
 class Rise:
-    """By how much the sum of squares is larger where z of a parameter is pinned; not a number where it has none.
+    """Increase of the sum of squares with one parameter pinned, as a function of z; NaN where it cannot be computed.
 
-    Each solve starts from the nearest one on the way from the minimum: one from beyond may lie in another valley.
+    Each solve starts from the nearest solution between the minimum and z: one beyond z may lie in another valley.
 
     Args:
         basin: The minimum.
-        index: Of the parameter.
+        index: Position of the parameter.
     """
 
     def __init__(self, basin: Basin, index: int) -> None:
@@ -150,7 +152,7 @@ class Rise:
         self._center, self._least = float(basin.solution["z"][index]), total_squares(basin.solution)
 
     def __call__(self, z: float) -> float:
-        """The rise at z."""
+        """Return the increase at z."""
         if z not in self._known:
             way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._is_known(at)]
             self._known[z] = self._basin.solve_pinned(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
@@ -161,14 +163,14 @@ class Rise:
 
     @property
     def lowest(self) -> Solution:
-        """Where the sum of squares was the least."""
+        """The solution with the smallest sum of squares so far."""
         return min((solution for at, solution in self._known.items() if self._is_known(at)), key=total_squares)
 
     @property
     def most_fall(self) -> float:
-        """How far the sum of squares may lie above its least, by the steepest place at which the solver ended.
+        """Largest decrease that the tangent plane still predicted where the solver ended.
 
-        At a kink of the residuals it ends where their tangent plane says that much is to be gained.
+        It is large where the solver ended at a kink of the residuals.
         """
         return max(solution["fall"] for at, solution in self._known.items() if self._is_known(at))
 
@@ -181,14 +183,14 @@ def compute_profile(
     z: Sequence[float] | np.ndarray,
     with_priors: bool = False,
 ) -> Profile:
-    """The profile of one free parameter, for figures and for questions of identifiability.
+    """Compute the profile of one free parameter, for figures and for identifiability.
 
     Args:
         posterior: The posterior.
-        objective: Its compiled solve.
+        objective: Its compiled objective.
         name: Name of the parameter.
         start: z to start from, such as that of the maximum of the posterior.
-        z: Where the parameter is pinned, as z.
+        z: Values of z at which the parameter is pinned.
         with_priors: Whether the priors count as measurements of the parameters.
     """
     problem, index = Problem(posterior, objective, with_priors), posterior.model.space.index[name]
@@ -202,12 +204,12 @@ def compute_profile(
 
 @dataclass(frozen=True)
 class ProfileIntervals:
-    """The 90 % intervals about a minimum.
+    """90 % profile intervals about a minimum.
 
     Args:
-        of: By name, in shown units; not numbers where the solver was stuck on the way.
-        stuck: Whether it was at the minimum.
-        lower: Where the sum of squares was the least, if that is lower than the minimum.
+        limits: Limits by name, in shown units; NaN where the solver was stuck on the way.
+        stuck: Whether it was stuck at the minimum.
+        lower: The solution with the smallest sum of squares, if it is lower than the minimum.
     """
 
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -216,7 +218,7 @@ class ProfileIntervals:
 
 
 def compute_profile_intervals(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> ProfileIntervals:
-    """90 % intervals of determined parameters, by the scatter of each residual about the minimum."""
+    """Compute 90 % intervals of determined parameters, given the scatter of each residual about the minimum."""
     limits, lowest, least_level = {}, basin.solution, np.inf
     cheap = basin.solution["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
@@ -233,14 +235,14 @@ def compute_profile_intervals(basin: Basin, scale: np.ndarray, determined: np.nd
 
 
 def is_stuck(fall: float, level: float) -> bool:
-    """Whether a sum of squares that yet falls so far says little of where it has risen by a level."""
+    """Return whether the predicted decrease is too large for a rise by `level` to be meaningful."""
     return bool(fall > max(_STUCK * level, _ROUNDING))
 
 
 def _estimate_spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float, float, float]:
-    """Standard error of z of a parameter, its variance over that by readings of unit scatter, and degrees of freedom.
+    """Return the standard error of z of a parameter, its variance over that by unit scatter, and degrees of freedom.
 
-    Not numbers where the readings say nothing of it, not even a little inside its range.
+    NaN where the readings carry no information about it, not even a little inside its range.
     """
     solution, terms = basin.solution, basin.problem.posterior.model.terms
     if basin.at_end[index]:  # where z has no influence; a little inside its range
@@ -264,10 +266,10 @@ def _estimate_spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float
 
 
 def satterthwaite_freedom(parts: np.ndarray, freedom: np.ndarray) -> float:
-    """Satterthwaite's degrees of freedom of a variance; at least 1.
+    """Return Satterthwaite's degrees of freedom of a variance; at least 1.
 
     Args:
-        parts: What each block of residuals contributes to the variance.
+        parts: Contribution of each block of residuals to the variance.
         freedom: Degrees of freedom of each block's scatter; infinite where it is known.
     """
     share = parts / max(float(np.sum(parts)), 1e-300)
@@ -277,10 +279,10 @@ def satterthwaite_freedom(parts: np.ndarray, freedom: np.ndarray) -> float:
 def find_interval_ends(
     rise: Callable[[float], float], center: float, error: float, ratio: float, freedom: float
 ) -> tuple[float, float]:
-    """Limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
+    """Return the limits of the 90 % interval, as z; infinite where the sum of squares never rises enough.
 
     Args:
-        rise: By how much the sum of squares is larger at a z.
+        rise: Function of z: increase of the sum of squares.
         center: z of the minimum.
         error: Standard error of z there; the first step is taken from it.
         ratio: V/C, variance of the parameter over what readings of unit scatter would give it.
@@ -297,10 +299,10 @@ def find_interval_ends(
 
 
 def _find_limit(above: Callable[[float], float], center: float, step: float) -> float:
-    """Where a function that is negative at the center first becomes positive, going by growing steps.
+    """Return where a function that is negative at the center first becomes positive, stepping outward by growing steps.
 
-    About a good minimum it is nearly straight. So the second step goes a little farther than a straight line would have to,
-    and no farther than the usual one. Where it is not a number short of there, the interval is the wider one.
+    About a regular minimum it is nearly linear, so the second step goes a little beyond the linear extrapolation, but no
+    farther than a usual step. Where it is NaN before the limit, the interval is the wider one.
     """
 
     def known(z: float) -> float:
@@ -332,16 +334,16 @@ def _find_limit(above: Callable[[float], float], center: float, step: float) -> 
 def find_crossing(
     above: Callable[[float], float], inside: float, outside: float, tolerance: float, close: float = 0.0
 ) -> float:
-    """Where a function goes through zero between two points at which it has either sign.
+    """Find the zero of a function between two points at which it has opposite signs.
 
-    By inverse interpolation through the last three points where that is safe, else halfway (Chandrupatla), but for the first
-    point, which is on the straight line; SciPy has it too, but takes a quarter of a second to load.
+    By inverse quadratic interpolation through the last three points where that is safe, else by bisection (Chandrupatla); the
+    first point is the linear interpolation. SciPy's version takes a quarter of a second to load.
 
     Args:
         above: The function.
         inside, outside: The points.
-        tolerance: How near a point has to be.
-        close: Size of the function that is as good as zero.
+        tolerance: Precision of the zero.
+        close: Size of the function that counts as zero.
     """
     (last, last_value), (other, other_value) = (outside, above(outside)), (inside, above(inside))
     part, least = last_value / (last_value - other_value), min(tolerance / 2 / abs(inside - outside), 0.5)
@@ -372,7 +374,5 @@ def find_crossing(
 
 
 def student_quantile(freedom: float) -> float:
-    """Student's t that the interval reaches to."""
-    from scipy.special import stdtrit
-
+    """Return the quantile of Student's t to which the interval reaches."""
     return float(stdtrit(freedom, (1 + PROBABILITY) / 2))

@@ -16,32 +16,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RELIABLE_K = 0.7  # Pareto k up to which importance weights can be trusted
-_NO_WEIGHT = 1e4  # so far below the largest a log weight is none at all
-_FLAT = 1e-9  # range of log ratios below which they say nothing, as those of a bound far off
-_MOST_STEPS = 30
-_FLOOR = 1e-12
-_GOOD_ENOUGH = 0.5  # Pareto k below which the weights have a finite variance, so that no step can gain much
+from bowdenfit.inference.diagnostics import array_stats
+
+RELIABLE_K = 0.7  # Pareto k up to which importance weights can be trusted (Vehtari and others 2024)
+_NO_WEIGHT = 1e4  # distance from the largest log weight at which a weight is zero
+_FLAT = 1e-9  # range of log ratios below which they are constant, as for a bound far off
+_MOST_STEPS = 30  # of moment matching
+_FLOOR = 1e-12  # least variance
+_GOOD_ENOUGH = 0.5  # Pareto k below which the weights have a finite variance, so that no further step gains much
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def reliable_k(n_draws: int) -> float:
-    """Pareto k up to which importance weights of so many draws can be trusted; section 3.2.4."""
+    """Return the Pareto k up to which importance weights of `n_draws` draws can be trusted; section 3.2.4."""
     return min(1 - 1 / np.log10(n_draws), RELIABLE_K) if n_draws > 10 else 0.0
 
 
 def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarray, float]:
-    """Smoothed log weights of sum 1, and Pareto k.
+    """Return smoothed log weights, whose exponentials sum to 1, and Pareto k.
 
-    Ratios that cannot be computed have no weight; those that are all alike have equal weights and k = 0. So much weight on a
-    handful of draws, or so many draws alike, that no Pareto distribution fits leaves equal weights and an infinite k.
+    Ratios that cannot be computed have no weight; equal ratios give equal weights and k = 0. If a handful of draws carry so
+    much weight, or so many draws are identical, that no Pareto distribution can be fitted, weights are equal and k is infinite.
 
     Args:
         log_ratio: Log importance ratio of every draw, up to a constant.
-        share: Effective draws a draw.
+        share: Effective draws per draw.
     """
-    from arviz_stats.base import array_stats
-
     usable, equal = np.isfinite(log_ratio), np.full(len(log_ratio), -np.log(len(log_ratio)))
     ratios = np.where(usable, log_ratio, np.max(log_ratio[usable], initial=0.0) - _NO_WEIGHT)
     if not np.ptp(ratios) > _FLAT:
@@ -49,7 +49,7 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
     try:
         with _raise_without_tail():
             # ArviZ's function takes what is left out, the log likelihood, and turns its sign itself.
-            log_weights, k = array_stats.psislw(-ratios, r_eff=share, axis=0)
+            log_weights, k = array_stats().psislw(-ratios, r_eff=share, axis=0)
     except (ValueError, UserWarning):
         return equal, float("inf")
     if not (np.isfinite(k) and np.all(np.isfinite(log_weights))):
@@ -58,12 +58,12 @@ def smooth_weights(log_ratio: np.ndarray, share: float = 1.0) -> tuple[np.ndarra
 
 
 def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: float) -> tuple[float, float, float]:
-    """Expected log density of one reading from weighted draws, its Pareto k, and its Monte Carlo standard error (3.2.3).
+    """Return the elpd of one reading from weighted draws, its Pareto k, and its Monte Carlo standard error (3.2.3).
 
     Args:
         log_ratio: Log importance ratio of every draw, up to a constant.
-        log_likelihood: Of the reading, at every draw.
-        share: Effective draws a draw.
+        log_likelihood: Log likelihood of the reading at every draw.
+        share: Effective draws per draw.
     """
     log_weights, k = smooth_weights(log_ratio, share)
     parts = log_weights + log_likelihood
@@ -74,29 +74,27 @@ def weighted_elpd(log_ratio: np.ndarray, log_likelihood: np.ndarray, share: floa
 
 
 def power_weights(part: np.ndarray, alpha: float) -> np.ndarray:
-    """Weights of draws for the density with a part of its logarithm times alpha, up to a factor.
+    """Return weights of draws for the density with one part of its logarithm multiplied by alpha, up to a factor.
 
-    They are as they come, not smoothed, where so many draws are alike, as walkers that stood still leave them, or so few that
-    there is no tail to fit a Pareto distribution to.
+    They are not smoothed where so many draws are identical, as those of walkers that stood still, or draws are so few, that no
+    Pareto distribution can be fitted to the tail.
 
     Args:
         part: That part at every draw, (chain, draw).
-        alpha: About 1.
+        alpha: The power, near 1.
     """
-    from arviz_stats.base import array_stats
-
     try:
         with _raise_without_tail():
-            return np.exp(array_stats.power_scale_lw(part, alpha, axis=(-2, -1)))
+            return np.exp(array_stats().power_scale_lw(part, alpha, axis=(-2, -1)))
     except (ValueError, UserWarning):
         return np.exp((alpha - 1) * part - np.max((alpha - 1) * part))
 
 
 @contextmanager
 def _raise_without_tail() -> Iterator[None]:
-    """ArviZ raises where all draws of a tail are alike, and warns where they are too few: an error too, for its caller.
+    """Make ArviZ raise instead of warn where a tail has too few different draws.
 
-    Where the lower quarter of a tail is alike it divides by zero; what is not finite then is looked at by the caller.
+    Where the lower quarter of a tail is constant ArviZ divides by zero; the caller checks for values that are not finite.
     """
     with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         warnings.simplefilter("error", UserWarning)
@@ -112,26 +110,26 @@ class Affine:
     center: np.ndarray
 
     def __call__(self, draws: np.ndarray) -> np.ndarray:
-        """Draws moved, one a row."""
+        """Return the draws moved, one a row."""
         return (draws - self.center) @ self.matrix.T + self.center + self.shift
 
     def back(self, draws: np.ndarray) -> np.ndarray:
-        """Draws moved back."""
+        """Return the draws moved back."""
         return np.linalg.solve(self.matrix, (draws - self.center - self.shift).T).T + self.center
 
     @property
     def log_volume(self) -> float:
-        """Log of how much larger a volume becomes."""
+        """Log of the factor on volumes."""
         return float(np.linalg.slogdet(self.matrix)[1])
 
 
 def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[float, float, float]:
-    """Expected log density of one reading left out, its Pareto k, and its Monte Carlo standard error.
+    """Return the elpd of one reading left out, its Pareto k, and its Monte Carlo standard error.
 
     Args:
         draws: Draws of the posterior with the reading, one a row.
         evaluate: Log posterior density with the reading, up to a constant, and log likelihood of the reading, at any draws.
-        share: Effective draws a draw.
+        share: Effective draws per draw.
 
     References:
         Paananen, Piironen, Buerkner and Vehtari 2021, "Implicitly adaptive importance sampling" (Statistics and Computing
@@ -147,7 +145,7 @@ def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[
 
 
 def find_best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate, share: float) -> Affine:
-    """The affine map with the least Pareto k that moments of the weighted draws lead to, step by step; see `match_moments`."""
+    """Return the affine map with the smallest Pareto k that moment matching reaches step by step; see `match_moments`."""
     size, center = draws.shape[1], draws.mean(axis=0)
     best = Affine(np.eye(size), np.zeros(size), center)
 
@@ -170,7 +168,7 @@ def find_best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate
 
 
 def _propose_maps(current: Affine, draws: np.ndarray, weights: np.ndarray) -> Iterator[Affine]:
-    """Maps onto the weighted mean; and the weighted standard deviations; and the weighted covariance."""
+    """Yield maps onto the weighted mean, then also the weighted standard deviations, then the weighted covariance."""
     moved = current(draws)
     mean = weights @ moved
     shift = mean - current.center

@@ -1,4 +1,4 @@
-"""Residuals of least squares, reading by reading and table by table, with what parameters and mountings can follow."""
+"""Residuals of least squares by groups of common scatter, after removing what parameters and mountings can follow."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -12,34 +12,34 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model
 
 _LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of readings is not known
-_SINGULAR = 1e-8
-_NOTHING_LEFT = 1e-300  # efficiency to which rounding takes absurd coefficients
-_LEAST_SCATTER = 1e-5  # in units of what is expected: readings that agree better were not measured
+_SINGULAR = 1e-8  # relative singular value, and size of a residual, that counts as zero
+_NOTHING_LEFT = 1e-300  # least efficiency, where rounding makes that of absurd coefficients zero
+_LEAST_SCATTER = 1e-5  # relative to the expected scatter; readings that scatter less were not measured
 
 
 @dataclass(frozen=True)
 class ResidualGroup:
-    """Readings that scatter alike.
+    """Readings with a common scatter.
 
     Args:
         table: Name of the readings.
         inside: Whether they are readings inside runs.
-        rows: Which of all residuals they are.
-        residuals: Standardized.
-        jacobian: Of the residuals.
-        of_runs: Columns that the effects of mountings follow.
-        unit: What a residual of 1 is in units of the reading.
-        reading: What was read, of which a departure is a share; a loss as a log ratio.
-        effect: What friction makes of that, where it is a part of what is read; a departure is as large as its share of this.
-        lever: How much of a reading a relative change of friction moves.
+        rows: Their rows among all residuals.
+        residuals: Standardized residuals.
+        jacobian: Jacobian of the residuals.
+        run_columns: Columns that the effects of mountings can follow.
+        unit: Size of a residual of 1 in units of the reading.
+        reading: The readings, to which a departure is relative; a loss as a log ratio.
+        effect: Part of the reading that is due to friction, where it is only a part; a departure is then relative to this.
+        lever: Change of a reading by a relative change of friction.
         used: Which of them are readings, not bounds.
-        group: Contact or the like that each belongs to; empty where all are of one kind.
-        at: Where they were taken, by axis label.
-        labels: Each in words; empty of readings inside runs.
-        count: How many independent ones there are.
-        extra: Sum of squares inside what was taken together.
-        freedom: Degrees of freedom that are left.
-        scatter: Standard deviation of the residuals; what they are divided by in `ResidualGroups`.
+        group: Contact or other group of each; empty where there are no groups.
+        at: Positions of the readings, by axis label.
+        labels: Label of each; empty for readings inside runs.
+        count: Number of independent readings.
+        extra: Sum of squares inside cells of readings that were averaged.
+        freedom: Remaining degrees of freedom.
+        scatter: Standard deviation of the residuals, by which `ResidualGroups` divides them.
     """
 
     table: str
@@ -62,7 +62,7 @@ class ResidualGroup:
     effect: np.ndarray | None = None
 
     def excess(self, selected: np.ndarray) -> float:
-        """How much more some of them read than the model says, over what is read [1]."""
+        """Return by how much selected readings exceed the model, relative to the readings [1]."""
         read = np.abs(self.reading[selected])
         total = np.sum(read) or len(read) * np.mean(np.abs(self.reading))  # where nothing is read there, of all of them
         return float(np.sum((self.unit * self.residuals)[selected]) / total)
@@ -73,9 +73,9 @@ class ResidualGroups:
     """All residuals, divided by the scatter of their table.
 
     Args:
-        residuals: Less what the parameters and the mountings can follow.
-        followed: Orthonormal columns of what they can.
-        readings: Those that can be tested.
+        residuals: Residuals minus what parameters and mountings can follow.
+        followed: Orthonormal columns that they can follow.
+        readings: Groups that can be tested.
     """
 
     residuals: np.ndarray
@@ -84,11 +84,11 @@ class ResidualGroups:
 
 
 def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups:
-    """Every residual of least squares in its place.
+    """Sort the residuals of least squares into groups of common scatter.
 
     Args:
         model: The model.
-        found: The minimum: residuals and expected readings by term, Jacobian, values.
+        solution: The minimum: residuals and expected readings by term, Jacobian, values.
     """
     values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
     values |= dict(zip((p.name for p in model.space.free), solution["values"], strict=True))
@@ -105,7 +105,7 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
 
 
 def _weigh_by_scatter(blocks: list[ResidualGroup]) -> ResidualGroups:
-    """Weighed by the scatter that the parameters leave, which needs the parameters' share of each residual first."""
+    """Divide the groups by their scatter, which needs the leverage of each residual first."""
     residuals, followed = _project_out(blocks)
     for i, block in enumerate(blocks):
         freedom = block.count - float(np.sum(followed[block.rows] ** 2))
@@ -123,7 +123,7 @@ def _weigh_by_scatter(blocks: list[ResidualGroup]) -> ResidualGroups:
 
 
 def _project_out(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals less what can be followed, and orthonormal columns of that."""
+    """Return residuals minus what can be followed, and orthonormal columns of that."""
     residuals = np.concatenate([block.residuals / block.scatter for block in blocks])
     n_runs = sum(block.run_columns.shape[1] for block in blocks)
     columns = np.zeros((len(residuals), blocks[0].jacobian.shape[1] + n_runs))
@@ -146,7 +146,7 @@ def _make_blocks(
     expected: np.ndarray,
     values: Mapping[str, float],
 ) -> Iterator[ResidualGroup]:
-    """Readings of a term that scatter alike: the first are told apart, further ones only where they are inside runs."""
+    """Yield the groups of a term: labelled readings first, then others, with positions only if they are inside runs."""
     first, *others = term.residual_blocks
     of_labels = _labelled_block(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
     effect = getattr(term, "friction_effect", None)
@@ -163,7 +163,7 @@ def _make_blocks(
 
 
 def _bare_block(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: float) -> ResidualGroup:
-    """Residuals that nothing is known of but their scatter."""
+    """Return residuals about which only their scatter is known."""
     n = len(residuals)
     nothing, none = np.zeros(n), np.zeros(n, dtype=bool)
     return ResidualGroup(
@@ -174,7 +174,7 @@ def _bare_block(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: 
 def _labelled_block(
     term: Term, places: Places | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
 ) -> ResidualGroup:
-    """The readings that results name, or whole runs."""
+    """Return the labelled readings, or whole runs."""
     n = len(residuals)
     bare = _bare_block(term, residuals, jacobian, float(np.count_nonzero(residuals)))
     observed = term.observed()
@@ -199,7 +199,7 @@ def _labelled_block(
 def _inside_run_block(
     term: Any, inside: InsideRuns, residuals: np.ndarray, jacobian: np.ndarray, values: Mapping[str, float]
 ) -> ResidualGroup:
-    """Readings inside runs, one by one: the residual of their cell, and how far they lie from it."""
+    """Return readings inside runs: each residual is that of its cell plus its deviation from the cell."""
     noise, root = float(values[term.reading_noise]), np.sqrt(inside.weight)
     share = root / np.sqrt(np.maximum(term.data["weight"][inside.cell], 1e-300))
     runs = inside.run[:, None] == np.unique(inside.run)[None, :]

@@ -14,8 +14,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from multiprocessing import connection, parent_process
 from threading import Lock
 from typing import Any
+
+from platformdirs import user_cache_dir
+from threadpoolctl import threadpool_limits
 
 from bowdenfit.errors import MemoryShortageError
 
@@ -37,8 +41,6 @@ def available_cores() -> int:
 
 def start_worker() -> None:
     """Prepare a worker process: it ignores interrupts, and ends when the process that started it ends, however that ends."""
-    from multiprocessing import connection, parent_process
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = parent_process()
@@ -60,8 +62,6 @@ def keep_compiled_programs() -> None:
     program has set by `jax.config`.
     """
     import jax
-    from platformdirs import user_cache_dir
-
     settings: Any = jax.config
     if settings.jax_compilation_cache_dir or not settings.jax_enable_compilation_cache:
         return
@@ -113,8 +113,6 @@ def linear_algebra_in_one_thread() -> Iterator[None]:
         yield
         return
     import scipy.linalg.cython_lapack  # noqa: F401  (what compiled programs call, which has to be there to be told)
-    from threadpoolctl import threadpool_limits
-
     with _changing:
         _limits.append(_limits[0] if _limits else threadpool_limits(1, user_api="blas"))
     try:

@@ -1,4 +1,4 @@
-"""Do two samplers of one density agree? Every summary of the draws, against what Monte Carlo error allows."""
+"""Do two samplers of one density agree? Differences of their summaries, compared with Monte Carlo errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,22 +7,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-FALSE_ALARM = 0.001  # probability that two samplers that are right are said to disagree
+from bowdenfit.inference.diagnostics import array_stats
+
+FALSE_ALARM = 0.001  # probability that two correct samplers are reported to disagree
 SUMMARIES = ("mean", "sd", "5 % quantile", "95 % quantile")
-NOTICEABLE = 0.1  # sd; smaller differences change no answer
+NOTICEABLE = 0.1  # standard deviations; smaller differences do not change an answer
 SAMPLER_NAMES = {"emcee": "emcee", "nuts": "NUTS"}
-MANY_PARAMETERS = 25  # above which ensembles of walkers mix slowly
+MANY_PARAMETERS = 25  # parameters above which ensembles of walkers mix slowly
 
 
 @dataclass(frozen=True)
 class SamplerDifference:
-    """Between the draws of two samplers, of one summary of one quantity.
+    """Difference between two samplers in one summary of one quantity.
 
     Args:
         quantity: A parameter (in z), or the optimal length or efficiency.
         summary: One of `SUMMARIES`.
-        sds: The second sampler's less the first's, in standard deviations of the quantity.
-        error: Monte Carlo standard error of that, in the same unit.
+        sds: The second sampler's summary minus the first's, in standard deviations of the quantity.
+        error: Monte Carlo standard error of the difference, in the same unit.
     """
 
     quantity: str
@@ -42,13 +44,13 @@ class SamplerDifference:
 
 @dataclass(frozen=True)
 class SamplerAgreement:
-    """Of two samplers on one density.
+    """Agreement of two samplers on one density.
 
     Args:
         first: The sampler whose draws are the result.
-        second: The other.
-        differences: Of every summary of every quantity.
-        limit: Monte Carlo standard errors that chance exceeds anywhere among them with probability `FALSE_ALARM`.
+        second: The other sampler.
+        differences: Differences of every summary of every quantity.
+        limit: Monte Carlo standard errors that correct samplers exceed anywhere with probability `FALSE_ALARM`.
     """
 
     first: str
@@ -64,27 +66,27 @@ class SamplerAgreement:
 
     @property
     def samplers(self) -> tuple[str, str]:
-        """Names of both."""
+        """Names of both samplers."""
         return self.first, self.second
 
     @property
     def significant(self) -> tuple[SamplerDifference, ...]:
-        """Differences that chance does not explain and that are large enough to matter, the largest first."""
+        """Differences that are significant and large enough to matter, the largest first."""
         seen = [d for d in self.differences if d.errors > self.limit and abs(d.sds) > NOTICEABLE]
         return tuple(sorted(seen, key=lambda d: -abs(d.sds)))
 
     @property
     def largest(self) -> SamplerDifference:
-        """The largest difference in standard deviations, whether by chance or not."""
+        """The largest difference in standard deviations, significant or not."""
         return max(self.differences, key=lambda d: abs(d.sds))
 
     @property
     def agree(self) -> bool:
-        """Whether no difference is beyond chance and noticeable."""
+        """Whether no difference is both significant and noticeable."""
         return not self.significant
 
     def sentence(self) -> str:
-        """What was found, for people."""
+        """Say whether the samplers agree, for users."""
         one, two, most = SAMPLER_NAMES[self.first], SAMPLER_NAMES[self.second], self.largest
         if self.agree:
             sharper = " A larger sampler.target_ess compares more sharply." if abs(most.sds) > NOTICEABLE else ""
@@ -107,12 +109,12 @@ class SamplerAgreement:
 
 @dataclass(frozen=True)
 class SamplerDraws:
-    """What one sampler drew.
+    """Draws of one sampler.
 
     Args:
-        sampler: Its name.
-        draws: By quantity, (walker, draw), ordered by ensemble.
-        n_ensembles: Number of independent ensembles; chains are an ensemble each.
+        sampler: Name of the sampler.
+        draws: Draws by quantity, (walker, draw), ordered by ensemble.
+        n_ensembles: Number of independent ensembles; each chain counts as one.
     """
 
     sampler: str
@@ -120,10 +122,10 @@ class SamplerDraws:
     n_ensembles: int
 
     def error_scale(self) -> float:
-        """By how much Monte Carlo errors are to be multiplied, 1 at the least.
+        """Return the factor on Monte Carlo errors that accounts for dependent walkers, at least 1.
 
-        Walkers of one ensemble move by each other's positions, so errors that take them for independent are too small; how
-        far ensembles lie apart says by how much. All quantities and summaries together tell, four ensembles of one do not.
+        Walkers of one ensemble move by each other's positions, so errors that treat them as independent are too small. The
+        spread between ensembles shows by how much, pooled over all quantities and summaries, because four ensembles are few.
         """
         ratios = []
         for draws in self.draws.values():
@@ -136,10 +138,10 @@ class SamplerDraws:
 
 
 def compare_samplers(first: SamplerDraws, second: SamplerDraws) -> SamplerAgreement:
-    """Whether two samplers, the first of which drew the result, agree on every quantity.
+    """Compare two samplers on every quantity; the first of them drew the result.
 
-    The limit is Bonferroni's over all comparisons, so that two samplers that are right are said to disagree once in a
-    thousand comparisons of fits at the most.
+    The limit is Bonferroni's over all comparisons, so two correct samplers are reported to disagree in at most one of a
+    thousand fits.
     """
     scales = first.error_scale(), second.error_scale()
     differences = tuple(d for name in first.draws for d in _differences(name, first, second, scales))
@@ -160,14 +162,12 @@ def _differences(name: str, first: SamplerDraws, second: SamplerDraws, scales: t
 
 
 def _summarize(draws: np.ndarray) -> list[float]:
-    """Of `SUMMARIES`."""
+    """Return the `SUMMARIES` of draws."""
     return [float(np.mean(draws)), float(np.std(draws)), *map(float, np.quantile(draws, (0.05, 0.95)))]
 
 
 def _standard_errors(draws: np.ndarray) -> list[float]:
-    """Monte Carlo standard errors of `SUMMARIES`, if every walker is independent of the others."""
-    from arviz_stats.base import array_stats
-
+    """Return Monte Carlo standard errors of `SUMMARIES`, treating walkers as independent."""
     if np.ptp(draws) == 0:
         return [0.0] * len(SUMMARIES)
     statistics: tuple[dict[str, Any], ...] = (
@@ -175,11 +175,11 @@ def _standard_errors(draws: np.ndarray) -> list[float]:
         {"method": "sd"},
         *({"method": "quantile", "prob": p} for p in (0.05, 0.95)),
     )
-    return [float(array_stats.mcse(draws, chain_axis=0, draw_axis=1, **options)) for options in statistics]
+    return [float(array_stats().mcse(draws, chain_axis=0, draw_axis=1, **options)) for options in statistics]
 
 
 def recommend_sampler(sampler: str, n_parameters: int, short: bool) -> str:
-    """A sentence that recommends the other sampler where emcee does badly, or is likely to; empty otherwise."""
+    """Recommend the other sampler where emcee has not converged, or probably will not; empty otherwise."""
     if sampler != "emcee":
         return ""
     if short:

@@ -1,4 +1,4 @@
-"""Single numbers through a prior, by one program for all priors of a kind; op by op each would be several."""
+"""Priors of single numbers, by one compiled program for all priors of a kind."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -12,21 +12,21 @@ import numpy as np
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.parameters.priors import Prior
 
-_FARTHEST = 6.0
+_FARTHEST = 6.0  # z
 
 
 def value_at(prior: Prior, z: float) -> float:
-    """`Prior.constrain` of one number."""
+    """Return the parameter value at z: `Prior.constrain` of one number."""
     return _apply(prior, "constrain", z)
 
 
 def z_at(prior: Prior, value: float) -> float:
-    """`Prior.unconstrain` of one number."""
+    """Return z at a parameter value: `Prior.unconstrain` of one number."""
     return _apply(prior, "unconstrain", value)
 
 
 def clipped_z(prior: Prior, value: float) -> float:
-    """The same, no farther out than a solve may start from or a noise scale be pinned at."""
+    """Return z at a parameter value, clipped to where a solve may start or a noise scale may be pinned."""
     return float(np.clip(z_at(prior, value), -_FARTHEST, _FARTHEST))
 
 

@@ -1,9 +1,8 @@
-"""The least-squares solver: Levenberg-Marquardt by optimistix, with a bolder first step where that fails, and a last polish.
+"""The least-squares solver: Levenberg-Marquardt by optimistix, with a bolder first step where that fails, and a final polish.
 
-It sees the residuals and their Jacobian by automatic differentiation. The polish takes undamped Gauss-Newton steps while what
-is left of the gradient shrinks. It buys the last digits; and where the weights of readings follow the parameters without being
-differentiated, it finds the point at which the weighted gradient is zero, which a method that only compares sums of squares
-can miss.
+Jacobians come from automatic differentiation. The polish takes undamped Gauss-Newton steps while the remaining gradient
+shrinks. It yields the last digits; and where the weights of readings follow the parameters without being differentiated, it
+finds the point at which the weighted gradient is zero, which a method that only compares sums of squares can miss.
 
 References:
     Bates and Watts, A relative offset orthogonality convergence criterion for nonlinear least squares, Technometrics 23
@@ -15,28 +14,30 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+import jax
 import numpy as np
+
+from bowdenfit.inference.levenberg_marquardt import compile_stepper
 
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 _MOST_POLISHING = 30
-_STRAIGHT = (
-    0.3  # part of a step's effect by which residuals may depart from their tangent plane; at a kink they do by more
-)
-_SMOOTH = 1e-3  # part of the residuals along the tangent plane above which a point is no smooth minimum
-_SHRINKS = 0.8  # factor by which each step of the polish must shorten what is left of the gradient
-_SINGULAR = 1e-13  # of scaled singular values; a direction below it takes no step
-_RADIUS, _BOLD_RADIUS = 0.3, 100.0  # of the first step, as part of the length of the scaled parameters
+# Deviation of residuals from their tangent plane, relative to a step's effect, up to which it is polished; larger at a kink.
+_STRAIGHT = 0.3
+_SMOOTH = 1e-3  # share of the residuals along the tangent plane above which a point is not a smooth minimum
+_SHRINKS = 0.8  # factor by which each step of the polish must reduce the remaining step
+_SINGULAR = 1e-13  # relative singular value below which a direction takes no step
+_RADIUS, _BOLD_RADIUS = 0.3, 100.0  # of the first step, relative to the norm of the scaled parameters
 
 
 class Precision(NamedTuple):
-    """Where the solver ends.
+    """Stopping criteria of the solver.
 
     Args:
-        change: Relative change of parameters and of the sum of squares that is none.
-        gradient: Part of the residuals along the tangent plane that is none; its square is what the sum of squares may yet fall
-            by.
-        evaluations: After how many it gives up.
+        change: Relative change of parameters and of the sum of squares that counts as none.
+        gradient: Share of the residuals along the tangent plane that counts as none; its square bounds the relative decrease
+            that is left.
+        evaluations: Evaluations after which it gives up.
     """
 
     change: float
@@ -54,7 +55,7 @@ ROUGH = Precision(1e-5, 1e-3, 150)
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where the solver stopped: parameters, residuals, their derivatives, and whether it is a minimum."""
+    """Where the solver stopped: parameters, residuals, their Jacobian, and whether it is a minimum."""
 
     x: np.ndarray
     residuals: np.ndarray
@@ -68,17 +69,17 @@ class Minimum:
 
     @cached_property
     def fall(self) -> float:
-        """By how much the sum of squares would yet fall if residuals were straight: nothing at a minimum, but at kinks."""
+        """Decrease of the sum of squares that the tangent plane still predicts: 0 at a minimum, positive at kinks."""
         return _remaining_step(self)[1] ** 2 if np.all(np.isfinite(self.residuals)) else float("inf")
 
 
 def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECISE) -> Minimum:
-    """Least squares from a start.
+    """Minimize a sum of squares from a start.
 
     Args:
-        evaluate: Residuals, at least as many as parameters, and their Jacobian.
+        evaluate: Function that returns residuals, at least as many as parameters, and their Jacobian.
         start: Parameters to start from.
-        precision: Of the sum of squares.
+        precision: Stopping criteria.
     """
     first = Minimum(start, *evaluate(start), not len(start))
     if not len(start) or not np.all(np.isfinite(first.residuals)):
@@ -95,17 +96,13 @@ def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECI
 
 
 def compile_solver(rows: int, columns: int) -> None:
-    """Compile what solves of a shape need, in a thread beside something else; the first of them does it otherwise."""
-    import jax
-
-    from bowdenfit.inference.levenberg_marquardt import compile_stepper
-
+    """Compile the solver for a shape ahead of its first use, in another thread."""
     with jax.enable_x64(True):  # the setting is each thread's own
         compile_stepper(rows, columns)
 
 
 def orthogonalize(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Q and the inverse of R of a Jacobian's QR decomposition: errors of readings e move the parameters by R^-1 Q^T e.
+    """Return Q and the inverse of R of a Jacobian's QR decomposition: errors e of readings move parameters by R^-1 Q^T e.
 
     The normal equations, whose condition number is the square, are never formed.
 
@@ -118,16 +115,14 @@ def orthogonalize(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gauss_newton_step(jacobian: np.ndarray, residuals: np.ndarray) -> np.ndarray:
-    """The undamped step: to the minimum where residuals are linear, and none in a direction that they do not tell."""
+    """Return the undamped step to the minimum of the linearized problem; 0 in undetermined directions."""
     size = np.linalg.norm(jacobian, axis=0)
     size = np.where(size > 0, size, np.inf)
     return -np.linalg.lstsq(jacobian / size, residuals, _SINGULAR)[0] / size
 
 
 def _descend(evaluate: Evaluate, at: Minimum, precision: Precision, radius: float) -> Minimum:
-    """Where Levenberg-Marquardt from a point ends."""
-    from bowdenfit.inference.levenberg_marquardt import compile_stepper
-
+    """Run Levenberg-Marquardt from a point; return where it ends."""
     settings = precision.change, precision.gradient, radius
     advance, state = compile_stepper(*at.jacobian.shape)
     best, x = replace(at, succeeded=False), at.x
@@ -142,7 +137,7 @@ def _descend(evaluate: Evaluate, at: Minimum, precision: Precision, radius: floa
 
 
 def _polish(evaluate: Evaluate, minimum: Minimum, precision: Precision) -> Minimum:
-    """Gauss-Newton steps from where a method stopped, as long as each shortens what is left of the gradient."""
+    """Take Gauss-Newton steps as long as each shortens the remaining step."""
     step, left = _remaining_step(minimum)
     for _ in range(_MOST_POLISHING):
         flat = left <= precision.gradient * np.linalg.norm(minimum.residuals)
@@ -161,7 +156,7 @@ def _polish(evaluate: Evaluate, minimum: Minimum, precision: Precision) -> Minim
 
 
 def _remaining_step(minimum: Minimum) -> tuple[np.ndarray, float]:
-    """The undamped step, and the length of the residuals along the tangent plane, which it would take off."""
+    """Return the undamped step, and the length of the residuals along the tangent plane."""
     jacobian = np.where(np.isfinite(minimum.jacobian), minimum.jacobian, 0.0)
     step = gauss_newton_step(jacobian, minimum.residuals)
     return step, float(np.linalg.norm(jacobian @ step))

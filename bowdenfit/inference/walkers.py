@@ -29,12 +29,12 @@ from bowdenfit.inference.moves import Moves, RandomNumbers, count_move_numbers, 
 
 
 class SweepChoices(NamedTuple):
-    """What is drawn at random for some steps.
+    """Random choices for some steps.
 
     Args:
-        frame: Number of the coordinates that walkers move in.
+        frame: Number of the coordinates in which walkers move.
         kinds: Number of the move of each step.
-        bits: (step, half, walker, `count_walker_numbers`), as unsigned integers.
+        bits: Random bits, (step, half, walker, `count_walker_numbers`), as unsigned integers.
     """
 
     frame: Array | np.ndarray
@@ -43,12 +43,12 @@ class SweepChoices(NamedTuple):
 
 
 class Walkers(NamedTuple):
-    """Walkers on their way.
+    """State of walkers during a sweep.
 
     Args:
-        w, z: Where they are in the coordinates that they move in, and in z, (walker, parameter).
-        value_in_w, value: Log densities there, in either.
-        accepted: How many of their proposals were accepted.
+        w, z: Positions in the coordinates of the sweep, and in z, (walker, parameter).
+        value_in_w, value: Log densities in w and in z.
+        accepted: Number of accepted proposals.
     """
 
     w: Array
@@ -59,22 +59,22 @@ class Walkers(NamedTuple):
 
 
 def count_walker_numbers(size: int) -> int:
-    """How many uniform numbers a step of a walker of so many parameters needs."""
+    """Return how many uniform numbers a step of a walker of `size` parameters needs."""
     return 1 + count_move_numbers(size)
 
 
 def make_walker_sweep(
     log_density: Callable[[Array, Any], Array], moves: Moves, frames: CoordinateMaps
 ) -> Callable[..., Any]:
-    """Steps of all walkers of an ensemble, of what is `SweepChoices`, z (walker, parameter), and data.
+    """Return a function of `SweepChoices`, z (walker, parameter) and data that moves all walkers of an ensemble.
 
-    They give z and log densities after them, and how many proposals of every walker were accepted. The halves of the ensemble
-    move in turns, so that walkers should be put in another order from one sweep to the next.
+    It returns z, log densities, and the number of accepted proposals of every walker. The halves of the ensemble move in turns,
+    so walkers should be shuffled from one sweep to the next.
 
     Args:
-        log_density: Of one z and data.
-        moves: What the walkers do.
-        frames: In which coordinates.
+        log_density: Log density of one z and data.
+        moves: Moves of the walkers, with their shares.
+        frames: Coordinates, with their shares.
     """
     proposals = [move for move, _ in moves]
 
@@ -108,28 +108,28 @@ def make_walker_sweep(
 
 
 def _apply_map(frame: CoordinateMap, is_z: bool, points: Array, data: Any) -> tuple[Array, Array, Array]:
-    """W, z and log volume of walkers, of either of the first two."""
+    """Return w, z and the log volume of walkers, given either of the first two."""
     return frame(points, jnp.asarray(is_z), data)
 
 
 def to_uniform(bits: Array | np.ndarray) -> Array:
-    """Numbers between 0 and 1, neither of them, of unsigned integers."""
+    """Return numbers strictly between 0 and 1 from unsigned integers."""
     return (jnp.asarray(bits) + 0.5) / 2.0**32
 
 
 class MoveShares(NamedTuple):
-    """How often what is done.
+    """How often each move and each coordinate system is used.
 
     Args:
         moves: Share of each.
-        frames: Share of each of the coordinates.
+        frames: Share of each coordinate system.
     """
 
     moves: tuple[float, ...]
     frames: tuple[float, ...]
 
     def choose(self, random: np.random.RandomState, shape: tuple[int, int]) -> SweepChoices:
-        """What is drawn at random for a sweep of walkers, (walker, parameter)."""
+        """Draw the random choices for a sweep of walkers of a shape, (walker, parameter)."""
         walkers, size = shape
         return SweepChoices(
             np.asarray(random.choice(len(self.frames), p=self.frames), dtype=np.int32),
@@ -139,12 +139,12 @@ class MoveShares(NamedTuple):
 
 
 class WalkerPrograms(NamedTuple):
-    """What walkers of an ensemble run.
+    """Compiled programs of an ensemble's walkers.
 
     Args:
-        sweep: `walker_sweep` of `THIN` steps.
-        shares: Of its moves and coordinates.
-        later: What walkers run that have not settled in the usual time, compiled then; None where that is the same.
+        sweep: Function of `make_walker_sweep` for `THIN` steps.
+        shares: Shares of its moves and coordinates.
+        later: Compiles the programs of walkers that have not converged in the usual time; None if they are the same.
     """
 
     sweep: Callable[..., Any]
@@ -155,15 +155,16 @@ class WalkerPrograms(NamedTuple):
 def compile_walkers(
     posterior: LogDensity, settings: SamplerSettings, moves: Moves | None = None, beside: Executor | None = None
 ) -> WalkerPrograms:
-    """The programs of one posterior.
+    """Compile the walkers of one posterior.
 
-    Where its ridge is wide, walkers do without it at first, because it takes half of the time to compile and to run: loops,
-    benches and recordings settle in as many steps. What has not settled in the usual time has it, whatever the reason.
+    Where the ridge of friction coefficients is wide, walkers first move without its coordinates, which take half of the time to
+    compile and to run: loops, benches and recordings converge in as many steps. Walkers that have not converged in the usual
+    time then use them.
 
     Args:
-        posterior: The posterior; what is compiled serves others with data of the same shapes.
-        settings: How many walkers.
-        moves: What they do, in z alone; `default_moves`, in all coordinates, if omitted.
+        posterior: The posterior; the programs serve other data of the same shapes.
+        settings: Sampler settings, for the number of walkers.
+        moves: Moves, in z alone; `default_moves`, in all coordinates, if omitted.
         beside: See `compile_program`.
     """
     space = posterior.model.space
@@ -192,13 +193,13 @@ def compile_density_walkers(
     moves: Moves | None = None,
     beside: Executor | None = None,
 ) -> WalkerPrograms:
-    """The programs of any density.
+    """Compile the walkers of any density.
 
     Args:
-        log_density: Of one z and data.
-        data: Data of the shapes that it is compiled for.
+        log_density: Log density of one z and data.
+        data: Data of the shapes for which the programs are compiled.
         size: Number of parameters.
-        settings: How many walkers.
+        settings: Sampler settings, for the number of walkers.
         frames: The coordinates.
         moves: `default_moves` if omitted.
         beside: See `compile_program`.

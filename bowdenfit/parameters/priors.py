@@ -15,7 +15,7 @@ from jax.scipy.special import erf, erfc, erfinv, ndtr, ndtri
 from jax.scipy.stats import norm
 from jaxtyping import Float
 
-_NEAR_ZERO = 1e-4  # below this quantiles are better computed from the first terms of a series
+_NEAR_ZERO = 1e-4  # step below which quantiles are computed from their series
 _FARTHEST = 20.0  # z; the half-Cauchy's quantile there is 1e88 of its scale
 
 Numbers: TypeAlias = Array | np.ndarray
@@ -24,31 +24,31 @@ Real: TypeAlias = float | Float[Numbers, "*any"]
 
 @runtime_checkable
 class Prior(Protocol):
-    """What the parameter space needs of a prior, and those who ask what it does."""
+    """Interface of a prior."""
 
     allowed_ends: ClassVar[tuple[bool, bool]]
     """Whether its density goes on undiminished to the lower and to the upper end of its range."""
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Quantile of Phi(z): from the standard normal to the parameter."""
+        """Return the parameter at z: its quantile of Phi(z)."""
         ...
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Inverse of `constrain`."""
+        """Return z at a parameter value: the inverse of `constrain`."""
         ...
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """The prior as people read it.
+        """Return the prior as users read it.
 
         Args:
-            unit: Unit in which it is said; empty or "1" where there is none.
-            scale: Number said over internal value.
-            digits: Significant digits of what has a unit.
+            unit: Unit in which it is shown; empty or "1" where there is none.
+            scale: Shown value over internal value.
+            digits: Significant digits of numbers with a unit.
         """
         ...
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
-        """Logarithm of the density with the scale times a factor over its own, up to a constant; 0 without a scale."""
+        """Return the log ratio of the density with its scale times a factor to its own, up to a constant; 0 without a scale."""
         ...
 
 
@@ -61,15 +61,15 @@ class Normal:
     allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Mean + sd z"""
+        """Return mean + sd z."""
         return self.mean + self.sd * z
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """(value - mean) / sd"""
+        """Return (value - mean) / sd."""
         return (value - self.mean) / self.sd
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """Normal(mean, sd) unit"""
+        """Return "Normal(mean, sd) unit"."""
         return f"Normal({_number(self.mean, scale, digits)}, {_number(self.sd, scale, digits)}){_suffix(unit)}"
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
@@ -86,15 +86,15 @@ class LogNormal:
     allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Median exp(log_sd z)"""
+        """Return median exp(log_sd z)."""
         return self.median * jnp.exp(self.log_sd * z)
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """log(value / median) / log_sd"""
+        """Return log(value / median) / log_sd."""
         return jnp.log(value / self.median) / self.log_sd
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """LogNormal(median unit, log_sd)"""
+        """Return "LogNormal(median unit, log_sd)"."""
         return f"LogNormal({_number(self.median, scale, digits)}{_suffix(unit)}, {_number(self.log_sd)})"
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
@@ -104,13 +104,13 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class HalfNormal:
-    """HalfNormal(sd): a scale, zero allowed and small values not discouraged."""
+    """HalfNormal(sd): a scale that may be zero."""
 
     sd: Real
     allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Upper half of a normal from its nearer end, by one error function."""
+        """Return the quantile, computed from the nearer tail by one error function."""
         is_low = z < 0
         tail = erfc(jnp.where(is_low, -z, z) * (0.5 * np.sqrt(2.0))) / 2  # Phi(-|z|)
         low = np.sqrt(2.0) * erfinv(jnp.where(is_low, tail, 0.5))
@@ -118,13 +118,13 @@ class HalfNormal:
         return self.sd * jnp.where(is_low, low, high)
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Standard normal quantile of 2 Phi(value / sd) - 1."""
+        """Return the standard normal quantile of 2 Phi(value / sd) - 1."""
         x = value / self.sd
         tail = 2 * ndtr(-x)
         return jnp.where(tail < 0.5, -ndtri(jnp.minimum(tail, 0.5)), ndtri(erf(x / jnp.sqrt(2.0))))
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """HalfNormal(sd unit)"""
+        """Return "HalfNormal(sd unit)"."""
         return f"HalfNormal({_number(self.sd, scale, digits)}{_suffix(unit)})"
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
@@ -134,16 +134,16 @@ class HalfNormal:
 
 @dataclass(frozen=True)
 class HalfCauchy:
-    r"""HalfCauchy(scale) to a power: a scale of which little more than its size is known.
+    r"""HalfCauchy(scale) to a power: a scale of which little more than its order of magnitude is known.
 
     .. math:: x = \left(s \tan\left(\tfrac\pi2 \Phi(z)\right)\right)^q
 
     On the logarithm it is symmetric about its median: nine tenths of x lie between s/12.7 and 12.7 s (q = 1), and its tails
-    are so heavy that readings which want another size get it. Zero is allowed.
+    are so heavy that the readings can override it. Zero is allowed.
 
     Args:
         scale: s, the median where q = 1.
-        power: q; 2 of a quantity whose root is half-Cauchy.
+        power: q; 2 for a quantity whose root is half-Cauchy.
 
     References:
         Gelman, Prior distributions for variance parameters in hierarchical models, Bayesian Analysis 1 (2006), 515.
@@ -154,19 +154,19 @@ class HalfCauchy:
     allowed_ends: ClassVar = True, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Quantile of the half-Cauchy from the nearer tail; beyond z = 20, where its derivative would overflow, it stays."""
+        """Return the quantile, computed from the nearer tail; constant beyond z = 20, where its derivative would overflow."""
         below, above = _split(jnp.minimum(z, _FARTHEST))
         ratio = jnp.where(z < 0, jnp.tan(jnp.pi / 2 * ndtr(below)), 1 / jnp.tan(jnp.pi / 2 * ndtr(-above)))
         return (self.scale * ratio) ** self.power
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Standard normal quantile of the half-Cauchy distribution function."""
+        """Return the standard normal quantile of the half-Cauchy distribution function."""
         root = value ** (1 / self.power)
         lower, upper = 2 / jnp.pi * jnp.arctan2(root, self.scale), 2 / jnp.pi * jnp.arctan2(self.scale, root)
         return jnp.where(root < self.scale, ndtri(lower), -ndtri(upper))
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """HalfCauchy(scale unit), with its power where that is not 1"""
+        """Return "HalfCauchy(scale unit)", with its power where that is not 1."""
         power = "" if self.power == 1 else f"^{float(self.power):g}"
         return f"HalfCauchy({_number(self.scale, scale, digits)}{_suffix(unit)}){power}"
 
@@ -185,17 +185,17 @@ class Uniform:
     allowed_ends: ClassVar = True, True
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Low + (high - low) Phi(z), from the nearer end."""
+        """Return low + (high - low) Phi(z), computed from the nearer end."""
         width = self.high - self.low
         return jnp.where(z < 0, self.low + width * ndtr(z), self.high - width * ndtr(-z))
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Standard normal quantile of the fraction of the range."""
+        """Return the standard normal quantile of the fraction of the range."""
         fraction = (value - self.low) / (self.high - self.low)
         return jnp.where(fraction < 0.5, ndtri(fraction), -ndtri(1 - fraction))
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """Uniform(low, high) unit"""
+        """Return "Uniform(low, high) unit"."""
         return f"Uniform({_number(self.low, scale, digits)}, {_number(self.high, scale, digits)}){_suffix(unit)}"
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
@@ -206,14 +206,14 @@ class Uniform:
 
 @dataclass(frozen=True)
 class TruncatedNormal:
-    """Normal(mean, sd) cut off at 0: a coefficient measured separately, value and standard deviation."""
+    """Normal(mean, sd) truncated at 0: a coefficient measured separately, with its standard deviation."""
 
     mean: Real
     sd: Real
     allowed_ends: ClassVar = False, False
 
     def constrain(self, z: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Quantile of the truncated normal, from the nearer tail; next to 0, where digits cancel, its series."""
+        """Return the quantile, computed from the nearer tail; next to 0, where digits cancel, from its series."""
         ratio = self.mean / self.sd
         below, above = _split(z)
         per_density = ndtr(ratio) * jnp.exp(jnp.minimum(-norm.logpdf(ratio), 700.0))  # inf would spoil derivatives
@@ -226,7 +226,7 @@ class TruncatedNormal:
         return self.sd * jnp.where(z < 0, jnp.where(near, series, low), high)
 
     def unconstrain(self, value: Float[Numbers, "*any"]) -> Float[Numbers, "*any"]:
-        """Standard normal quantile of the truncated distribution function."""
+        """Return the standard normal quantile of the truncated distribution function."""
         ratio, x = self.mean / self.sd, value / self.sd
         above = ndtr(ratio)
         upper = ndtr(ratio - x) / above
@@ -235,7 +235,7 @@ class TruncatedNormal:
         return jnp.where(upper < 0.5, -ndtri(jnp.minimum(upper, 0.5)), ndtri(jnp.minimum(lower, 0.5)))
 
     def text(self, unit: str = "", scale: float = 1.0, digits: int = 6) -> str:
-        """Normal(mean, sd) unit, cut off at 0"""
+        """Return "Normal(mean, sd) unit, cut off at 0"."""
         return f"{Normal(self.mean, self.sd).text(unit, scale, digits)}, cut off at 0"
 
     def widening(self, value: np.ndarray, factor: float) -> np.ndarray:
@@ -244,7 +244,7 @@ class TruncatedNormal:
 
 
 def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Numbers, "*any"]]:
-    """Z for the lower and for the upper branch of a quantile, each harmless where the other branch is taken.
+    """Return z for the lower and the upper branch of a quantile, each harmless where the other branch is taken.
 
     (A plain minimum or maximum would halve the derivative at z = 0, where least squares starts.)
     """
@@ -252,12 +252,12 @@ def _split(z: Float[Numbers, "*any"]) -> tuple[Float[Numbers, "*any"], Float[Num
 
 
 def _widening(deviation: np.ndarray, factor: float) -> np.ndarray:
-    """Of a normal, from deviations in its standard deviations."""
+    """Return the log ratio for a normal, given deviations in its standard deviations."""
     return deviation**2 * (1 - factor**-2) / 2
 
 
 def _number(value: Real, scale: float = 1.0, digits: int = 6) -> str:
-    """A hyperparameter in the unit in which it is said."""
+    """Return a hyperparameter in its shown unit."""
     return f"{float(value) * scale:.{digits}g}"
 
 

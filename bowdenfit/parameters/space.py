@@ -19,12 +19,12 @@ Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor"
 
 @dataclass(frozen=True)
 class Scale:
-    """Size of what was measured: whatever its unit, and however large a bench is, priors stand to it in one proportion.
+    """Size of the measurements to which default priors are proportional, whatever the unit or the size of the bench.
 
     Args:
         value: Size in internal units, above 0.
         name: What it is, such as "median load".
-        unit: Unit in which it is said.
+        unit: Unit in which it is shown.
     """
 
     value: float
@@ -32,32 +32,32 @@ class Scale:
     unit: str
 
     def __str__(self) -> str:
-        """Such as "the median load, 39.1 N"."""
+        """Return a phrase such as "the median load, 39.1 N"."""
         return f"the {self.name}, {significant(self.value)} {self.unit}"
 
     def describe_share(self, part: float) -> str:
-        """Such as "5 % of the median load, 39.1 N"."""
+        """Return a phrase such as "5 % of the median load, 39.1 N"."""
         return f"{significant(100 * part)} % of {self}"
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown of the model, declared once for fit, tables, figures and report.
+    """One parameter of the model, declared once for fit, tables, figures and report.
 
     Args:
         name: Unique machine-readable name.
-        symbol: The same for figures, in matplotlib's math notation.
+        symbol: Symbol for figures, in matplotlib's math notation.
         meaning: One phrase for tables and reports.
-        role: What it belongs to; decides how it is treated in least squares and where it is shown.
+        role: Group that it belongs to; decides how least squares treats it and where it is shown.
         prior: Prior in internal units.
         unit: Unit in which it is shown ("1" where there is none).
         shown_scale: Shown value over internal value.
         fixed: Value [internal unit] where it is held fixed, else None.
-        prior_words: What is said of the prior instead of what it says itself in the shown unit.
-        scaled_by: What of the measurements a default prior is in proportion to; empty where it is to nothing.
-        starts: z from which the largest density is looked for; more than one where it may have several maxima,
-            none where the first look tells.
-        first_look: Value [internal unit] from which it is looked for as well; NaN where there is none.
+        prior_words: Description of the prior that replaces its own text.
+        scaled_by: Measurements that a default prior is proportional to; empty where there are none.
+        starts: z from which the maximum of the density is searched: several where there may be several maxima, none where
+            `first_look` suffices.
+        first_look: Further start of that search, as a value [internal unit]; NaN where there is none.
     """
 
     name: str
@@ -132,37 +132,37 @@ class ParameterSpace:
 
     @cached_property
     def _order(self) -> np.ndarray:
-        """From the order of the groups to that of z."""
+        """Permutation from the order of the groups to that of z."""
         return np.argsort(np.concatenate([where for where, _ in self._groups]))
 
     def vector(self, z: Float[Array, " free"]) -> Float[Array, " free"]:
-        """Values of the free parameters [internal units] at z."""
+        """Return values of the free parameters [internal units] at z."""
         if not self._groups:
             return z
         return jnp.concatenate([prior.constrain(z[where]) for where, prior in self._groups])[self._order]
 
     def z_of(self, vector: Float[Array, " free"]) -> Float[Array, " free"]:
-        """Z at values of the free parameters [internal units], the inverse of `vector`; NaN at what one cannot be."""
+        """Return z at values of the free parameters [internal units], the inverse of `vector`; NaN at impossible values."""
         if not self._groups:
             return vector
         return jnp.concatenate([prior.unconstrain(vector[where]) for where, prior in self._groups])[self._order]
 
     def constrain(self, z: Float[Array, " free"]) -> dict[str, Array]:
-        """Named values of all parameters, fixed ones included [internal units], at z."""
+        """Return named values of all parameters, fixed ones included [internal units], at z."""
         return self.named(self.vector(z))
 
     def named(self, vector: Float[Array, " free"]) -> dict[str, Array]:
-        """Named values of all parameters, fixed ones included, of those of the free ones [internal units]."""
+        """Return named values of all parameters, fixed ones included, from a vector of the free ones [internal units]."""
         values = {p.name: vector[i] for i, p in enumerate(self.free)}
         return values | {p.name: jnp.asarray(p.fixed, dtype=vector.dtype) for p in self.fixed}
 
     def unconstrain(self, values: Mapping[str, Any]) -> Float[Array, " free"]:
-        """Z at named values [internal units]."""
+        """Return z at named values [internal units]."""
         return jnp.array(
             [p.prior.unconstrain(jnp.asarray(values[p.name], dtype=float)) for p in self.free], dtype=float
         )
 
 
 def _stack_priors(kind: type, priors: list[Any]) -> Prior:
-    """One prior of the given kind whose hyperparameters are the arrays of those of several."""
+    """Combine several priors of a kind into one whose hyperparameters are arrays."""
     return kind(**{field.name: np.array([getattr(p, field.name) for p in priors]) for field in fields(kind)})

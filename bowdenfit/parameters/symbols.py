@@ -1,7 +1,7 @@
-"""Symbols with names that people chose, whatever is in them.
+"""Symbols of parameters whose names users chose.
 
-A name stands behind its letter as plain text: in matplotlib's math notation every letter is placed by itself, for one font, and
-falls apart in a reader with another.
+A long name stands behind its letter as plain text, because matplotlib's math notation places every letter by itself, for one
+font, and the letters drift apart in a viewer with another font.
 """
 
 import re
@@ -12,18 +12,18 @@ _INDEX = re.compile(r"[a-zA-Z0-9]{1,2}")
 
 
 def make_symbol(letter: str, name: str) -> str:
-    """A letter with a name behind it, or below it where that is no longer than an index.
+    """Return a letter with a name behind it, or below it as an index if the name is short.
 
     Args:
-        letter: In matplotlib's math notation.
-        name: Underscores in it are spaces.
+        letter: Letter in matplotlib's math notation.
+        name: Name; underscores become spaces.
     """
     plain = name.strip("_ ").replace("_", " ") or name
     return rf"${letter}_\mathrm{{{plain}}}$" if _INDEX.fullmatch(plain) else f"${letter}$ " + plain.replace("$", r"\$")
 
 
 def to_plain_text(symbol: str) -> str:
-    r"""A symbol as plain text can show it: 'μ1' of '$\mu_1$'."""
+    r"""Return a symbol as plain text: 'μ1' for '$\mu_1$'."""
     formula = r"(?<!\\)\$(.*?)(?<!\\)\$"
     return re.sub(formula, lambda match: _strip_commands(match[1]), symbol).replace(r"\$", "$")
 

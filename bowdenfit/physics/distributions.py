@@ -18,14 +18,14 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-_SMALL = 1e-3  # below, five terms of the series of log(1 + s)/s are exact
-_NEGLIGIBLE = -40.0  # log of a probability too small to change 1
+_SMALL = 1e-3  # below, five terms of the series of log(1 + s)/s are exact to double precision
+_NEGLIGIBLE = -40.0  # log of a probability too small to change 1 in double precision
 _FAR = -30.0  # below, five terms of the series of the tail are exact to 2e-12, of a logarithm that is -450
 _NEAR_1 = 3.0  # above, six terms of the series of log(1 - p) are exact, and 1 - p is not
 
 
 def log_student_density(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*batch"]:
-    r"""Logarithm of the standard t density, :math:`-\frac{\nu+1}{2}\log(1 + x^2/\nu)` and its constant.
+    r"""Return the log of the standard t density, :math:`-\frac{\nu+1}{2}\log(1 + x^2/\nu)` plus its constant.
 
     Args:
         x: Standardized deviation [1].
@@ -36,7 +36,7 @@ def log_student_density(x: Float[Array, "*batch"], freedom: int) -> Float[Array,
 
 
 def log_student_cdf(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*batch"]:
-    """Logarithm of the standard t distribution function, with all its digits in both tails.
+    """Return the log of the standard t distribution function, to full precision in both tails.
 
     Args:
         x: Standardized deviation [1].
@@ -51,7 +51,7 @@ def log_student_cdf(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*b
 
 
 def _log_lower_tail(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*batch"]:
-    """Logarithm of the distribution function where x is not positive."""
+    """Return the log of the distribution function where x is not positive."""
     m = freedom // 2
     coefficients = [1 / (factorial(m - 1 - k) * factorial(m + k)) for k in reversed(range(m))]
     square = freedom + x**2
@@ -62,7 +62,7 @@ def _log_lower_tail(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*b
 
 
 def student_residual(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*batch"]:
-    r"""The residual half of whose square is minus the log density, up to a constant.
+    r"""Return the residual whose half square is minus the log density, up to a constant.
 
     .. math:: r = x \sqrt{(\nu + 1) \frac{\log(1 + x^2/\nu)}{x^2}}
 
@@ -78,7 +78,7 @@ def student_residual(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*
 
 
 def student_bound_residual(x: Float[Array, "*batch"], freedom: int) -> Float[Array, "*batch"]:
-    r"""The residual :math:`\sqrt{-2 \log T(x)}` of a reading of which only an upper limit is known.
+    r"""Return the residual :math:`\sqrt{-2 \log T(x)}` of a reading of which only an upper limit is known.
 
     Args:
         x: Standardized limit [1].
@@ -91,13 +91,13 @@ def student_bound_residual(x: Float[Array, "*batch"], freedom: int) -> Float[Arr
 
 
 def log_normal_cdf(x: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-    r"""Logarithm of the standard normal distribution function.
+    r"""Return the log of the standard normal distribution function.
 
     .. math:: \log\Phi(x) \to -\frac{x^2}{2} - \log(-x) - \frac{1}{2}\log 2\pi
        + \log\left(1 - \frac{1}{x^2} + \frac{3}{x^4} - \frac{15}{x^6} + \frac{105}{x^8}\right)
        \quad \text{as } x \to -\infty
 
-    One logarithm is taken, of whichever of these holds: JAX's own `log_ndtr` takes twice as long or more, and has
+    Only one logarithm is taken, of the applicable branch: JAX's own `log_ndtr` takes twice as long or more, and has
     the derivative :math:`\exp(\log\phi - \log\Phi)`, in which two numbers of size x^2/2 cancel: below x = -1e6 few of its
     digits are right, below -1e8 none.
 

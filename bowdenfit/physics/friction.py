@@ -8,13 +8,13 @@ from jax import Array
 from jaxtyping import Float
 
 _SMALL_EXPONENT = 1e-6  # below, three terms of the series in p are exact to the last digit
-_NOTHING_LEFT = 1e-9
+_NOTHING_LEFT = 1e-9  # least u^p that is left where friction would hold more than the whole force
 
 
 def friction_exponent(
     friction_coefficient: Float[Array, "*batch contacts"], wrap_angle: Float[Array, "*batch contacts"]
 ) -> Float[Array, "*batch"]:
-    r"""Sum of friction coefficient times wrap angle over the contacts in series.
+    r"""Return the sum of friction coefficient times wrap angle over the contacts in series.
 
     .. math:: \Lambda = \sum_k \mu_k \theta_k
 
@@ -32,7 +32,7 @@ def friction_exponent(
 
 
 def transmission_efficiency(friction_exponent: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-    r"""Output force over input force while the rope slides toward the motor.
+    r"""Return output force over input force while the rope slides toward the motor.
 
     .. math:: \eta = \exp(-\Lambda)
 
@@ -51,11 +51,11 @@ def transmission_efficiency(friction_exponent: Float[Array, "*batch"]) -> Float[
 def capstan_output_force(
     input_force: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"], stroke: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""Capstan equation for both directions of sliding.
+    r"""Return the output force by the capstan equation, for both directions of sliding.
 
     .. math:: F_\text{out} = F_\text{in} \exp(-s \Lambda)
 
-    Not to be trusted while nothing slides (the force then lies anywhere between the two strokes), nor for a loop with
+    Not valid while nothing slides (the force then lies anywhere between the two strokes), nor for a loop with
     preload, where the return side takes part.
 
     Args:
@@ -78,7 +78,7 @@ def force_scale(
     drag: Float[Array, ""],
     reference_force: float,
 ) -> Float[Array, "*batch"]:
-    r"""The scale on which friction is a shift by :math:`\Lambda`, whatever the load.
+    r"""Transform force to a scale on which friction is a shift by :math:`\Lambda`, whatever the load.
 
     .. math:: g(F) = \frac{u^p - 1}{p}, \quad u = \frac{F + D}{F_\text{ref}}, \quad g \to \log u \text{ as } p \to 0
 
@@ -107,9 +107,9 @@ def force_from_scale(
     drag: Float[Array, ""],
     reference_force: float,
 ) -> Float[Array, "*batch"]:
-    """Inverse of `force_scale`: the force [N] at a value of g.
+    """Return the force [N] at a value of g: the inverse of `force_scale`.
 
-    Where friction would hold more than the whole force the result is what remains of it: next to nothing, less the drag.
+    Where friction would hold more than the whole force, the result is nearly zero minus the drag.
     """
     small = load_exponent < _SMALL_EXPONENT
     p = jnp.where(small, 1.0, load_exponent)
@@ -124,7 +124,7 @@ def force_scale_slope(
     drag: Float[Array, ""],
     reference_force: float,
 ) -> Float[Array, "*batch"]:
-    r"""Derivative of `force_scale` by the force [1/N], :math:`u^{p - 1}/F_\text{ref}`."""
+    r"""Return the derivative of `force_scale` by the force [1/N], :math:`u^{p - 1}/F_\text{ref}`."""
     u = (force + drag) / reference_force
     return u ** (load_exponent - 1) / reference_force
 
@@ -135,7 +135,7 @@ def rate_factor(
     stribeck_speed: Float[Array, ""],
     viscous: Float[Array, ""],
 ) -> Float[Array, "*batch"]:
-    r"""How friction depends on speed: more at low speed (Stribeck), and a part proportional to speed.
+    r"""Return the speed dependence of friction: more at low speed (Stribeck), and a part proportional to speed.
 
     .. math:: \frac{\mu(v)}{\mu} = 1 + a \exp\left(-\left(\frac{v}{v_s}\right)^2\right) + c |v|
 
@@ -157,7 +157,7 @@ def rate_slope(
     stribeck_speed: Float[Array, ""],
     viscous: Float[Array, ""],
 ) -> Float[Array, "*batch"]:
-    r"""Derivative of `rate_factor` by the speed; where it is negative a rope that is pulled through a spring sticks and slips.
+    r"""Return the derivative of `rate_factor` by the speed; where it is negative, a rope pulling a spring sticks and slips.
 
     .. math:: \frac{1}{\mu} \frac{d\mu}{dv} = -\frac{2 a v}{v_s^2} \exp\left(-\left(\frac{v}{v_s}\right)^2\right) + c
 
@@ -181,15 +181,15 @@ def play_operator(
     slopes: tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]] | None = None,
     restart: Float[Array, "time *batch"] | None = None,
 ) -> tuple[Float[Array, "time *batch"], Float[Array, "time *batch"]]:
-    r"""Output of a quasi-static rope that stands still between two limits, and its derivative by the friction exponent.
+    r"""Return the output of a quasi-static rope that stands still between two limits, and its derivative by Lambda.
 
     .. math:: y_t = \text{clip}(y_{t-1},\ f_-(x_t),\ f_+(x_t))
 
-    Of a single rope the limits are :math:`x \mp \Lambda` on the scale g on which friction is a shift, x = g(F_in) and
+    For a single rope the limits are :math:`x \mp \Lambda` on the scale g on which friction is a shift, x = g(F_in) and
     y = g(F_out): while pulling the output follows at :math:`x - \Lambda`, on the return at :math:`x + \Lambda`, and in
     between it stands still, however the input moves inside the band. It remembers noise peaks of the input as if the rope
-    had moved: average recordings down to the mechanical bandwidth first, and lead it through what is left as
-    `bowdenfit.recordings.preparation.likely_input` has it.
+    had moved: average recordings down to the mechanical bandwidth first, and smooth the input as in
+    `bowdenfit.recordings.preparation.likely_input`.
 
     The slope is that of the limit that was touched last, where it was touched: kept while the output stands still, and 0
     before the rope has slid at all.

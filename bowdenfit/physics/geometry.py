@@ -1,4 +1,4 @@
-"""Wrap angle against cable length: curves in the coordinates that data can see, and in the printed ones."""
+"""Wrap angle against cable length: curves in well-identified coordinates, and in the coordinates that papers print."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -8,11 +8,11 @@ from jaxtyping import Float
 def gaussian_wrap_angle(
     length: Float[Array, "*batch"], A: Float[Array, "*#batch"], B: Float[Array, "*#batch"], C: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""The curve as papers print it.
+    r"""Return the wrap angle of the Gaussian curve as papers print it.
 
     .. math:: \theta(l) = A \exp\left(-\left(\frac{l - B}{C}\right)^2\right)
 
-    For comparing with printed coefficients only: on data that never reach the peak (A, B, C) is a ridge with
+    For comparison with printed coefficients only: on data that never reach the peak (A, B, C) is a ridge with
     condition number near 3e4; fit with `log_quadratic_wrap_angle` instead.
 
     Args:
@@ -33,7 +33,7 @@ def gaussian_wrap_angle(
 def log_quadratic_wrap_angle(
     z: Float[Array, "*batch"], a: Float[Array, "*#batch"], b: Float[Array, "*#batch"], c: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""The same Gaussian, centered on the measured range, where its coefficients are nearly uncorrelated.
+    r"""Return the wrap angle of the same Gaussian, centered on the measured range, with nearly uncorrelated coefficients.
 
     .. math:: \log \theta = a + b z - c z^2, \quad z = \frac{l - l_\text{mid}}{l_\text{half}}, \quad c \ge 0
 
@@ -61,7 +61,7 @@ def gaussian_coefficients(
     middle: float,
     half_width: float,
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
-    r"""A, B and C of the printed curve from the log-quadratic coefficients.
+    r"""Return A, B and C of the printed curve from the log-quadratic coefficients.
 
     .. math::
         C = \frac{l_\text{half}}{\sqrt{c}}, \quad B = l_\text{mid} + l_\text{half}\frac{b}{2c}, \quad
@@ -89,7 +89,7 @@ def log_quadratic_coefficients(
     middle: float,
     half_width: float,
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
-    """Inverse of `gaussian_coefficients`: from printed A [rad], B [mm], C [mm] to a, b, c."""
+    """Return a, b and c from printed A [rad], B [mm], C [mm]: the inverse of `gaussian_coefficients`."""
     c = (half_width / C) ** 2
     b = 2 * c * (B - middle) / half_width
     return jnp.log(A) - b**2 / (4 * c), b, c
@@ -98,7 +98,7 @@ def log_quadratic_coefficients(
 def line_wrap_angle(
     z: Float[Array, "*batch"], start: Float[Array, "*#batch"], end: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""A straight line, by its angles at the ends of the measured range; 0 where it would be negative, outside the range.
+    r"""Return the wrap angle on a straight line between the ends of the measured range; at least 0.
 
     .. math:: \theta = \frac{1 - z}{2} \theta_\text{start} + \frac{1 + z}{2} \theta_\text{end}
 
@@ -116,7 +116,7 @@ def line_wrap_angle(
 def logistic_wrap_angle(
     z: Float[Array, "*batch"], a: Float[Array, "*#batch"], k: Float[Array, "*#batch"], s: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""A rise (or, with k < 0, a fall) between 0 and a plateau, by what it is in the middle of the measured range.
+    r"""Return the wrap angle of a rise (with k < 0, a fall) between 0 and a plateau.
 
     .. math:: \theta = \frac{e^a}{s + (1 - s) e^{-k z}}
 
@@ -144,7 +144,7 @@ def logistic_coefficients(
     middle: float,
     half_width: float,
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"], Float[Array, "*batch"]]:
-    r"""A, B and C of :math:`A / (1 + e^{-(l - B)/C})` from the coefficients of `logistic_wrap_angle`.
+    r"""Return A, B and C of :math:`A / (1 + e^{-(l - B)/C})` from the coefficients of `logistic_wrap_angle`.
 
     .. math::
         A = \frac{e^a}{s}, \quad B = l_\text{mid} + \frac{l_\text{half}}{k} \log\frac{1 - s}{s}, \quad

@@ -17,7 +17,7 @@ def loop_output_force(
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
 ) -> Float[Array, "..."]:
-    r"""Output force of a loop while it moves.
+    r"""Return the output force of a loop while it moves.
 
     .. math:: F_\text{out} = \min\left(F_\text{in} - 2 P \Lambda,\ F_\text{in} e^{-\Lambda}\right)
 
@@ -25,9 +25,8 @@ def loop_output_force(
     driving the motor (F_in < 0) and the way back follow by exchanging the sides and the ends:
     :math:`F_\text{out} = s \min(s F_\text{in} - 2 P \Lambda,\ s F_\text{in} e^{-\Lambda},\ s F_\text{in} e^{\Lambda})`.
 
-    Not to be trusted while nothing moves (see `bowdenfit.cable.drive.Loop`), nor for a rope much stiffer at high than at low
-    load, where
-    mean tensions do not quite add up to 2P.
+    Not valid while nothing moves (see `bowdenfit.cable.drive.Loop`), and inaccurate for a rope much stiffer at high than at low
+    load, where mean tensions do not quite add up to 2P.
 
     Args:
         input_force: F_in, of either sign [N].
@@ -50,7 +49,7 @@ def loop_input_force(
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
 ) -> Float[Array, "..."]:
-    r"""Input force that gives an output force while the loop moves [N]: the inverse of `loop_output_force`.
+    r"""Return the input force [N] that gives an output force while the loop moves: the inverse of `loop_output_force`.
 
     .. math:: F_\text{in} = s \max(s F_\text{out} + 2 P \Lambda,\ s F_\text{out} e^{\Lambda},\ s F_\text{out} e^{-\Lambda})
 
@@ -68,7 +67,7 @@ def loop_input_force(
 def loop_band(
     input_force: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."]
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-    """Output force while moving forward and while moving back [N]; at rest it lies between the two."""
+    """Return the output force [N] while moving forward and while moving back; at rest it lies between the two."""
     lower, upper = (
         loop_output_force(input_force, preload, friction_exponent, jnp.asarray(stroke)) for stroke in (1.0, -1.0)
     )
@@ -81,7 +80,7 @@ def loop_response(
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
 ) -> tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]:
-    """`loop_output_force` [N] and its derivatives by the input force [1] and by the friction exponent [N]."""
+    """Return `loop_output_force` [N] and its derivatives by the input force [1] and by the friction exponent [N]."""
     shares = jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
     return loop_response_from(input_force, 2 * preload * friction_exponent, 2 * preload, *shares, stroke)
 
@@ -94,7 +93,7 @@ def loop_response_from(
     more: Float[Array, "..."],
     stroke: Float[Array, "..."],
 ) -> tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]:
-    """`loop_response` where what depends on preload and friction alone is known.
+    """Return `loop_response` from precomputed functions of preload and friction.
 
     Args:
         input_force: F_in [N].
@@ -114,14 +113,14 @@ def loop_response_from(
 def free_motion_loss(
     preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""Force that moving the unloaded loop takes [N], :math:`2 P \Lambda`; times the pulley's radius it is what is felt."""
+    r"""Return the force [N] needed to move the unloaded loop, :math:`2 P \Lambda`."""
     return 2 * preload * friction_exponent
 
 
 def dynamic_range(
     largest_force: Float[Array, "*#batch"], preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""Largest force, or torque, over that which moving the unloaded loop takes, :math:`F_\text{max}/(2 P \Lambda)` [1].
+    r"""Return the largest force, or torque, over that needed to move the unloaded loop, :math:`F_\text{max}/(2 P \Lambda)` [1].
 
     Args:
         largest_force: F_max, of which the device is capable [N].
@@ -135,9 +134,9 @@ def dynamic_range(
 
 
 def slack_load(preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
-    r"""Input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
+    r"""Return the input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
 
-    That is while moving forward; for the way back give the exponent a minus sign.
+    This holds while moving forward; for the way back use the negative exponent.
     """
     return 2 * preload / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
 
@@ -148,7 +147,7 @@ def side_tensions(
     friction_exponent: Float[Array, "*#batch"],
     stroke: Float[Array, "*#batch"],
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-    r"""Mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
+    r"""Return mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
 
     With :math:`a = (1 - e^{-s\Lambda})/(s\Lambda)` for the pulling side and b, the same of :math:`-s`, for the other:
     :math:`\bar T_1 = a (2 P + b F_\text{in})/(a + b)` and :math:`\bar T_2 = 2 P - \bar T_1` while that is positive;

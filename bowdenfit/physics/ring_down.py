@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float, Int
 
-_LEAST = 1e-12  # of 1 - zeta^2, at and beyond critical damping
+_LEAST = 1e-12  # of |1 - zeta^2|, where damping is nearly critical
 
 
 def compute_peaks(
@@ -14,7 +14,7 @@ def compute_peaks(
     held: Float[Array, "*runs"],
     number: int,
 ) -> Float[Array, "swings *runs"]:
-    r"""Where half swings begin, counted from where the spring is at rest.
+    r"""Return the starts of half swings, measured from the rest position of the spring.
 
     .. math:: |x_{n + 1}| = \rho (|x_n| - f) - f
 
@@ -23,11 +23,11 @@ def compute_peaks(
     Args:
         amplitude: x_0, where it is released, of either sign [rad].
         decay: rho, of a half swing by damping alone [1].
-        held: f = F/K, how far dry friction can hold the bar from where the spring is at rest [rad].
-        number: Of half swings.
+        held: f = F/K, how far dry friction can hold the bar from the rest position [rad].
+        number: Number of half swings.
 
     Returns:
-        x_0 and the places after each half swing but the last [rad].
+        x_0 and the positions after each half swing but the last [rad].
     """
 
     def swing(x: Array, _: None) -> tuple[Array, Array]:
@@ -48,12 +48,12 @@ def ring_down(
     friction: Float[Array, ""],
     swings: int,
 ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
-    r"""Angle and speed of a bar after its release.
+    r"""Return angle and speed of a bar after its release.
 
     .. math:: J \ddot x + b \dot x + K x + F \operatorname{sign} \dot x = 0, \qquad x(0) = x_0,\ \dot x(0) = 0
 
-    From one reversal to the next friction is a constant, which shifts where the spring is at rest by F/K against the motion:
-    a damped oscillation about there, half a period long. It ends where the spring cannot overcome friction any more.
+    From one reversal to the next friction is constant and shifts the rest position by F/K against the motion: half a period of
+    a damped oscillation about that position. The motion ends where the spring cannot overcome friction any more.
 
     Args:
         time: Since the release; before it the bar stands still [s].

@@ -8,9 +8,9 @@ from jax import Array
 from jaxtyping import Float
 
 _SMALL_EXPONENT = 1e-4  # below this the mean tension is better computed from its series
-_NOTHING_LEFT = 1e-30  # a share of the peak load, and a friction exponent, that are as good as none
+_NOTHING_LEFT = 1e-30  # least share of the peak load, and least friction exponent
 _ITERATIONS = 2  # of Fritsch's method, each with four times the digits of the one before
-_POLISHES = 2
+_POLISHES = 2  # Newton steps
 
 
 def extension(
@@ -19,11 +19,11 @@ def extension(
     bedding_stretch: Float[Array, "*#batch"],
     bedding_load: Float[Array, "*#batch"],
 ) -> Float[Array, "*batch"]:
-    r"""Extension of a rope: linear, and at low load the strands bedding in.
+    r"""Return the extension of a rope: linear, and at low load the strands bedding in.
 
     .. math:: e(T) = \frac{T}{k} + d \left(1 - e^{-T/T_c}\right)
 
-    Not for a rope that has not been loaded before, whose first bedding-in does not come back.
+    Not valid for a rope that has not been loaded before, whose first bedding-in is not reversible.
 
     Args:
         tension: T [N].
@@ -46,7 +46,7 @@ def compliance(
     bedding_stretch: Float[Array, "*#batch"],
     bedding_load: Float[Array, "*#batch"],
 ) -> Float[Array, "*batch"]:
-    r"""Derivative of `extension` by the tension [mm/N], :math:`1/k + (d/T_c) e^{-T/T_c}`."""
+    r"""Return the derivative of `extension` by the tension [mm/N], :math:`1/k + (d/T_c) e^{-T/T_c}`."""
     return 1 / stiffness + bedding_stretch / bedding_load * jnp.exp(-tension / bedding_load)
 
 
@@ -57,7 +57,7 @@ def tension_from_extension(
     bedding_stretch: Float[Array, "*#batch"],
     bedding_load: Float[Array, "*#batch"],
 ) -> Float[Array, "*batch"]:
-    r"""Inverse of `extension`: the tension of a rope that is extended so far; 0 where it is not extended, but slack.
+    r"""Return the tension of an extended rope, the inverse of `extension`; 0 where the rope is slack.
 
     With :math:`a = k(e - d)/T_c` and :math:`L = \log(kd/T_c) - a` the root is :math:`T = T_c (a + w)`,
     :math:`w + \log w = L` (Lambert's function), found by Fritsch's iteration of fourth order and polished on e(T) itself.
@@ -107,7 +107,7 @@ def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Arra
 def stiffness_with_springs(
     stiffness: Float[Array, "*batch"], spring: Float[Array, "*#batch"], sides: int
 ) -> Float[Array, "*batch"]:
-    r"""Stiffness of a cable whose ropes each have a spring in series.
+    r"""Return the stiffness of a cable whose ropes each have a spring in series.
 
     .. math:: \frac 1 K = \frac 1{K_\text{cable}} + \frac 1{n k_\text{spring}}
 
@@ -128,7 +128,7 @@ def stiffness_with_springs(
 
 
 def mean_tension(force: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
-    r"""Tension averaged along a rope that slides toward the force on its end.
+    r"""Return the tension averaged along a rope that slides toward the force on its end.
 
     .. math:: \bar T = F \frac{1 - e^{-\Lambda}}{\Lambda}
 
@@ -153,7 +153,7 @@ def mean_tension(force: Float[Array, "*batch"], friction_exponent: Float[Array, 
 def mean_tension_unloading(
     force: Float[Array, "*batch"], peak_force: Float[Array, "*#batch"], friction_exponent: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""Mean tension of a rope, fixed at its far end, whose load was once larger and comes down.
+    r"""Return the mean tension of a rope, fixed at its far end, whose load was once larger and now decreases.
 
     From the loaded end on the rope slides back, and tension grows along it as :math:`F e^{\Lambda x}`, until it meets the
     tension :math:`F_\text{peak} e^{-\Lambda x}` that friction still holds from the peak, at
@@ -183,7 +183,7 @@ def mean_tension_from_shares(
     loading_share: Float[Array, "*#batch"],
     unloading_share: Float[Array, "*#batch"],
 ) -> Float[Array, "*batch"]:
-    """`mean_tension_unloading` where the mean tension per end tension is known for both ways of sliding.
+    """Return `mean_tension_unloading` from the mean tension per end tension for both ways of sliding.
 
     Args:
         force: Load now [N].
@@ -210,13 +210,13 @@ def preload_at(
     bedding_stretch: Float[Array, "*#batch"],
     bedding_load: Float[Array, "*#batch"],
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-    r"""Preload between fixed ends when bending lengthens the sheath's center line, and the slack where there is none.
+    r"""Return the preload between fixed ends when bending lengthens the sheath's center line, and the slack if there is any.
 
     .. math:: e(P(\theta)) = e(P_0) + g (\theta - \theta_0)
 
     and where the right side is negative P = 0 and its size is the slack.
 
-    With preload springs the preload is constant, and this does not apply.
+    With preload springs the preload is constant and this does not apply.
 
     Args:
         wrap_angle: theta [rad].

@@ -44,28 +44,28 @@ from bowdenfit.physics.stretch import extension, mean_tension, tension_from_exte
 
 @dataclass(frozen=True)
 class RopeStretch:
-    """How a rope gives under its mean tension; linear where nothing is said of bedding in.
+    """Elasticity of a rope under its mean tension; linear without bedding-in.
 
     Args:
         stiffness: k [N/mm].
-        bedding: Bedding-in stretch d [mm] and the load over which it is taken up [N]; None of a linear rope.
+        bedding: Bedding-in stretch d [mm] and the load over which it is taken up [N]; None for a linear rope.
     """
 
     stiffness: Array
     bedding: tuple[Array, Array] | None = None
 
     def extension(self, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Extension under a mean tension [mm]."""
+        """Return the extension under a mean tension [mm]."""
         return tension / self.stiffness if self.bedding is None else extension(tension, self.stiffness, *self.bedding)
 
     def tension(self, extended: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Mean tension from the extension [N]; 0 of a slack rope."""
+        """Return the mean tension from the extension [N]; 0 for a slack rope."""
         if self.bedding is None:
             return jnp.maximum(extended, 0.0) * self.stiffness
         return tension_from_extension(extended, self.stiffness, *self.bedding)
 
     def motor_force(self, travel: Array, share: Array, more_compliance: Array) -> Array:
-        """Force at the motor [N] of a rope whose mean tension is a share of it, in series with a linear compliance [mm/N]."""
+        """Return the force at the motor [N] of a rope in series with a compliance, given its mean tension per motor force."""
         together = more_compliance + share / self.stiffness
         if self.bedding is None:
             return jnp.maximum(travel, 0.0) / together
@@ -75,10 +75,10 @@ class RopeStretch:
 
 @dataclass(frozen=True)
 class Turn:
-    """Where the motor turned round last.
+    """The last reversal of the motor.
 
     Args:
-        travel: Displacement beyond that of no force [mm].
+        travel: Displacement from that without force [mm].
         force: Force at the motor [N].
         mean: Mean tension of the rope [N].
     """
@@ -90,12 +90,12 @@ class Turn:
 
 @dataclass(frozen=True)
 class Tendon:
-    """A rope in its sheath with what it pulls.
+    """A rope in its sheath, with the spring or stop that it pulls.
 
     Args:
         exponent: Lambda [1].
-        end_compliance: 1/K of the spring at the far end [mm/N]; 0 of a stop.
-        rope: How it stretches.
+        end_compliance: 1/K of the spring at the far end [mm/N]; 0 for a stop.
+        rope: Elasticity of the rope.
     """
 
     exponent: Array
@@ -103,10 +103,10 @@ class Tendon:
     rope: RopeStretch
 
     def sliding(self, travel: Array, stroke: Array) -> tuple[Array, Array]:
-        """Force at the motor and mean tension while all of the rope slides [N].
+        """Return force at the motor and mean tension [N] while all of the rope slides.
 
         Args:
-            travel: Displacement beyond that of no force [mm].
+            travel: Displacement from that without force [mm].
             stroke: +1 pulling, -1 return.
         """
         along = stroke * self.exponent
@@ -115,7 +115,7 @@ class Tendon:
         return force, share * force
 
     def sliding_after_turn(self, turn: Turn, travel: Array, stroke: Array) -> tuple[Array, Array]:
-        """The same after a turn, until the slip front has crossed the rope and from then on."""
+        """Return force and mean tension [N] after a reversal, before and after the slip front has crossed the rope."""
         moved = jnp.maximum(stroke * (travel - turn.travel), 0.0)
         mean = self.rope.tension(self.rope.extension(turn.mean) + stroke * moved)
         before = _safe_root(turn.force)
@@ -126,6 +126,6 @@ class Tendon:
 
 
 def _safe_root(value: Array) -> Array:
-    """Square root with a derivative of 0 at 0."""
+    """Return the square root, with a derivative of 0 at 0."""
     positive = value > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, value, 1.0)), 0.0)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import jax
 import numpy as np
 
+from bowdenfit.inference import nuts
 from bowdenfit.inference.batch.laplace import StudentMixture, fit_mixtures
 from bowdenfit.inference.batch.programs import (
     CHUNK,
@@ -38,6 +39,7 @@ from bowdenfit.inference.chain import SamplingRequest, describe_stuck_walkers
 from bowdenfit.inference.diagnostics import (
     MAXIMUM_DRIFT,
     Diagnostics,
+    array_stats,
     describe_convergence_shortfalls,
     describe_low_ess,
     diagnose_all,
@@ -235,13 +237,11 @@ def _summarize_walkers(programs: BatchPrograms, late: np.ndarray, short_before: 
 
 def sample_by_nuts(programs: BatchPrograms, outcome: DatasetOutcome, start: MaximumPosterior) -> BatchFit:
     """Sample a data set by NUTS."""
-    from bowdenfit.inference.nuts import sample
-
     posterior = replace(programs.posterior, data_override=outcome.dataset.data)
     request = SamplingRequest(
         posterior, start, programs.settings.sampler, outcome.dataset.seed, diagnose=diagnose_few_draws
     )
-    chain = sample(request, programs.nuts)
+    chain = nuts.sample(request, programs.nuts)
     draws = {name: chain.z[..., i] for i, name in enumerate(programs.names)}
     reasons = chain.reasons or describe_uncertain_sds(estimate_sd_errors(draws), programs.settings.target_sd_error)
     z = chain.z.reshape(-1, chain.z.shape[-1])
@@ -275,10 +275,8 @@ def describe_remembered_starts(diagnostics: Mapping[str, Diagnostics], least: in
 
 def estimate_sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return the Monte Carlo error of each standard deviation, relative to it, from draws (walker, draw)."""
-    from arviz_stats.base import array_stats
-
     return {
-        name: float(array_stats.mcse(values, method="sd", chain_axis=0, draw_axis=1) / np.std(values))
+        name: float(array_stats().mcse(values, method="sd", chain_axis=0, draw_axis=1) / np.std(values))
         for name, values in draws.items()
         if np.ptp(values) > 0
     }

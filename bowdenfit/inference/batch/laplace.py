@@ -28,12 +28,7 @@ N_STARTS = 4  # starts of each climb: the prior medians, and draws of the prior
 # Offsets from its maximum, in standard deviations, at which each noise scale is held, as many as there are starts. At the
 # highest everything else is widest, which decides how well standard deviations are known.
 _NOISE_OFFSETS = (-2.0, 2.0, 4.0, 6.0)
-_FRICTION_OFFSETS = (
-    -0.5,
-    -1.0,
-    -1.7,
-    -2.5,
-)  # from its maximum, where a coefficient is held; in standard deviations of its prior
+_FRICTION_OFFSETS = (-0.5, -1.0, -1.7, -2.5)  # held below the maximum, in standard deviations of the prior
 _FRICTION_WIDTH = 0.4  # spread of the draws about these offsets, in standard deviations of the prior
 _MOST_STEPS, _DIFFERENCE = 30, 1e-5
 _LEAST_CURVATURE = 0.2  # lower limit of a curvature; the prior's is 1

@@ -24,12 +24,11 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import Conditional, CoordinateMaps, coordinate_maps, identity
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import Moves, weighted_moves
+from bowdenfit.inference.nuts import compile_nuts
 from bowdenfit.inference.objective import noise_scales
 from bowdenfit.inference.walkers import SweepChoices, count_walker_numbers, make_walker_sweep, to_uniform
 
-STATES_PER_ROUND = (
-    20  # states of a round that are stored, `THIN` steps from one to the next, all in the same coordinates
-)
+STATES_PER_ROUND = 20  # states stored of a round, `THIN` steps apart
 STEPS_PER_ROUND = STATES_PER_ROUND * THIN
 _STREAM = 1  # stream of random numbers of the walkers
 CHUNK = 16  # data sets that climb together, always the same number so that rounding is the same
@@ -191,8 +190,6 @@ class BatchPrograms:
     @cached_property
     def nuts(self) -> Callable[..., Any]:
         """Compiled NUTS of one data set."""
-        from bowdenfit.inference.nuts import compile_nuts
-
         return compile_nuts(self.posterior, self.settings.sampler)
 
     @cached_property

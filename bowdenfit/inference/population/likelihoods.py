@@ -25,20 +25,20 @@ from scipy.special import gammaln
 
 from bowdenfit.inference.log_density import LogDensity
 
-_LEAST_FREEDOM, _MOST_FREEDOM = 1.5, 200.0
+_LEAST_FREEDOM, _MOST_FREEDOM = 1.5, 200.0  # limits of the degrees of freedom
 # Factors that degrees of freedom are tried with in each round. Small ones are among them: scale and freedom are found in turn,
 # and steps of a quarter end a quarter too high, with tails that are too light.
 _STEPS = (0.5, 0.8, 0.95, 0.99, 1.0, 1.01, 1.05, 1.25, 2.0)
-_ROUNDS = 40
-_CLIPPED = 0.999  # quantile of the weights beyond which none counts for more
+_ROUNDS = 40  # of expectation and maximization
+_CLIPPED = 0.999  # quantile of the weights at which they are clipped
 
 
 @dataclass(frozen=True)
 class Summaries:
-    """Multivariate t distributions, one an inspection.
+    """Multivariate t distributions, one for each inspection.
 
     Args:
-        center: Of log coefficients, (inspection, coefficient).
+        center: Centers of the log coefficients, (inspection, coefficient).
         scale: Scale matrices, (inspection, coefficient, coefficient).
         freedom: Degrees of freedom, (inspection,).
     """
@@ -48,20 +48,21 @@ class Summaries:
     freedom: np.ndarray
 
     def log_density(self, values: np.ndarray) -> np.ndarray:
-        """Of log coefficients, (inspection, draw, coefficient); (inspection, draw).
+        """Return log densities (inspection, draw) of log coefficients.
 
         Args:
-            values: Log coefficients.
+            values: Log coefficients, (inspection, draw, coefficient).
         """
         return _log_t(_distances(values, self.center, self.scale), self.scale, self.freedom)
 
 
 def summarize_likelihoods(values: np.ndarray, prior_mean: np.ndarray, prior_sd: np.ndarray) -> Summaries:
-    """The likelihood of log coefficients that draws stand for, by maximum likelihood from draws without their prior.
+    """Fit the likelihood of log coefficients to draws, by maximum likelihood, with the prior of the draws removed.
 
     Args:
         values: Draws of log coefficients of equal weight, (inspection, draw, coefficient).
-        prior_mean, prior_sd: Of the log coefficients in the single fits, (coefficient,); an infinite sd where it was flat.
+        prior_mean, prior_sd: Prior of the log coefficients in the single fits, (coefficient,); an infinite standard deviation
+            where it was flat.
     """
     weights = _remove_prior(values, prior_mean, prior_sd)
     dimensions = values.shape[2]
@@ -80,7 +81,7 @@ def summarize_likelihoods(values: np.ndarray, prior_mean: np.ndarray, prior_sd: 
 
 
 def _remove_prior(values: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """Weights of sum 1 under which draws are those of a flat prior, (inspection, draw)."""
+    """Return weights under which draws are those of a flat prior; they sum to 1, (inspection, draw)."""
     log = np.sum(((values - mean) / sd) ** 2, axis=2) / 2
     weights = np.exp(log - log.max(axis=1, keepdims=True))
     weights = np.minimum(weights, np.quantile(weights, _CLIPPED, axis=1)[:, None])
@@ -95,7 +96,7 @@ def _covariances(values: np.ndarray, center: np.ndarray, weights: np.ndarray) ->
 
 
 def _distances(values: np.ndarray, center: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Squared Mahalanobis distances, (inspection, draw)."""
+    """Return squared Mahalanobis distances, (inspection, draw)."""
     away = np.linalg.solve(np.linalg.cholesky(scale), (values - center[:, None]).transpose(0, 2, 1))
     return np.sum(away**2, axis=1)
 
@@ -108,13 +109,13 @@ def _log_t(distances: np.ndarray, scale: np.ndarray, freedom: np.ndarray) -> np.
 
 @dataclass(frozen=True, eq=False)
 class JointReadings:
-    """Inspections that one program serves; what else their fits drew, such as noise, is drawn with the population.
+    """Inspections of one shape whose readings enter the density; their other parameters are sampled with the population.
 
     Args:
-        posterior: Of a single fit of them.
-        names: Of its parameters those that are pooled, each with its place among the coefficients.
-        rows: Which inspections they are, by number.
-        data: Of each, what `posterior.data` is.
+        posterior: Posterior of a single fit of them.
+        names: Names of its pooled parameters, with their positions among the coefficients.
+        rows: Numbers of these inspections.
+        data: `posterior.data` of each.
     """
 
     posterior: LogDensity
@@ -124,19 +125,19 @@ class JointReadings:
 
     @property
     def others(self) -> tuple[int, ...]:
-        """Places of the parameters that are not pooled, among all that are free."""
+        """Positions of the parameters that are not pooled, among the free ones."""
         return tuple(i for i, p in enumerate(self.posterior.model.space.free) if p.name not in self.names)
 
     @property
     def size(self) -> int:
-        """Numbers that are drawn of all of them beside their coefficients."""
+        """Number of sampled parameters of all of them, beside their coefficients."""
         return len(self.rows) * len(self.others)
 
     def stack(self, where: np.ndarray) -> dict[str, Any]:
-        """Their data as one.
+        """Return their data, stacked.
 
         Args:
-            where: Number of the cable and place among its inspections, of every inspection.
+            where: Number of the cable, and position among its inspections, of every inspection.
         """
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *self.data)
         return {"where": where[list(self.rows)], "counts": np.ones(len(self.rows)), "readings": stacked}
@@ -147,12 +148,12 @@ class JointReadings:
         other_z: Float[Array, " size"],
         stacked: Mapping[str, Any],
     ) -> Float[Array, ""]:
-        """Log likelihood of all readings, and log prior of what is not pooled, up to a constant.
+        """Return the log likelihood of all readings plus the log prior of other parameters, up to a constant.
 
         Args:
             at: Log coefficients at every inspection.
-            rest: z of what is not pooled.
-            given: See `given`.
+            other_z: z of the parameters that are not pooled.
+            stacked: See `stack`.
         """
         here = at[stacked["where"][:, 0], stacked["where"][:, 1]]
         every = jax.vmap(self._log_density_of_one)(here, other_z.reshape(len(self.rows), -1), stacked["readings"])
@@ -171,10 +172,10 @@ class JointReadings:
 
 
 def without_cables(stacked: Mapping[str, Any], cables: list[int]) -> dict[str, Any]:
-    """Data of inspections without those of some cables.
+    """Remove some cables from stacked data of inspections.
 
     Args:
-        given: See `JointReadings.given`.
-        cables: By number.
+        stacked: See `JointReadings.stack`.
+        cables: Numbers of the cables.
     """
     return dict(stacked) | {"counts": stacked["counts"] * ~np.isin(stacked["where"][:, 0], cables)}

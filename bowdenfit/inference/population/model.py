@@ -1,12 +1,12 @@
-r"""A population of cables that wear, given what single fits say of each inspection.
+r"""Hierarchical model of a population of cables that wear, from the likelihoods of single inspections.
 
 Log coefficients of cable i at its inspection j, after c cycles, lubricated (l = 1) or not, at temperature T:
 
 .. math:: \theta_{ijk} = a_{ik} + b_i \frac{c_{ij}}{c_{ref}} + \gamma l_{ij} + \alpha (T_{ij} - T_0), \qquad
           a_{ik} \sim \mathrm{Normal}(m_k, s_k), \quad b_i \sim \mathrm{Normal}(m_b, s_b)
 
-Every inspection keeps its own scatter and noise, which single fits have integrated out. Cables are drawn in coordinates in
-which each is nearly standard normal given its population, whether its data say much or little, so that there is no funnel.
+Every inspection keeps its own scatter and noise, which single fits have integrated out. Cables are sampled in coordinates in
+which each is nearly standard normal given its population, however informative its data are, so that there is no funnel.
 """
 
 from collections.abc import Sequence
@@ -30,15 +30,15 @@ REFERENCE_TEMPERATURE = 20.0  # degC
 
 @dataclass(frozen=True)
 class Inspections:
-    """What is known of all inspections, in rows.
+    """Data of all inspections, in rows.
 
     Args:
-        cable: Number of the cable of each, from 0.
-        cycles: Over the reference; None where wear cannot be told.
-        effects: What else friction may depend on, by name, a column each: 1 after lubrication, and degrees above the reference.
+        cable: Number of the cable of each inspection, from 0.
+        cycles: Cycles over the reference; None where wear cannot be estimated.
+        effects: Covariates by name, one value for each inspection: 1 after lubrication, and degrees above the reference.
         known: Whether an inspection has a coefficient, (inspection, coefficient).
-        summaries: Of their log coefficients.
-        prior_mean, prior_sd: Of the mean log coefficients of the population, (coefficient,).
+        summaries: Likelihoods of their log coefficients.
+        prior_mean, prior_sd: Prior of the mean log coefficients of the population, (coefficient,).
     """
 
     cable: np.ndarray
@@ -51,22 +51,22 @@ class Inspections:
 
     @property
     def cables(self) -> int:
-        """How many there are."""
+        """Number of cables."""
         return int(self.cable.max()) + 1
 
     @property
     def coefficients(self) -> int:
-        """How many there are."""
+        """Number of coefficients."""
         return int(self.known.shape[1])
 
     @cached_property
     def positions(self) -> np.ndarray:
-        """Number of the cable, and place among its inspections, of every inspection, (inspection, 2)."""
+        """Number of the cable, and position among its inspections, of every inspection, (inspection, 2)."""
         return np.array([(i, np.sum(self.cable[:j] == i)) for j, i in enumerate(self.cable)])
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """Arrays that the density is computed from, (cable, inspection, ...)."""
+        """Arrays from which the density is computed, (cable, inspection, ...)."""
         position = self.positions[:, 1]
         shape = self.cables, int(position.max()) + 1
 
@@ -92,7 +92,7 @@ class Inspections:
         }  # fmt: skip
 
     def data_with(self, readings: Sequence[JointReadings]) -> dict[str, Any]:
-        """The same with readings of some inspections in place of what single fits say of them.
+        """Return the data with readings of some inspections in place of their summaries; coordinates stay the same.
 
         Coordinates stay those that single fits suggest.
         """
@@ -112,7 +112,7 @@ class Inspections:
 
 
 def whitening_roots(scale: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Matrices W with |W x|^2 = x' scale^-1 x in what is known, and nothing of what is not, (inspection, row, coefficient).
+    """Return matrices W with |W x|^2 = x' scale^-1 x over known coefficients, (inspection, row, coefficient).
 
     Args:
         scale: Scale matrices, (inspection, coefficient, coefficient).
@@ -130,11 +130,11 @@ class PopulationDensity:
     """Log density of a population and its cables in coordinates z.
 
     Args:
-        coefficients: How many.
-        wears: Whether there is wear to be told.
-        effects: Names of what else friction may depend on.
-        cables: How many.
-        readings: Inspections whose readings themselves are in it.
+        coefficients: Number of coefficients.
+        wears: Whether wear is estimated.
+        effects: Names of the other covariates.
+        cables: Number of cables.
+        readings: Inspections whose readings themselves enter.
     """
 
     coefficients: int
@@ -145,21 +145,21 @@ class PopulationDensity:
 
     @property
     def numbers_per_cable(self) -> int:
-        """Numbers of a cable: its log coefficients when new, and its wear."""
+        """Number of parameters of a cable: its log coefficients when new, and its wear."""
         return self.coefficients + self.wears
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of what describes the population, in the order of z."""
+        """Names of the population's parameters, in the order of z."""
         k = range(self.coefficients)
         wear = ("wear", "wear_spread") if self.wears else ()
         return (*(f"mean_{i}" for i in k), *(f"spread_{i}" for i in k), *wear, *self.effects)
 
     def describe_parameters(self, coefficient_names: Sequence[str]) -> tuple[str, ...]:
-        """What describes the population in words, in the order of z.
+        """Describe the population's parameters in words, in the order of z.
 
         Args:
-            called: Names of the coefficients; their numbers, from 1, where there are none.
+            coefficient_names: Names of the coefficients; numbered from 1 where empty.
         """
         every = coefficient_names or [f"coefficient {i + 1}" for i in range(self.coefficients)]
         wear = ("the wear", "the difference of wear between cables") if self.wears else ()
@@ -169,16 +169,16 @@ class PopulationDensity:
 
     @property
     def _fleet_size(self) -> int:
-        """Numbers of the population and of all cables, which come first in z."""
+        """Number of parameters of the population and of all cables, which come first in z."""
         return len(self.names) + self.cables * self.numbers_per_cable
 
     @property
     def size(self) -> int:
-        """Of z."""
+        """Length of z."""
         return self._fleet_size + sum(part.size for part in self.readings)
 
     def population_at(self, z: Float[Array, " size"], data: dict[str, Any]) -> dict[str, Array]:
-        """What describes the population: means, spreads and effects, (cable's number,) and (effect,)."""
+        """Return means, spreads (parameter of a cable,) and effects (effect,) of the population."""
         k = self.coefficients
         mean = data["prior_mean"] + data["prior_sd"] * z[:k]
         spread, remaining = SPREAD.constrain(z[k : 2 * k]), z[2 * k :]
@@ -192,7 +192,7 @@ class PopulationDensity:
     def cables_at(
         self, z: Float[Array, " size"], data: dict[str, Any], population: dict[str, Array]
     ) -> tuple[Float[Array, "cable each"], Float[Array, " cable"]]:
-        """Log coefficients when new and wear of every cable, and the log of the volume that z is stretched by."""
+        """Return log coefficients when new and wear of every cable, and the log volume of the map from z."""
         inner = z[len(self.names) : self._fleet_size].reshape(self.cables, self.numbers_per_cable)
         weight = population["spread"] ** -2
         toward = data["toward"] - data["by_effect"] @ population["effects"] + weight * population["mean"]
@@ -202,7 +202,7 @@ class PopulationDensity:
         return values, -jnp.sum(jnp.log(jnp.diagonal(root, axis1=1, axis2=2)), axis=1)
 
     def log_density(self, z: Float[Array, " size"], data: dict[str, Any]) -> Float[Array, ""]:
-        """Log posterior density in z, up to a constant."""
+        """Return the log posterior density in z, up to a constant."""
         population = self.population_at(z, data)
         values, volume = self.cables_at(z, data, population)
         away = (values - population["mean"]) / population["spread"]
@@ -218,7 +218,7 @@ class PopulationDensity:
     def log_coefficients(
         self, values: Float[Array, "cable each"], population: dict[str, Array], data: dict[str, Any]
     ) -> Float[Array, "cable inspection coefficient"]:
-        """At every inspection."""
+        """Return log coefficients at every inspection."""
         k = self.coefficients
         shift = data["effects"] @ population["effects"]
         if self.wears:
@@ -229,6 +229,6 @@ class PopulationDensity:
 def log_likelihood(
     at: Float[Array, "cable inspection coefficient"], data: dict[str, Any]
 ) -> Float[Array, "cable inspection"]:
-    """Of log coefficients at every inspection, up to a constant; 0 where there is no inspection."""
+    """Return the log likelihood of log coefficients at every inspection, up to a constant; 0 where there is no inspection."""
     away = jnp.einsum("ijkl,ijl->ijk", data["root"], at - data["center"])
     return -(data["freedom"] + data["counts"]) / 2 * jnp.log1p(jnp.sum(away**2, axis=2) / data["freedom"])

@@ -32,20 +32,16 @@ from bowdenfit.inference.population.model import WEAR, Inspections, PopulationDe
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)
-_FEW_CABLES, _CAREFUL_ACCEPTANCE = (
-    5,
-    0.99,
-)  # cables, of fewer than which hardly anything is known of their spread; what then is accepted
-_MOST_DENSE = 60  # numbers of whose covariance the first 200 draws of warm-up tell enough
-_FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first look, until the next, and at all
+# With fewer cables hardly anything is known of their spread, and NUTS needs this target acceptance.
+_FEW_CABLES, _CAREFUL_ACCEPTANCE = 5, 0.99
+_MOST_DENSE = 60  # largest number of parameters whose covariance 200 draws of warm-up can estimate
+_FIRST, _MORE, _MOST = 20, 10, 100  # blocks after warm-up at the first convergence check, until the next, and at most
 _AT_ONCE = _SETTINGS.n_chains * BLOCK  # draws whose values are computed together
-_STEP, _DISPERSED = (
-    1e-4,
-    5.0,
-)  # of derivatives; by how much more the starts of the population scatter than those of cables
+_STEP = 1e-4  # of numerical derivatives
+_DISPERSED = 5.0  # spread of the starts of the population, over that of cables
 _UNCOMPUTABLE = 1e100  # minus the log density where it cannot be computed
-_MOST_DIVERGENT = 0.001  # share of trajectories
-_SWEEPS = 60
+_MOST_DIVERGENT = 0.001  # share of trajectories that may diverge
+_SWEEPS = 60  # of the Gibbs sampler
 
 
 @dataclass(frozen=True)
@@ -53,11 +49,11 @@ class PopulationDraws:
     """Draws of a population with its cables, of equal weight.
 
     Args:
-        mean, spread: Of log coefficients of new cables and of wear, (draw, number).
-        effects: Of lubrication and of a degree, as far as they are told, (draw, effect).
+        mean, spread: Mean and spread of log coefficients of new cables and of wear, (draw, parameter).
+        effects: Estimated effects of lubrication and of a degree, (draw, effect).
         cables: Log coefficients of each cable when new, and its wear, (draw, cable, number).
-        reasons: Why they should not be trusted; empty if they may.
-        n_effective: Effective number of draws of the worst number of the population.
+        reasons: Why the draws should not be trusted; empty if they can be.
+        n_effective: Effective sample size of the population's worst parameter.
     """
 
     mean: np.ndarray
@@ -75,14 +71,14 @@ def draw_population(
     coefficient_names: Sequence[str] = (),
     readings: tuple[JointReadings, ...] = (),
 ) -> PopulationDraws:
-    """Draw a population and its cables.
+    """Sample a population and its cables by NUTS.
 
     Args:
-        inspected: What is known of all inspections.
-        seed: Of everything random.
-        without: Cables whose inspections are not looked at, by number.
-        called: Names of the coefficients, for reasons not to trust the draws.
-        readings: Inspections whose readings themselves are looked at, in place of what single fits say of them.
+        inspected: The inspections.
+        seed: Seed of everything random here.
+        without: Numbers of cables whose inspections are left out.
+        coefficient_names: Names of the coefficients, for messages.
+        readings: Inspections whose readings themselves enter, in place of their summaries.
     """
     wears = inspected.cycles is not None
     density = PopulationDensity(inspected.coefficients, wears, tuple(inspected.effects), inspected.cables, readings)
@@ -116,17 +112,17 @@ def draw_population(
 
 
 def _first_mass(density: PopulationDensity) -> np.ndarray:
-    """The first inverse mass matrix; its diagonal where cables are many.
+    """Return the first inverse mass matrix; only its diagonal where cables are many.
 
-    Inspections of a few cables leave wear, lubrication and temperature to be told apart by hardly anything but their priors:
-    what is known of them together is known well, and of each alone badly.
+    With few cables, wear, lubrication and temperature are distinguished by hardly anything but their priors: their sum is known
+    well, and each of them badly.
     """
     dense = density.cables < _FEW_CABLES and density.size <= _MOST_DENSE
     return np.eye(density.size) if dense else np.ones(density.size)
 
 
 def _blank_cables(data: dict[str, Any], cables: Collection[int]) -> dict[str, Any]:
-    """The data without those of some cables."""
+    """Return the data without those of some cables."""
     blanked = dict(data)
     for name in ("root", "precision", "toward", "by_effect") if cables else ():
         blanked[name] = data[name].copy()
@@ -136,7 +132,7 @@ def _blank_cables(data: dict[str, Any], cables: Collection[int]) -> dict[str, An
 
 
 def _describe_shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float) -> tuple[tuple[str, ...], float]:
-    """What keeps the draws from being trusted, in words, and the effective number of the worst."""
+    """Describe why the draws should not be trusted; return also the smallest effective sample size."""
     diagnostics = {name: diagnose(np.ascontiguousarray(z[:, :, i]), len(z)) for i, name in enumerate(names)}
     reasons = describe_convergence_shortfalls(diagnostics, _SETTINGS.target_r_hat, _SETTINGS.target_ess)
     if divergent > _MOST_DIVERGENT:
@@ -145,11 +141,11 @@ def _describe_shortfalls(z: np.ndarray, names: tuple[str, ...], divergent: float
 
 
 def _locate_population(density: PopulationDensity, data: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Where the population is in z, and the root of its covariance, as far as it is normal: units in which it is drawn.
+    """Return the population's mode in z and a root of its covariance, the units in which it is sampled.
 
-    Effects of lubrication and temperature are known together with wear and the middle of all cables, and a hundred times better
-    than their priors say. Coordinates of cables at 0 are their most likely values, so that the density there is that of the
-    population alone, as far as single fits are normal.
+    Effects of lubrication and temperature are strongly correlated with wear and the mean of all cables, and known a hundred
+    times better than their priors say. Coordinates of cables at 0 are their most likely values, so that the density there is
+    that of the population alone, as far as single fits are normal.
     """
     size, slopes_of = len(density.names), _compile_gradient(density, *_tree_and_shapes(data))
 
@@ -168,13 +164,13 @@ def _locate_population(density: PopulationDensity, data: dict[str, Any]) -> tupl
 
 
 def _to_z(units: Any, density: PopulationDensity, data: dict[str, Any]) -> Any:
-    """Where a point in units of the population is in z."""
+    """Return z of a point in units of the population."""
     (center, root), size = data["about"], len(density.names)
     return jnp.concatenate([center + root @ units[:size], units[size:]])
 
 
 def _tree_and_shapes(data: dict[str, Any]) -> tuple[Any, tuple[tuple[tuple[int, ...], Any], ...]]:
-    """Tree, and shapes and kinds of its leaves."""
+    """Return the tree of data, and shapes and types of its leaves."""
     leaves, tree = jax.tree.flatten(data)
     return tree, tuple((np.shape(leaf), np.asarray(leaf).dtype) for leaf in leaves)
 
@@ -185,14 +181,14 @@ def _shape_tree(tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> A
 
 @lru_cache(maxsize=16)
 def _compile_gradient(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> Any:
-    """Log density and its derivatives."""
+    """Compile the log density and its gradient."""
     z = jax.ShapeDtypeStruct((density.size,), np.float64)
     return compile_program(jax.value_and_grad(density.log_density), z, _shape_tree(tree, shapes), run_once=True)
 
 
 @lru_cache(maxsize=16)
 def _compile(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[int, ...], Any], ...]) -> tuple[Any, Any]:
-    """What draws, and what gives the values of draws; the same for all fleets of one shape."""
+    """Compile the sampler and the values of draws, for all fleets of one shape."""
     data = _shape_tree(tree, shapes)
     settings = (
         _SETTINGS.model_copy(update={"target_acceptance": _CAREFUL_ACCEPTANCE})
@@ -223,13 +219,14 @@ def _compile(density: PopulationDensity, tree: Any, shapes: tuple[tuple[tuple[in
 def draw_unpooled(
     inspected: Inspections, population: PopulationDraws, cable: int, seed: int
 ) -> tuple[np.ndarray, bool]:
-    """Log coefficients of a cable when new and its wear, (draw, number), and whether its own inspections tell its wear.
+    """Return a cable's log coefficients when new and its wear, (draw, parameter), and whether its wear is identified.
 
     Args:
-        inspected: What is known.
-        population: That the cable is unlike, for what its inspections do not tell; as many draws come back.
-        cable: Its number.
-        seed: Of everything random.
+        inspected: The inspections.
+        population: Population of the other cables, for what the cable's inspections do not identify; as many draws are
+            returned.
+        cable: Number of the cable.
+        seed: Seed of everything random here.
     """
     generator, rows = np.random.default_rng([seed, 19, cable]), np.flatnonzero(inspected.cable == cable)
     freedom, counts = inspected.summaries.freedom[rows], inspected.known[rows].sum(axis=1)
@@ -260,11 +257,11 @@ def draw_unpooled(
 
 
 def _is_wear_known(information: np.ndarray, has: np.ndarray) -> bool:
-    """Whether inspections tell more of wear than its prior does, whatever the coefficients are.
+    """Return whether inspections carry more information about wear than its prior, for any coefficients.
 
     Args:
-        information: Precision of log coefficients and wear, (number, number).
-        has: Which coefficients they have.
+        information: Precision of log coefficients and wear, (parameter, parameter).
+        has: Which coefficients the cable has.
     """
     inside = information[:-1, :-1][np.ix_(has, has)]
     beside = information[:-1, -1][has]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         StoreError,
         UsageError,
     )
-    from bowdenfit.front_desk import Fit, load
+    from bowdenfit.finished_fit import Fit, load
     from bowdenfit.questions.calibrate.verb import calibrate
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.compare.verb import compare
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from bowdenfit.run.verb import fit
 
 _WHERE = {
-    "Fit": "bowdenfit.front_desk",
+    "Fit": "bowdenfit.finished_fit",
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "check": "bowdenfit.questions.check.verb",
     "compare": "bowdenfit.questions.compare.verb",
@@ -49,7 +49,7 @@ _WHERE = {
     "fit": "bowdenfit.run.verb",
     "fleet": "bowdenfit.questions.fleet.verb",
     "identify": "bowdenfit.questions.identify.verb",
-    "load": "bowdenfit.front_desk",
+    "load": "bowdenfit.finished_fit",
     "metabolic": "bowdenfit.questions.metabolic.verb",
     "next_measurement": "bowdenfit.questions.next.verb",
     "plot": "bowdenfit.questions.summary.verb",

@@ -1,4 +1,4 @@
-"""The program `bowdenfit`, or `python -m bowdenfit`: an interrupt while it loads is one line, and no traceback."""
+"""The program `bowdenfit`, or `python -m bowdenfit`: an interrupt while it loads prints one line, no traceback."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Every way bowdenfit can refuse: sentences with a remedy, never a bare traceback."""
+"""Errors that a user can cause or meet: each is complete sentences with a remedy."""
 
 import difflib
 import errno

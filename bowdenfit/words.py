@@ -1,4 +1,4 @@
-"""Plain text as people read it: quoted values, lists in words, digits worth showing, filled paragraphs, aligned columns."""
+"""Plain text for people: quoted values, lists in words, significant digits, filled paragraphs, aligned columns."""
 
 import math
 import re

@@ -49,7 +49,7 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained_share
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
 CANDIDATES = tuple(Candidate(kind, at) for kind in ("angle", "efficiency") for at in LENGTHS)

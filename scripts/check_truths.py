@@ -39,7 +39,7 @@ from bowdenfit.questions.calibrate.replication import RankedTruth
 from bowdenfit.questions.calibrate.truths import StatedTruth, stated_truths
 from bowdenfit.questions.calibrate.workbench import Plan, Workbench
 from bowdenfit.questions.simulate.simulation import empty_tables
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 from bowdenfit.words import table
 

@@ -10,9 +10,8 @@ from typing import NoReturn
 
 from cyclopts import CycloptsError
 
-from bowdenfit.cli.commands import describe_error
-from bowdenfit.cli.interrupts import INTERRUPTED, requested, run_interruptibly
-from bowdenfit.cli.program import bowdenfit
+from bowdenfit.cli.commands import bowdenfit, describe_error
+from bowdenfit.cli.running import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
 from bowdenfit.errors import BowdenfitError, UsageError, system_error
 from bowdenfit.words import few

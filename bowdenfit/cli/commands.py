@@ -1,4 +1,4 @@
-"""A verb as a command: the parameters of its function as arguments and options, and its answer as what is printed."""
+"""The commands of the program: each verb with the arguments and options of its function, and what it prints."""
 
 import json
 import os
@@ -15,16 +15,17 @@ from docstring_parser.google import parse
 from rich.box import Box
 
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
-from bowdenfit.cli.progress import watch_verb
+from bowdenfit.cli.init_command import HELP, init
+from bowdenfit.cli.running import watch_verb
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
+from bowdenfit.verbs import VERBS
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
-    from bowdenfit.front_desk import Fit
-
+    from bowdenfit.finished_fit import Fit
 
 LOOK: dict[str, Any] = {  # of every command
     "default_parameter": Parameter(negative=(), show_default=False, allow_repeating=True, json_list=False, json_dict=False),
@@ -131,7 +132,7 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
 
 def _load_kept_answers(source: Path) -> dict[str, Any]:
     """What the fit of a results folder has answered before."""
-    from bowdenfit.results.kept import read_answers
+    from bowdenfit.results.answer_cache import read_answers
 
     return read_answers(source)
 
@@ -185,14 +186,14 @@ def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Repl
 
 def _to_json(reply: Reply) -> str:
     """An answer as JSON."""
-    from bowdenfit.results.plain import plain_data
+    from bowdenfit.results.serialization import plain_data
 
     return json.dumps(plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
 
 
 def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
     """The fit of a results folder; of several, by their own names, or from where their paths part where two have the same."""
-    from bowdenfit.front_desk import load
+    from bowdenfit.finished_fit import load
 
     if isinstance(results, Path):
         return load(results)
@@ -208,3 +209,41 @@ def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
 def _results_name(dataset: Path) -> str:
     """What the results of a data set are called if nothing else is said."""
     return dataset.stem if dataset.suffix else dataset.resolve().name
+
+
+_HELP = """Friction coefficients of a Bowden cable from bench measurements.
+
+With honest uncertainty, and the cable length that transmits force best.
+
+Start with `bowdenfit init FOLDER`, fill in the files, `bowdenfit check FOLDER`,
+then `bowdenfit fit FOLDER`.
+
+Exit codes: 0 done (a fit has converged); 1 failure; 2 bad usage or bad input;
+3 the fit finished but must not be trusted; 130 interrupted, with the checkpoint
+kept.
+"""
+_COMPLETION = """Print the completion script of a shell.
+
+For bash: eval "$(bowdenfit completion bash)"
+"""
+
+
+def _completion(shell: Annotated[Literal["bash", "zsh", "fish"], Parameter("SHELL", help="Such as bash.")], /) -> None:
+    say(bowdenfit.generate_completion(shell=shell))
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return f"bowdenfit, version {version('bowdenfit')}"
+
+
+bowdenfit = App(name="bowdenfit", help=_HELP, version=_version, **LOOK)
+COMMANDS = (
+    App(name="init", help=HELP, default_command=init, **LOOK),
+    *map(command, VERBS),
+    App(name="completion", help=_COMPLETION, default_command=_completion, **LOOK),
+)
+for position, verb in enumerate(COMMANDS):
+    verb.sort_key = position
+    bowdenfit.command(verb)

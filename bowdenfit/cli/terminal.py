@@ -1,4 +1,4 @@
-"""What is said in a terminal: in its own letters, or in ASCII where it has no others."""
+"""Print to a terminal: in Unicode, or in ASCII where the terminal has nothing else."""
 
 import os
 import sys

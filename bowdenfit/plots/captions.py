@@ -1,4 +1,4 @@
-"""Words that captions share: what lines and bands are, and how many of what are drawn."""
+"""Phrases that the captions of several figures share: what lines and bands are, and how many items are shown."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""A figure that a notebook shows by itself, in whichever state pyplot is; imported when something is drawn."""
+"""A matplotlib figure that a notebook displays by itself, whatever the state of pyplot; imported when something is drawn."""
 
 import io
 

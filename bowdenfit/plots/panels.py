@@ -1,4 +1,4 @@
-"""Small multiples of recordings: which are shown, in which panels, on which axes."""
+"""Small multiples: which recordings are shown, in which panels, on which axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels of what was measured and fitted, each with a strip of residuals below it."""
+"""Panels of measurements and fit, each with a strip of residuals below it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing a figure to a file, whole or not at all."""
+"""Write a figure to a file, whole or not at all."""
 
 from __future__ import annotations
 

@@ -39,9 +39,9 @@ from bowdenfit.questions.summary import (
     residuals_figure,
     traces_figure,
 )
-from bowdenfit.results.arrays import read_arrays
+from bowdenfit.results.answer_cache import read_answers
 from bowdenfit.results.folder import FIGURE_DATA
-from bowdenfit.results.kept import read_answers
+from bowdenfit.results.serialization import read_arrays
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:

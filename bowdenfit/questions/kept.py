@@ -7,8 +7,8 @@ import numpy as np
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.predict.lengths import predict_at_lengths
 from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.results.plain import serialize
 from bowdenfit.results.record import Record
+from bowdenfit.results.serialization import serialize
 
 
 def answers_of(fit: Record) -> dict[str, Any]:

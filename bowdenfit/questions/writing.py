@@ -96,9 +96,9 @@ def write_answer(
         StoreError: The folder cannot be written.
     """
     from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.captions import copy_captions
+    from bowdenfit.results.figures_folder import copy_captions
     from bowdenfit.results.folder import fill_folder_atomically, write_text
-    from bowdenfit.results.plain import plain_data
+    from bowdenfit.results.serialization import plain_data
 
     page_file, text_file, *_ = files = files_of(folder, name)
     files += [path for each in figures if each != name for path in figures_of(folder, each)]

@@ -1,1 +1,1 @@
-"""The record of a fit, the folder it is kept in, and the best length that follows from its draws."""
+"""A finished fit as data: its record, its results folder, and the best length that follows from its draws."""

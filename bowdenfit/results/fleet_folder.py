@@ -11,8 +11,8 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import or_damaged, refuse_special
+from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.folder import read_page, replace_atomically
-from bowdenfit.results.kept import file_checksum
 from bowdenfit.types import Vector
 
 if TYPE_CHECKING:

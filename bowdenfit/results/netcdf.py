@@ -1,4 +1,4 @@
-"""posterior.nc: draws as ArviZ reads them, from plain data and back; loads no model."""
+"""posterior.nc: arrays in the layout that ArviZ reads, written and read as HDF5; loads no model."""
 
 import io
 from collections.abc import Mapping, Sequence

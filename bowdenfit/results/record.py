@@ -1,4 +1,4 @@
-"""The record of a fit: what was fitted to what, the draws, and what follows from them without asking a question."""
+"""The record of a fit: data set, model, draws, and what follows from them directly."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -19,15 +19,15 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.sampler_agreement import SamplerAgreement
 from bowdenfit.model import Model, build_model
-from bowdenfit.results.efficiencies import Efficiencies
-from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.route_draws import (
+from bowdenfit.results.along_route import (
+    Efficiencies,
     RouteDraws,
     compile_along_route,
     compute_along_route,
     draw_new_mounting,
     summarize_optimum,
 )
+from bowdenfit.results.optimal_length import OptimalLength
 from bowdenfit.words import few, shown
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"

@@ -1,4 +1,4 @@
-"""A fit to its results folder, and back bit for bit."""
+"""Save a fit to its results folder, and load it back bit for bit."""
 
 import json
 from collections.abc import Mapping
@@ -18,12 +18,11 @@ from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.settings import parse_description
-from bowdenfit.results.arrays import write_arrays
+from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
-from bowdenfit.results.kept import CHECKSUM, file_checksum, page_checksum, write_answers
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
-from bowdenfit.results.plain import deserialize, serialize
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
+from bowdenfit.results.serialization import deserialize, serialize, write_arrays
 
 SCHEMA = 6
 LOG_POSTERIOR, WALKER = "lp", "walker"

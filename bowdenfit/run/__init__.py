@@ -1,1 +1,1 @@
-"""From a data set to a finished fit: stages, helpers beside them, and what is written."""
+"""From a data set to a finished fit: prepare the results folder, fit, sample, write."""

@@ -1,4 +1,4 @@
-"""Fitting a data set."""
+"""`bf.fit` and `bowdenfit fit`."""
 
 from collections.abc import Callable
 from functools import partial
@@ -18,7 +18,7 @@ from bowdenfit.words import percent
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
-    from bowdenfit.front_desk import Fit
+    from bowdenfit.finished_fit import Fit
     from bowdenfit.inference.chain import Progress
 
 Sampler = Literal["emcee", "nuts", "both"]
@@ -57,9 +57,9 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from bowdenfit.notebook import show_progress_bar
     from bowdenfit.results.folder import reserve_folder
-    from bowdenfit.run.storing import choose_sampler, choose_seed, start_checkpointing
+    from bowdenfit.run.preparing import choose_sampler, choose_seed, start_checkpointing
+    from bowdenfit.verb import show_progress_bar
 
     refuse_low_memory()
     folder = Path(output) if output is not None else None

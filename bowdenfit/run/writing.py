@@ -1,4 +1,4 @@
-"""What a finished fit writes into its results folder: the fit itself, figures, texts and the report."""
+"""Write the results folder of a finished fit: the fit itself, figures, texts and the report."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,7 +6,7 @@ from textwrap import shorten
 from typing import Any
 
 from bowdenfit.errors import DiskError, system_error
-from bowdenfit.front_desk import Fit
+from bowdenfit.finished_fit import Fit
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
 from bowdenfit.questions.figures import captions_of, draw_figure, figures_of, mark_of
@@ -16,8 +16,7 @@ from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.questions.summary.words import full_text
 from bowdenfit.questions.writing import write_page
-from bowdenfit.results.captions import write_captions
-from bowdenfit.results.drawn import record_drawn_figures
+from bowdenfit.results.figures_folder import record_drawn_figures, write_captions
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit, write_text
 from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable

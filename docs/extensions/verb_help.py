@@ -16,7 +16,7 @@ class VerbHelp(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """All sections."""
-        from bowdenfit.cli.program import COMMANDS
+        from bowdenfit.cli.commands import COMMANDS
 
         return [_section("bowdenfit"), *(_section("bowdenfit", verb.name[0]) for verb in COMMANDS)]
 

@@ -15,8 +15,8 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit import verbs
-from bowdenfit.cli import interrupts
-from bowdenfit.cli.progress import watch_verb
+from bowdenfit.cli import running
+from bowdenfit.cli.running import watch_verb
 from bowdenfit.inference.chain import Progress
 from bowdenfit.verbs import FIT
 
@@ -353,7 +353,7 @@ def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting
 def test_a_watched_loop_that_is_interrupted_says_how_to_go_on(tmp_path, monkeypatch):
     (tmp_path / "chain.checkpoint").touch()
     requested = threading.Event()
-    monkeypatch.setattr(interrupts, "requested", requested)
+    monkeypatch.setattr(running, "requested", requested)
     with pytest.raises(KeyboardInterrupt, match=r"the checkpoint is kept in .*: run the same command with --resume"):  # noqa: SIM117
         with watch_verb(tmp_path, FIT.watch) as report:
             report(Progress(200, 4000, None, None))

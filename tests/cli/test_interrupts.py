@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from bowdenfit.cli import interrupts
-from bowdenfit.cli.interrupts import refuse_interrupted, run_interruptibly
+from bowdenfit.cli import running
+from bowdenfit.cli.running import refuse_interrupted, run_interruptibly
 
 pytestmark = pytest.mark.extended
 
@@ -127,13 +127,13 @@ def test_a_loop_that_looks_at_the_flag_ends_by_itself():
             run_interruptibly(loop)
     finally:
         signal.signal(signal.SIGINT, before)
-        interrupts.requested.clear()
+        running.requested.clear()
     assert ended
 
 
 AT_A_PROMPT = """
 import sys
-from bowdenfit.cli.interrupts import run_interruptibly
+from bowdenfit.cli.running import run_interruptibly
 run_interruptibly(sys.stdin.readline)
 """
 

@@ -20,7 +20,7 @@ from bowdenfit.kinds.efficiencies.table import EfficiencyTable
 from bowdenfit.kinds.settings import parse_description
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.units import conversion_factor
 
 # The on-body paper's printed curves: A [deg], B [mm], C [mm] of equation 8.

@@ -15,7 +15,7 @@ from scipy import stats
 
 import bowdenfit
 from bowdenfit.dataset import Dataset
-from bowdenfit.front_desk import Fit
+from bowdenfit.finished_fit import Fit
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.summary.brief_words import summary_text

@@ -26,7 +26,7 @@ CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE
 IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
 PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01"}  # and what they print
 CALIBRATING = """
-from bowdenfit.notebook import watched
+from bowdenfit.verb import watched
 from bowdenfit.questions.calibrate.verb import WATCH
 
 with watched(WATCH, None) as report:

@@ -14,8 +14,7 @@ import pytest
 from IPython.lib.pretty import pretty
 
 import bowdenfit as bf
-from bowdenfit.display import Display, shorten_lines
-from bowdenfit.html_text import as_html
+from bowdenfit.display import Display, as_html, shorten_lines
 from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict

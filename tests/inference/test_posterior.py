@@ -22,7 +22,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import build_model
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.store import posterior_page
 
 # model.md, section 8: mean, standard deviation; efficiencies only, continuous geometry. Two NUTS implementations agree.

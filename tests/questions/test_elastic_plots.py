@@ -9,7 +9,7 @@ from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
 from kept_data import assert_kept
 
-from bowdenfit.plots.bands import choose_evenly
+from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.questions.bends.bending_loss_figure import BendingLoss, EfficiencyLine
 from bowdenfit.questions.bends.loops_figure import LoopCurve
 from bowdenfit.questions.bends.preload_figure import PreloadCurve, stretches

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from bowdenfit.description import Description
-from bowdenfit.front_desk import Fit
+from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.questions.bends.words import elastic_text
 from bowdenfit.questions.check.data_set_words import check_text

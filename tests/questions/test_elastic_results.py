@@ -29,7 +29,7 @@ from bowdenfit.questions.simulate.simulation import empty_tables, true_values, w
 from bowdenfit.questions.simulate.tables import read_bench
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 
 pytestmark = pytest.mark.extended
 

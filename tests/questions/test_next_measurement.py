@@ -18,7 +18,7 @@ from scipy import stats
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.front_desk import Fit
+from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.angles.table import AngleTable
@@ -37,7 +37,7 @@ from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import error_of_difference, explained_share, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin
 

@@ -20,11 +20,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.contour import ContourSet
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band
-from bowdenfit.plots.densities import density
-from bowdenfit.plots.layout import axes_at, empty_page
+from bowdenfit.plots.curves import BAND_QUANTILES, NEW_RUN, Band, density
+from bowdenfit.plots.layout import NUMBER_SPACE, axes_at, empty_page, number_below, ticks
 from bowdenfit.plots.style import in_paper_style
-from bowdenfit.plots.ticks import NUMBER_SPACE, number_below, ticks
 from bowdenfit.plots.write import FORMATS, write
 from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
 from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
@@ -35,8 +33,7 @@ from bowdenfit.questions.summary.pairs_figure import Pairs
 from bowdenfit.questions.summary.quantities import SampledQuantity
 from bowdenfit.questions.summary.residuals_figure import Residuals
 from bowdenfit.questions.summary.traces_figure import Paths
-from bowdenfit.results.choices import Choice, Window
-from bowdenfit.results.length import OptimalLength
+from bowdenfit.results.optimal_length import Choice, OptimalLength, Window
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
 LABEL = "Cable length (mm)"

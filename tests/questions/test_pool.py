@@ -27,8 +27,8 @@ from bowdenfit.questions.pool.next import next_inspections
 from bowdenfit.questions.pool.pooling import pooled
 from bowdenfit.questions.pool.unlike import anderson_darling, chances
 from bowdenfit.questions.pool.words import pool_text
+from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
-from bowdenfit.results.kept import file_checksum
 
 pytestmark = pytest.mark.extended
 

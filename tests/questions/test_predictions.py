@@ -14,8 +14,8 @@ from bowdenfit.inference import draws
 from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, replicator, value_function
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
-from bowdenfit.results.choices import find_best_window, is_at_edge, rank_choices
-from bowdenfit.results.optimum import make_optimizer, route_grid
+from bowdenfit.results.along_route import make_optimizer, route_grid
+from bowdenfit.results.optimal_length import find_best_window, is_at_edge, rank_choices
 
 FINE = 20_001
 

@@ -25,7 +25,7 @@ from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.next.answer import NextMeasurement, Ranked
 from bowdenfit.questions.next.candidates import can_be_ranked
 from bowdenfit.questions.next.target import Answer
-from bowdenfit.results.captions import CAPTIONS
+from bowdenfit.results.figures_folder import CAPTIONS
 
 pytestmark = pytest.mark.extended
 

@@ -16,11 +16,11 @@ from bowdenfit.questions import figures
 from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
-from bowdenfit.results import drawn
+from bowdenfit.results import figures_folder
+from bowdenfit.results.answer_cache import SCHEMA, read_answers, write_answers
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
-from bowdenfit.results.kept import SCHEMA, read_answers, write_answers
-from bowdenfit.results.plain import serialize
+from bowdenfit.results.serialization import serialize
 
 HEAVY = {
     "jax",
@@ -153,7 +153,7 @@ def edit_fit(folder, monkeypatch):
 
 
 def update_matplotlib(folder, monkeypatch):
-    monkeypatch.setattr(drawn, "installed_version", lambda _: "99.0")
+    monkeypatch.setattr(figures_folder, "installed_version", lambda _: "99.0")
 
 
 def leave_unnamed(folder, monkeypatch):

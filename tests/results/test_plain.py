@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.results.plain import deserialize, plain_data, serialize
+from bowdenfit.results.serialization import deserialize, plain_data, serialize
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 

@@ -11,7 +11,7 @@ from sealed import sealed
 
 import bowdenfit as bf
 from bowdenfit.arguments import read_quantity
-from bowdenfit.results.kept import CHECKSUM
+from bowdenfit.results.answer_cache import CHECKSUM
 
 pytestmark = pytest.mark.extended
 

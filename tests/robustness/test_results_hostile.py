@@ -15,9 +15,9 @@ from fuzzing_results import SHAPES, begun_fleet, resume_fleet
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
 from bowdenfit.questions.fleet.store import KEPT
-from bowdenfit.results.arrays import read_arrays
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
 from bowdenfit.results.netcdf import read_groups, write_groups
+from bowdenfit.results.serialization import read_arrays
 
 pytestmark = pytest.mark.extended
 

@@ -16,7 +16,7 @@ from bowdenfit.description.device_keys import KEYS
 from bowdenfit.questions.fleet.cases import read_cases, refuse_where_none
 from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.metabolic.words import metabolic_text
-from bowdenfit.results.plain import plain_data
+from bowdenfit.results.serialization import plain_data
 
 INSPECTIONS = 3  # of the fleet that is mangled
 LONG, DEEP = "9" * 4400, "[" * 600 + "]" * 600

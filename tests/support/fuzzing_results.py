@@ -26,9 +26,9 @@ from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, begun_before
 from bowdenfit.results import folder as names
+from bowdenfit.results.answer_cache import file_checksum, read_answers
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
-from bowdenfit.results.kept import file_checksum, read_answers
-from bowdenfit.run.storing import choose_seed
+from bowdenfit.run.preparing import choose_seed
 
 ODD_JSON: tuple[Any, ...] = (
     None, True, -1, 0, 1e400, float("nan"), "", "x", "1", "NaN", [], {}, [[]], {"": 0}, [1, "a", None], 10**30, -0.5,
@@ -133,7 +133,7 @@ def _mangle_arrays(chance: random.Random, path: Path) -> None:
 
 def interrupted_fit(place: Path, data: Dataset) -> Path:
     """The folder of a fit that was ended after some steps; for `resume_fit`."""
-    from bowdenfit.run.storing import start_checkpointing
+    from bowdenfit.run.preparing import start_checkpointing
 
     place.mkdir()
     path = start_checkpointing(place, data, 3, resume=False)

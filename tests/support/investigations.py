@@ -12,7 +12,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.refit import Laboratory as Fits
 from bowdenfit.questions.calibrate.refit import with_parameters_of
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 
 HELD = 0.9
 

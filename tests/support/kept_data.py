@@ -1,8 +1,7 @@
 """Whether what a figure shows comes back from the file in which it is kept."""
 
 from bowdenfit.questions.figures import data_types
-from bowdenfit.results.arrays import read_arrays, write_arrays
-from bowdenfit.results.plain import serialize
+from bowdenfit.results.serialization import read_arrays, serialize, write_arrays
 
 
 def assert_kept(data, path):

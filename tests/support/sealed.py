@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.results.kept import CHECKSUM, page_checksum
+from bowdenfit.results.answer_cache import CHECKSUM, page_checksum
 
 
 def sealed(page: dict[str, Any]) -> str:

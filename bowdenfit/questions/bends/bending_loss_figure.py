@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, name_band
 from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.curves import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, count_columns, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color

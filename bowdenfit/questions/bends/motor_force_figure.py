@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import choose_evenly, draw_quantiles, name_band, note_shown_count
 from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
+from bowdenfit.plots.curves import choose_evenly, draw_quantiles, name_band, note_shown_count
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, middle, name_band
 from bowdenfit.plots.captions import describe_curve, describe_strip
+from bowdenfit.plots.curves import draw_quantiles, middle, name_band
 from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names

@@ -22,7 +22,7 @@ from bowdenfit.results.folder import (
     remove_run_files,
     write_text,
 )
-from bowdenfit.results.plain import deserialize, serialize
+from bowdenfit.results.serialization import deserialize, serialize
 
 CALIBRATION = "calibration.json"
 # Everything that a calibration writes.

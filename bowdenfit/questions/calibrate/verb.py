@@ -12,10 +12,9 @@ from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PATH, TEXTS, Output, Seed, read_first, whole_number
 from bowdenfit.inference.resources import refuse_low_memory
-from bowdenfit.notebook import show_progress_bar
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
-from bowdenfit.verb import Reply, Verb, Watch
+from bowdenfit.verb import Reply, Verb, Watch, show_progress_bar
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -204,7 +203,7 @@ def _write(found: "Calibration", folder: Path | None) -> None:
     from bowdenfit.questions.calibrate.words import calibration_text, details_text
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
-    from bowdenfit.results.plain import plain_data
+    from bowdenfit.results.serialization import plain_data
 
     with folder_to_write(folder):
         (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications

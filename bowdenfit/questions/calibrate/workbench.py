@@ -24,7 +24,7 @@ from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication, rank_truth
 from bowdenfit.questions.calibrate.truths import StatedTruth
-from bowdenfit.results.optimum import make_optimizer
+from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
 TOGETHER = 128  # replications that are fitted together: what is lost when a calibration is interrupted

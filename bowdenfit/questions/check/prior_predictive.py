@@ -16,7 +16,7 @@ from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check.answer import readings_of
-from bowdenfit.results.optimum import route_grid
+from bowdenfit.results.along_route import route_grid
 
 QUANTILES = (0.005, 0.05, 0.5, 0.95, 0.995)
 _DRAWS = 4096

@@ -48,11 +48,11 @@ def compare(
     """
     import jax
 
-    from bowdenfit.notebook import show_progress_bar
     from bowdenfit.questions.compare import comparison_figure
     from bowdenfit.questions.compare.answer import compare as compared
     from bowdenfit.questions.compare.sections import comparison_page
     from bowdenfit.questions.compare.words import comparison_text
+    from bowdenfit.verb import show_progress_bar
 
     if output is not None:
         refuse_to_replace(Path(output), NAME, "comparison", force)

@@ -14,7 +14,6 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import or_damaged
-from bowdenfit.results.arrays import read_arrays, write_arrays
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.results.folder import (
     SUMMARY_TEXT,
@@ -25,6 +24,7 @@ from bowdenfit.results.folder import (
     remove_run_files,
     write_text,
 )
+from bowdenfit.results.serialization import read_arrays, write_arrays
 from bowdenfit.words import few, shown
 
 KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for

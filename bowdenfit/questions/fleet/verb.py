@@ -61,9 +61,9 @@ def fleet(
         BowdenfitError: What is wrong, in a sentence; broken inspections are named in the answer, and the rest goes on.
     """
     import bowdenfit.questions.fleet.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.notebook import show_progress_bar
     from bowdenfit.questions.fleet.inspections import read_inspections
     from bowdenfit.results.folder import reserve_folder
+    from bowdenfit.verb import show_progress_bar
 
     refuse_low_memory()
     place = Path(output) if output is not None else None
@@ -140,10 +140,10 @@ def _fit(
 def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> None:
     """The draws, the summary and, last, fleet.json, all of them or none; what was kept of pieces is not needed then."""
     from bowdenfit.questions.fleet.words import fleet_text
+    from bowdenfit.results.answer_cache import file_checksum
     from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
     from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically, write_text
-    from bowdenfit.results.kept import file_checksum
-    from bowdenfit.results.plain import plain_data
+    from bowdenfit.results.serialization import plain_data
     from bowdenfit.words import printable
 
     with fill_folder_atomically(store.folder, FLEET_PAGE) as folder:

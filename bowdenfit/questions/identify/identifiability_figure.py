@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.layout import empty_page, text_width, wrap_words
+from bowdenfit.plots.layout import empty_page, text_width, ticks, wrap_words
 from bowdenfit.plots.style import BLUE, GRAY, LEAST, LIGHT, SMALL, WIDE, in_paper_style
-from bowdenfit.plots.ticks import ticks
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:

@@ -166,7 +166,7 @@ def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     from bowdenfit.inference.identifiability import CovarianceAnalysis
     from bowdenfit.questions.identify.answer import Identifiability
     from bowdenfit.questions.identify.words import identifiability_text
-    from bowdenfit.results.plain import deserialize
+    from bowdenfit.results.serialization import deserialize
 
     page = answers["identify"]
     groups = deserialize(dict[str, CovarianceAnalysis], page["groups"])

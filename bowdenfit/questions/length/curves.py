@@ -5,8 +5,8 @@ import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function
-from bowdenfit.plots.bands import BAND_QUANTILES, Band
-from bowdenfit.results.optimum import route_grid
+from bowdenfit.plots.curves import BAND_QUANTILES, Band
+from bowdenfit.results.along_route import route_grid
 from bowdenfit.results.record import Record, cached_per_fit
 
 _DRAWS = 5000  # enough for a line's width of accuracy

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.pages.chart import Chart, Group, Series, Span
-from bowdenfit.plots.bands import NEW_RUN, Band
+from bowdenfit.plots.curves import NEW_RUN, Band
 from bowdenfit.plots.style import EFFICIENCY, LEAST_SQUARES, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL, percent
 from bowdenfit.questions.length.efficiency_figure import READING, RUN, AlongRoute
 from bowdenfit.questions.length.efficiency_points import EfficiencyPoints

@@ -7,9 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import BAND_QUANTILES, NEW_RUN, Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.captions import describe_strip
-from bowdenfit.plots.densities import GRID_POINTS, density
+from bowdenfit.plots.curves import (
+    BAND_QUANTILES,
+    GRID_POINTS,
+    NEW_RUN,
+    Band,
+    density,
+    draw_band,
+    route_limits,
+    shade_outside,
+)
 from bowdenfit.plots.layout import TITLE, legend_above, panels, wrap_words
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
@@ -26,7 +34,7 @@ from bowdenfit.plots.style import (
     rounded_texts,
 )
 from bowdenfit.questions.length.efficiency_points import EfficiencyPoints, efficiency_points
-from bowdenfit.results.length import OptimalLength
+from bowdenfit.results.optimal_length import OptimalLength
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure

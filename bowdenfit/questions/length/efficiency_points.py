@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import BAND_QUANTILES
+from bowdenfit.plots.curves import BAND_QUANTILES
 
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record

@@ -7,7 +7,7 @@ from bowdenfit.arguments import FIT, RESULTS, read_first
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.results.length import OptimalLength
+    from bowdenfit.results.optimal_length import OptimalLength
     from bowdenfit.results.record import Record
 
 
@@ -31,8 +31,8 @@ def _reply(answer: "OptimalLength", _: object) -> Reply:
 def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
     if "length" not in answers:
         return None
-    from bowdenfit.results.length import OptimalLength
-    from bowdenfit.results.plain import deserialize
+    from bowdenfit.results.optimal_length import OptimalLength
+    from bowdenfit.results.serialization import deserialize
 
     return _reply(deserialize(OptimalLength, answers["length"]), asked)
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.captions import describe_strip
+from bowdenfit.plots.curves import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, WRAP_ANGLE, in_paper_style

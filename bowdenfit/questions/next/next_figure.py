@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.kinds.terms import candidate_kinds
-from bowdenfit.plots.bands import route_limits, shade_outside
+from bowdenfit.plots.curves import route_limits, shade_outside
 from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import show_plain_numbers
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, axis_label, in_paper_style

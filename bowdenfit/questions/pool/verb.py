@@ -94,7 +94,7 @@ def _write(found: "Pool", folder: Path) -> None:
     from bowdenfit.questions.pool.words import pool_text
     from bowdenfit.questions.writing import write_page
     from bowdenfit.results.folder import fill_folder_atomically, write_text
-    from bowdenfit.results.plain import plain_data
+    from bowdenfit.results.serialization import plain_data
     from bowdenfit.words import printable
 
     page = f"{NAME}.json"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import NEW_RUN
 from bowdenfit.plots.captions import describe_curve
+from bowdenfit.plots.curves import NEW_RUN
 from bowdenfit.plots.layout import TITLE, count_columns, drop_unused, legend_above, panels
 from bowdenfit.plots.panels import shorten_name, span
 from bowdenfit.plots.style import (

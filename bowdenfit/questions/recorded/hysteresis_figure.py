@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import choose_evenly, note_shown_count
 from bowdenfit.plots.captions import count_shown
+from bowdenfit.plots.curves import choose_evenly, note_shown_count
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, enlarge_marks, label_outer, recording_panels, set_limits, share_limits, span
 from bowdenfit.plots.style import (

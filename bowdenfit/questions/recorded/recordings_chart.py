@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bowdenfit.pages.chart import Chart, Group, Series, Span
-from bowdenfit.plots.bands import choose_evenly
+from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.plots.panels import extremes
 from bowdenfit.plots.style import LEAST_SQUARES, WIDE_INTERVAL
 from bowdenfit.questions.recorded.recordings_figure import (

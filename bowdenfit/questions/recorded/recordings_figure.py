@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import choose_evenly, note_shown_count
+from bowdenfit.plots.curves import choose_evenly, note_shown_count
 from bowdenfit.plots.layout import count_columns, legend_above
 from bowdenfit.plots.panels import LEAST_WIDTH, draw_marks, extremes, label_outer, panels_with_limits, span
 from bowdenfit.plots.style import (

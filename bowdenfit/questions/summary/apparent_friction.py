@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, middle
+from bowdenfit.plots.curves import draw_quantiles, middle
 from bowdenfit.plots.style import BLACK, GRAY, WRAP_ANGLE
 from bowdenfit.questions.summary.forces_by_bend import draw_by_bend, limits_of_bends
 from bowdenfit.questions.summary.forces_marks import RETURN_DASHES, colored_places, draw_readings, where_read

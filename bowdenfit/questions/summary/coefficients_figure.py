@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.captions import explain_symbols
-from bowdenfit.plots.densities import GRID_POINTS, density, limits, support
+from bowdenfit.plots.curves import GRID_POINTS, density, limits, support
 from bowdenfit.plots.layout import (
     TITLE,
     count_columns,

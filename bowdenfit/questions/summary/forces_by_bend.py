@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles
+from bowdenfit.plots.curves import draw_quantiles
 from bowdenfit.plots.style import GRAY
 from bowdenfit.questions.summary.forces_marks import RETURN_DASHES
 from bowdenfit.questions.summary.forces_shown import STROKES

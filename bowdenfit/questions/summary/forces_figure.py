@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.bands import draw_quantiles, name_band
+from bowdenfit.plots.curves import draw_quantiles, name_band
 from bowdenfit.plots.layout import BOTTOM, RIGHT, axes_at, empty_page, legend_above, place_labels, wrap_words
 from bowdenfit.plots.panels import make_logarithmic
 from bowdenfit.plots.style import (

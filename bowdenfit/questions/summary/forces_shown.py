@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.plots.bands import choose_evenly
+from bowdenfit.plots.curves import choose_evenly
 
 if TYPE_CHECKING:
     from bowdenfit.kinds.forces.table import ForceTable

@@ -23,8 +23,8 @@ from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.recorded.stick_slip import stick_slip
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.results.plain import plain_data
 from bowdenfit.results.record import Draws, Record
+from bowdenfit.results.serialization import plain_data
 
 SCHEMA = 1
 

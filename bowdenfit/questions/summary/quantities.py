@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.densities import density, limits, support
+from bowdenfit.plots.curves import density, limits, support
 from bowdenfit.plots.style import axis_label
 
 if TYPE_CHECKING:

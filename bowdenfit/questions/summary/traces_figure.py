@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit.plots.captions import explain_symbols
-from bowdenfit.plots.layout import EDGE, axes_at, empty_page, line_entry, place_labels, wrap_words
+from bowdenfit.plots.layout import (
+    EDGE,
+    axes_at,
+    empty_page,
+    line_entry,
+    number_below,
+    number_left,
+    place_labels,
+    wrap_words,
+)
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
-from bowdenfit.plots.ticks import number_below, number_left
 from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
 
 if TYPE_CHECKING:

@@ -84,7 +84,7 @@ def plot(
     """
     from bowdenfit.errors import UsageError
     from bowdenfit.questions.writing import Files
-    from bowdenfit.results.captions import copy_captions, write_captions
+    from bowdenfit.results.figures_folder import copy_captions, write_captions
     from bowdenfit.results.folder import FIGURES, fill_folder_atomically
 
     if isinstance(found, str | Path):
@@ -104,7 +104,7 @@ def plot(
 
 def _there(results: Path, names: Sequence[str], endings: Sequence[str]) -> "_Asked | None":
     """Figures that the fit has drawn already, to be copied."""
-    from bowdenfit.results.drawn import captions_if_unchanged
+    from bowdenfit.results.figures_folder import captions_if_unchanged
     from bowdenfit.results.folder import FIGURES
 
     captions = captions_if_unchanged(results, names, endings)
@@ -151,8 +151,8 @@ def _shown(found: "Record | str | Path", names: Sequence[str]) -> tuple[dict[str
     """Data of all figures of a fit, or of some, the cable and `mark_of`; what is kept of it is not worked out again."""
     from bowdenfit.errors import UsageError, suggest_name
     from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures, mark_of
+    from bowdenfit.results.answer_cache import read_answers
     from bowdenfit.results.folder import FIT, read_page
-    from bowdenfit.results.kept import read_answers
 
     for name in names:
         if name not in FIGURES:

@@ -2,19 +2,24 @@
 
 Signals are handled between two steps of Python in the main thread, and compiled code may take seconds for one step. So a
 command runs in a thread of its own while the main thread waits. A signal sets the flag; loops that keep what they have done
-(see `bowdenfit.cli.progress`) look at it and end. Whatever has not ended soon after is ended with the process: files are
+(see `bowdenfit.cli.running`) look at it and end. Whatever has not ended soon after is ended with the process: files are
 written whole under their names or not at all, and a checkpoint only grows.
 """
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import copy_context
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeAlias
 
 from bowdenfit.cli.terminal import say_interrupted
+from bowdenfit.errors import DiskError, MemoryShortageError, system_error
+from bowdenfit.inference.resources import refuse_low_memory
+from bowdenfit.verb import Watch
 
 INTERRUPTED = 130  # exit code, as shells have it
 _PATIENCE = 1.0  # s, in which a command may end by itself
@@ -104,3 +109,56 @@ def _end_process() -> None:
         say_interrupted(next(filter(None, (how_to_go_on() for how_to_go_on in _how_to_go_on)), ""))
     finally:  # whether or not anybody reads it
         os._exit(INTERRUPTED)
+
+
+Report: TypeAlias = Callable[..., None]
+
+
+@contextmanager
+def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
+    """Yield what to call while something long runs; say how to go on when the user (or the system) stops it.
+
+    Args:
+        folder: Results folder, where there is one.
+        watch: What is kept there, and what the bar shows.
+
+    Raises:
+        MemoryShortageError: There is too little memory to begin.
+        KeyboardInterrupt: The user stopped it; with how to go on, where something is kept.
+    """
+    refuse_low_memory()
+    kept = folder / watch.kept if folder is not None and watch.kept else None
+
+    def how_to_go_on() -> str:
+        return f"{watch.remark} {folder}: run the same command with --resume" if kept is not None and kept.exists() else ""
+
+    try:
+        with announce_continuation(how_to_go_on), _bar(watch) as show:
+
+            def report(*progress: Any) -> None:
+                refuse_interrupted()
+                show(*progress)
+
+            yield report
+            refuse_interrupted()
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(how_to_go_on()) from None
+    except Exception as error:
+        shortage = error if isinstance(error, DiskError) else system_error(error)
+        if how_to_go_on() and isinstance(shortage, DiskError | MemoryShortageError):
+            raise type(shortage)(
+                f"{shortage} What was done so far is kept in {folder}: with room, run the same command with --resume."
+            ) from None
+        raise
+
+
+@contextmanager
+def _bar(watch: Watch) -> Iterator[Report]:
+    """Show a bar, on a terminal only."""
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(leave=False, **watch.bar) as bar:
+        yield lambda *progress: watch.show(bar, *progress)

@@ -1,5 +1,6 @@
-"""What every draw implies along the route, in one program: curves, and efficiencies at the lengths that can be bought."""
+"""What the draws imply along the route: curves, the optimal length of each draw, and efficiencies at chosen lengths."""
 
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -17,9 +18,88 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import DrawFunction, curves_at, for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
-from bowdenfit.results.choices import find_best_window, is_at_edge, rank_choices
-from bowdenfit.results.length import OptimalLength
-from bowdenfit.results.optimum import GRID_POINTS, route_grid
+from bowdenfit.results.optimal_length import OptimalLength, find_best_window, is_at_edge, rank_choices
+
+GRID_POINTS = 201
+_GOLDEN = (np.sqrt(5.0) - 1) / 2
+_REFINEMENTS = 32  # golden sections of a bracket of two grid steps: to 1e-7 of a step
+
+
+def route_grid(model: Model, points: int = GRID_POINTS) -> np.ndarray:
+    """Equally spaced route values over the range of the curves."""
+    route = model.description.route
+    assert route is not None  # callers ask only where there is a route
+    return np.linspace(*route.range, points)
+
+
+def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, Array]]:
+    """Function of z: the optimal route value and the efficiency there.
+
+    Grid search, then golden section between the neighbors of the best grid point; at a jump of a published geometry the
+    grid point itself is kept where it is better.
+    """
+    grid = route_grid(model)
+    step = float(grid[1] - grid[0])
+
+    def optimum(z: Float[Array, " free"]) -> tuple[Array, Array]:
+        values = model.space.constrain(z)
+
+        def loss(route: Array) -> Array:
+            return model.cable.loss_at(values, route[None])[0]
+
+        def efficiency(at_loss: Array) -> Array:
+            return -at_loss if model.cable.is_loop else model.cable.friction.efficiency(values, at_loss)
+
+        on_grid = model.cable.loss_at(values, jnp.asarray(grid))
+        best = jnp.argmin(on_grid)
+        at = jnp.asarray(grid)[best]
+
+        def shrink(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
+            low, high = bracket
+            left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+            better_left = loss(left) < loss(right)
+            return jnp.where(better_left, low, left), jnp.where(better_left, right, high)
+
+        ends = jnp.maximum(at - step, grid[0]), jnp.minimum(at + step, grid[-1])
+        low, high = jax.lax.fori_loop(0, _REFINEMENTS, shrink, ends)
+        refined = (low + high) / 2
+        better = loss(refined) < on_grid[best]
+        return jnp.where(better, refined, at), efficiency(jnp.minimum(loss(refined), on_grid[best]))
+
+    return optimum
+
+
+class Efficiencies(Display, list[Interval]):
+    """Efficiencies [1] at values of the route variable.
+
+    Args:
+        found: One a length.
+        route: The route; None without one.
+        lengths: Route values.
+    """
+
+    def __init__(self, intervals: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
+        super().__init__(intervals)
+        at = [float(length) for length in lengths]
+        self._at = [{} if route is None else {f"{route.variable}_{route.unit}": length} for length in at]
+        self._outside = ["" if route is None else route.outside(length) for length in at]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """As `predict` gives them."""
+        return [
+            at
+            | {"efficiency": interval.median}
+            | {k: v for k, v in vars(interval).items() if k != "median"}
+            | ({"in_range": not outside} if at else {})
+            | {"note": outside}
+            for at, interval, outside in zip(self._at, self, self._outside, strict=True)
+        ]
+
+    def _table(self) -> Rows:
+        rows = self.rows
+        numbers = [name for row in rows[:1] for name, value in row.items() if isinstance(value, float)]
+        return rows, {name: name.rpartition("_")[2] if name in self._at[0] else "1" for name in numbers}
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,11 +1,17 @@
-"""Any answer as plain data for JSON, and stored data back as what they were: one pair for every dataclass."""
+"""Dataclasses to JSON and back, and dataclasses of large arrays to a file (figures.npz) and back."""
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
+
+from bowdenfit.errors import StoreError
+from bowdenfit.inputs import refuse_packed, refuse_special
+from bowdenfit.results.folder import replace_atomically
 
 
 def plain_data(answer: Any) -> Any:
@@ -110,3 +116,48 @@ def _array(kind: Any, value: list[Any]) -> np.ndarray:
 
 def _number(value: Any) -> float:
     return float("nan") if value is None else float(value)
+
+
+_PAGE, _ARRAY = "page", "array"
+
+
+def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
+    """Write data whole; an array that stands in several places is written once.
+
+    Args:
+        path: The file.
+        data: Dataclasses, tuples and lists of them, by name.
+    """
+    arrays: dict[int, np.ndarray] = {}
+
+    def put(array: np.ndarray) -> dict[str, int]:
+        arrays[id(array)] = array
+        return {_ARRAY: list(arrays).index(id(array))}
+
+    page = np.frombuffer(json.dumps({name: serialize(one, put) for name, one in data.items()}).encode(), dtype=np.uint8)
+    with replace_atomically(path) as temporary, temporary.open("wb") as file:
+        np.savez(
+            file, allow_pickle=False, **{_PAGE: page}, **{f"{i}": array for i, array in enumerate(arrays.values())}
+        )
+
+
+def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
+    """What was written under some names, as far as it was.
+
+    Args:
+        path: The file.
+        kinds: Annotated type of what is wanted, by name.
+    """
+    refuse_special(path, StoreError)
+    with path.open("rb") as opened, np.load(opened) as file:  # what is opened here is closed where it is no archive
+        refuse_packed(file)
+
+        def take(data: Any) -> Any:
+            if isinstance(data, list):
+                return [take(one) for one in data]
+            if not isinstance(data, dict):
+                return data
+            return file[str(data[_ARRAY])] if _ARRAY in data else {key: take(one) for key, one in data.items()}
+
+        page = json.loads(file[_PAGE].tobytes())
+        return {name: deserialize(kinds[name], take(page[name])) for name in kinds if name in page}

@@ -1,4 +1,4 @@
-"""The results folder of a fit before it is fitted: whether it may be written, the seed, and the checkpoint."""
+"""Before a fit starts: may the results folder be written, which seed, which checkpoint."""
 
 import secrets
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The front desk: a fit as users hold it, which knows its folder and asks every question of its record."""
+"""`bf.Fit`: a finished fit as users hold it, with a method or attribute for every question."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -22,7 +22,7 @@ from bowdenfit.questions.summary.page import Summary, summarize
 from bowdenfit.questions.summary.parameter_words import drawn_intervals
 from bowdenfit.questions.summary.trust_words import verdict_text
 from bowdenfit.questions.summary.verdict import Verdict, verdict
-from bowdenfit.results.efficiencies import Efficiencies
+from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
 from bowdenfit.results.store import save

@@ -1,10 +1,11 @@
-"""The verb that belongs to the command line alone: a new data set."""
+"""`bowdenfit init`: a new data set, from questions in a terminal, from measured files, or from an example."""
 
 import glob
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from cyclopts import Parameter
 
@@ -13,7 +14,57 @@ from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.words import filled, printable
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.start.question import Asker
+    from bowdenfit.questions.start.question import Asker, Question
+
+Answer = TypeVar("Answer")
+
+
+class Terminal:
+    """A person at a terminal."""
+
+    def ask(self, question: "Question[Answer]") -> Answer:
+        """The answer to a question, asked until there is one."""
+        say("")
+        say(filled(question.words))
+        for i, option in enumerate(question.options, start=1):
+            say(filled(f"{i}  {option}", "  "))
+        if question.default is None:
+            such = "" if question.options else f"such as {question.example}; "
+            say(f"({such}there is no default, because nothing says it)")
+        shown = f"[{question.default}]" if question.default is not None else ""
+        while True:
+            typed = _read_line(f"{shown}> ") or question.default or ""
+            if not typed.strip():
+                say("Something must be written here; Ctrl-C ends it all, and nothing is written.")
+                continue
+            try:
+                return question.read(typed)
+            except BowdenfitError as error:
+                say(filled(f"{str(error)[:1].upper()}{str(error)[1:]}"))
+
+    def say(self, sentence: str) -> None:
+        """What was understood without asking."""
+        say(filled(sentence))
+
+    def settle(self) -> None:
+        """Nothing: everything was answered."""
+
+
+def _read_line(prompt: str) -> str:
+    """What is typed behind a prompt."""
+    say(prompt, nl=False)
+    sys.stdout.flush()
+    line = sys.stdin.readline()
+    if not line:
+        say("")
+        raise KeyboardInterrupt
+    return line.rstrip("\n")
+
+
+def is_interactive() -> bool:
+    """Whether somebody can be asked."""
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+
 
 FOLDER = "my-cable"
 _MOST_FILES = 12  # that are proposed
@@ -49,7 +100,6 @@ def init(
         files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
         example: Write a data set that comes with bowdenfit; without a name, list them.
     """
-    from bowdenfit.cli.dialog import Terminal, is_interactive
     from bowdenfit.questions.start.folder import refuse_existing, write_template
     from bowdenfit.questions.start.question import Nobody
 

@@ -1,7 +1,7 @@
-"""What a fit has answered, kept in its folder: read back without its draws and its model, and only beside that very fit.
+"""The answers that a fit has given, kept in its folder and read back without its draws and its model.
 
-The page of answers carries checksums of itself and of the files that the answers follow from. Where one of them is not as
-it was written, or another bowdenfit wrote them, nothing is read, and the question is answered anew.
+The page of answers carries checksums of itself and of the files from which the answers follow. If one of them has changed, or
+another version of bowdenfit wrote them, nothing is read and the question is answered anew.
 """
 
 import json

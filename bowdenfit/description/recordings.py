@@ -77,3 +77,9 @@ class RecordingFile(Frozen):
     where: dict[str, Finite] = Field(default_factory=dict)
     prepare: Preparation | None = None
     strokes: tuple[Phase, ...] = ()
+
+    @model_validator(mode="after")
+    def _named(self) -> "RecordingFile":
+        if not self.file:
+            raise ValueError('the name of the file is empty; write file = "name.csv"')
+        return self

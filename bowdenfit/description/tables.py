@@ -31,6 +31,8 @@ class Table(TableSettings):
 
     @model_validator(mode="after")
     def _one_source(self) -> "Table":
+        if self.file == "" or self.files in ("", ()):
+            raise ValueError('the name of the file is empty; write file = "name.csv" or files = "folder/*.csv"')
         if (self.file is None) == (self.files is None):
             raise ValueError('write either file = "name.csv" or files = "folder/*.csv"')
         return self

@@ -2,8 +2,8 @@
 
 import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from bowdenfit.errors import DatasetError
@@ -15,6 +15,8 @@ _UNDETECTED = re.compile(r"(?:<=|<|≤|&lt;)(?P<limit>.*)", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?(?=[.,]?\d)\d*(?:(?P<mark>[.,])\d*)?(?:[eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<separator>[ '.,])\d{3}(?:(?P=separator)\d{3})*(?:(?P<mark>[.,])\d+)?")
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+_FRACTION = re.compile(r"(?:(?P<whole>\d{1,4}) )?(?P<over>\d{1,2})/(?P<under>2|3|4|5|6|8|10|12|16|32|64)")  # 2 1/4 turns
+_WHOLE = re.compile(r"[+-]?[1-9]\d{2,}")
 _SPACES = "\t\v\f\x85\xa0\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000"
 _TYPOGRAPHY = str.maketrans({"\u2212": "-", "’": "'", **dict.fromkeys(_SPACES, " ")})
 _EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
@@ -34,10 +36,12 @@ class Decimals:
     Args:
         comma: Whether a lone comma is a decimal one, as in files separated by semicolons or tabs.
         seen: The first number that can only be read with a decimal point, and with a decimal comma.
+        whole: The first whole number beside which three digits behind a mark may be thousands; empty where there is none.
     """
 
     comma: bool = False
     seen: dict[str, str] = field(default_factory=dict)
+    whole: str = ""
 
     @classmethod
     def of(cls, texts: Iterable[str], comma: bool) -> "Decimals":
@@ -50,6 +54,21 @@ class Decimals:
                 if match and match["mark"] and match.start("mark") > 0 and not _AMBIGUOUS.fullmatch(plain):
                     seen.setdefault(match["mark"], plain)
         return cls(comma, seen)
+
+    def of_columns(self, columns: Sequence[Sequence[str]]) -> list["Decimals"]:
+        """Decimals of each column: with its own first whole number of three digits or more, if it has one.
+
+        A column in which every number has three digits behind a mark, of which the last is 0, may hold thousands too; where
+        all such numbers of the file are so round, a whole number of another column speaks for that.
+        """
+        wholes = [next((text.strip() for text in texts if _WHOLE.fullmatch(text.strip())), "") for texts in columns]
+        marked = [[text.strip() for text in texts if _AMBIGUOUS.fullmatch(text.strip())] for texts in columns]
+        if all(text.endswith("0") for texts in marked for text in texts):
+            other = next(filter(None, wholes), "")
+            for i, texts in enumerate(columns):
+                if len(marked[i]) > 1 and len(marked[i]) == sum(map(is_plain_number, texts)):
+                    wholes[i] = other
+        return [replace(self, whole=whole) for whole in wholes]
 
     def other(self, mark: str) -> str | None:
         """A number of the file that speaks against `mark` being decimal."""
@@ -134,6 +153,11 @@ class Cell:
         meanings = f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}"
         if mark == "," and not self.decimals.comma:
             raise self.refuse(f"{meanings}; write it without a thousands separator and with a decimal point.")
+        if self.decimals.whole and mark not in self.decimals.seen:
+            raise self.refuse(
+                f"{meanings}, because the file also has {shown(self.decimals.whole)}; write it without a separator of "
+                "thousands, or with a decimal point and a number of digits other than three."
+            )
         if against := self.decimals.other(mark):
             raise self.refuse(
                 f"{meanings}, because elsewhere the file has {shown(against)}; write all its decimals the same way, and "
@@ -171,6 +195,8 @@ def _with_decimal_point(text: str) -> str | None:
     """The number in Python's spelling, or None if it is none; separators of thousands must stand where they belong."""
     if _NUMBER.fullmatch(text):
         return text.replace(",", ".")
+    if (fraction := _FRACTION.fullmatch(text)) and int(fraction["over"]) < int(fraction["under"]):
+        return repr(int(fraction["whole"] or 0) + int(fraction["over"]) / int(fraction["under"]))
     grouped = _GROUPED.fullmatch(text)
     if grouped is None or grouped["mark"] == grouped["separator"]:
         return None

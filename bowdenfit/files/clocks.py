@@ -17,6 +17,7 @@ from bowdenfit.units import conversion_factor
 _TIME_WORDS = {"time", "timestamp", "datetime", "elapsed", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"}
 _LABVIEW = "x_value"
 _SECONDS = {"sek", "sek.", "sec.", "seg", "secs"}
+_RATIO = re.compile(r"[A-Za-z]_?\d?/[A-Za-z]_?\d?")  # of two symbols, such as T/t
 _TENSION = re.compile(r"T_?\d")  # a clock only where it rises
 _EPOCH_UNITS = (
     (1e17, 1e-9),
@@ -76,6 +77,8 @@ def is_clock(channel: Channel) -> bool:
 
 def names_time(heading: str) -> bool:
     """Whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
+    if _RATIO.fullmatch(heading.strip()):
+        return False
     plain = heading.rpartition("/")[2].strip().lower()
     words = [word for word in re.split(r"[\W\d_]+", plain) if word]
     if not {*words[:1], *words[-2:]} & {*_TIME_WORDS, "t"}:  # before a last word is looked up among all units

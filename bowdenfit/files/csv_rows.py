@@ -103,3 +103,15 @@ def too_many_cells(file: str, row: int, cells: Sequence[str], width: int) -> Non
         )
         error.fault_key, error.row = (file, "too many cells"), row
         raise error
+
+
+def too_few_cells(file: str, row: int, cells: Sequence[str], header: Sequence[str]) -> DatasetError:
+    """Return the refusal of a row that ends before a column in which other rows have numbers."""
+    error = DatasetError(
+        f"{file}, row {row}: {len(cells)} cell{'s' if len(cells) > 1 else ''} where the headings have {len(header)}: the "
+        f"cell of {shown(header[len(cells)] or f'column {len(cells) + 1}')} is missing. The usual causes are a file that was "
+        "cut off, and a value that was deleted together with its separator. Complete the row, delete it, or leave the cell "
+        "blank behind a separator of its own if nothing was measured."
+    )
+    error.alike, error.row = (file, "too few cells"), row
+    return error

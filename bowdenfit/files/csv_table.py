@@ -8,7 +8,14 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.apart import LIMITS
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.contents import PLAIN_TEXT, UNKNOWN, recognize
-from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, declared_separator, records, too_many_cells
+from bowdenfit.files.csv_rows import (
+    SEPARATORS,
+    CsvRecord,
+    declared_separator,
+    records,
+    too_few_cells,
+    too_many_cells,
+)
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
 from bowdenfit.files.table_parts import TableParts, parts_of
 from bowdenfit.files.table_rows import is_measured, numbers_found
@@ -126,10 +133,12 @@ def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separ
         )
     decimals = Decimals.of((cell for row in parts.body for cell in row.cells), separator != ",")
     units = (*parts.units, *[""] * len(header))[: len(header)]
-    too_long = Faults()
+    in_column = decimals.of_columns([_column(parts.body, i) for i in range(len(header))])
+    wrong_width = Faults()
     nothing = tuple[Cell, ...]()
-    cells = tuple(too_long.read_all(lambda row: _cells(name, header, row, decimals), parts.body, nothing))
-    too_long.refuse()
+    fewest = _fewest_cells(parts.body, len(header))
+    cells = tuple(wrong_width.read_all(lambda row: _cells(name, header, row, in_column, fewest), parts.body, nothing))
+    wrong_width.refuse()
     return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 
 
@@ -165,12 +174,26 @@ def _header(parts: TableParts, file: str) -> tuple[str, ...]:
     return header
 
 
-def _cells(file: str, header: tuple[str, ...], row: CsvRecord, decimals: Decimals) -> tuple[Cell, ...]:
+def _column(rows: Sequence[CsvRecord], position: int) -> list[str]:
+    """Texts of one column, of the rows that reach it."""
+    return [row.cells[position] for row in rows if position < len(row.cells)]
+
+
+def _fewest_cells(rows: Sequence[CsvRecord], width: int) -> int:
+    """Number of cells that a row must have: up to the last column in which any row has a number."""
+    return max((i + 1 for row in rows for i, cell in enumerate(row.cells[:width]) if is_measured(cell)), default=0)
+
+
+def _cells(
+    file: str, header: tuple[str, ...], row: CsvRecord, decimals: Sequence[Decimals], fewest: int
+) -> tuple[Cell, ...]:
     if any(map(is_measured, _behind(row, len(header)))):
         too_many_cells(file, row.row, row.cells, len(header))
+    if len(row.cells) < fewest:
+        raise too_few_cells(file, row.row, row.cells, header)
     padded = row.cells + [""] * (len(header) - len(row.cells))
     return tuple(
-        Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals)
+        Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals[i])
         for i, (column, text) in enumerate(zip(header, padded, strict=False))
     )
 

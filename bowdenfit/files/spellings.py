@@ -37,8 +37,23 @@ _QUANTITIES = {name: quantity for quantity, names in _NAMES.items() for name in 
 _LIKELY = {  # what only the user can say
     "wrap_angle": "wrap|bend|bend angle|bending angle|total bend angle|contact angle|angle|theta|phi|winkel|biegewinkel|"
     "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap|"
-    "measured angle|measured wrap|nominal wrap angle|measured wrap angle",
+    "measured angle|measured wrap|nominal wrap angle|measured wrap angle|deg|degree|degrees|grad|turns|turn|wraps|windings|"
+    "umdrehungen|windungen|tours|vueltas|giri",
 }
+# A heading with one of these words may be that of wrap angles; with one of the second, it is that of something else's angle.
+_ANGLE_WORDS = (
+    "angle angles deg degree degrees bend bends bending bent curve curvature curved turn turns wrap wraps wrapping theta phi "
+    "deflection winkel grad biegung biegewinkel umlenkung umlenkwinkel umschlingung krummung kurve umdrehungen windungen coude "
+    "courbure virage angulo curvatura curva giro vueltas angolo piega giri elbow direction configuration"
+)
+_OTHER_ANGLE_WORDS = (
+    "motor encoder joint crank pulley servo shaft wheel drum position motorwinkel gelenk knee ankle hip flexion phase step "
+    "error sd std stdev uncertainty noise radius"
+)
+_ANGULAR, _OTHER_ANGLES = frozenset(_ANGLE_WORDS.split()), frozenset(_OTHER_ANGLE_WORDS.split())
+_WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a label, or a direction of motion
+_COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
+            "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
 _GUESSES = {name: quantity for quantity, names in _LIKELY.items() for name in names.split("|")}
 _DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": ("ratio",)}
 _SYMBOL = re.compile(r"([ft])(in|out|ein|aus|input|output|motor|mot|act|load|prox|dist|ent|sal|i|o)")
@@ -85,6 +100,23 @@ def spelled(heading: str, unit: str = "") -> Spelling | None:
         if found and _may_be_force(written):
             return Spelling(f"{found[0]}_force", written or None, found[1])
     return None
+
+
+def likely_wrap_angle(heading: str, unit: str = "") -> str | None:
+    """Return the unit of a column that is likely to hold wrap angles, empty where none is written; None for any other.
+
+    Args:
+        heading: As written, with or without its unit.
+        unit: Unit that the file gives elsewhere, as in a row below the headings.
+    """
+    divided = list(_divided(heading, unit))
+    words = set(_words(divided[0][0]))
+    written = next((unit for _, unit in divided if unit), "")
+    if words & _OTHER_ANGLES or (written and dimension_of(written) != "angle"):
+        return None
+    if not written and not words & (_ANGULAR - _WITH_UNIT_ALONE):
+        return None
+    return written or next((_COUNTED[word] for word in words if word in _COUNTED), "")
 
 
 def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:

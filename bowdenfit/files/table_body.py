@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK
-from bowdenfit.files.csv_rows import CsvRecord
+from bowdenfit.files.csv_rows import SEPARATORS, CsvRecord, cells_of
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN
 from bowdenfit.files.table_rows import is_measured, is_units, is_words, words_and_numbers
@@ -19,7 +19,11 @@ _STATISTICS, _INSIDE = "statistics below the table", "statistics between the row
 
 
 def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[list[CsvRecord], dict[int, str]]:
-    """The rows of readings below the headings, and why the others are none."""
+    """The rows of readings below the headings, and why the others are none.
+
+    Raises:
+        DatasetError: A row that would be left out looks like a reading.
+    """
     stop = _other_table(rows, header, file)
     numeric = _numeric_columns(rows[:stop])
     agree = [_agrees(row, numeric) for row in rows[:stop]]
@@ -35,10 +39,32 @@ def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[l
             continue
         why = _inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
         if why:
+            _refuse_reading(row, header, numeric, file)
             left_out[row.row] = why
         else:
             body.append(row)
     return body, left_out
+
+
+def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: str) -> None:
+    """Refuse to leave out a row that is a reading when its single cell is divided at another separator.
+
+    Raises:
+        DatasetError: It has as many cells as the headings then, and numbers where the table has them.
+    """
+    filled = [cell for cell in row.cells if cell.strip()]
+    if len(filled) != 1:
+        return
+    width = len([cell for cell in header.cells if cell.strip()])
+    for separator in SEPARATORS:
+        cells = cells_of(filled[0].strip().strip('"'), separator)
+        numbers = sum(map(is_measured, cells))
+        if len(cells) == width > 1 and numbers >= max(len(numeric), 1):
+            raise DatasetError(
+                f"{file}, row {row.row}: {shown(filled[0])} looks like a row of readings, but its cells are not separated as "
+                "those of the rows above; the usual causes are rows that were pasted from another file, and quotation marks "
+                "around a whole row. Separate its columns as in the other rows, or begin the row with # if it is a remark."
+            )
 
 
 def _other_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:

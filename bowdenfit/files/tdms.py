@@ -36,7 +36,8 @@ def read(path: Path) -> ChannelFile:
         DatasetError: The file is damaged, too large or without numeric channels, or npTDMS is not installed.
     """
     nptdms = load("nptdms", "TDMS")
-    with refuse_damage(path), _quiet(), nptdms.TdmsFile.open(path) as file:
+    # By its stream, without its name: by name npTDMS would believe an index beside it, which may be of an older file.
+    with refuse_damage(path), _quiet(), path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
         stored = [channel for group in file.groups() for channel in group.channels()]
         left_out = UnreadNames()
         chosen = [channel for channel in stored if _is_recording(channel, left_out)]

@@ -14,6 +14,8 @@ from bowdenfit.inputs import refuse_special
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
 _COMMENT = re.compile(r"\s*\"?\s*(?P<mark>#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", re.IGNORECASE)
 _PIECE = 1 << 24
+# Marks without width that spreadsheets and chat programs leave in cells: two labels that look alike would be two.
+_INVISIBLE = dict.fromkeys(map(ord, "\xad\u200b\u200c\u200d\u200e\u200f\u2060\u202a\u202b\u202c\u202d\u202e\ufeff"))
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,6 @@ def _lines(data: bytes, encoding: str, start: int, most: int | None = None) -> l
         lengths = [len(piece) for piece in pieces]
     lines = []
     for row, (text, length) in enumerate(zip(texts, lengths, strict=True), start=1):
-        lines.append(Line(row, start, text))
+        lines.append(Line(row, start, text.translate(_INVISIBLE) if not text.isascii() else text))
         start += length
     return lines

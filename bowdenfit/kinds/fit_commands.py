@@ -11,7 +11,7 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.naming import naming
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.spellings import likely_wrap_angle
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.single_file import BESIDE_FORCES, FORCES, HEAD, FileKind, file_kind
 from bowdenfit.kinds.stated_angle import stated_angle
@@ -20,6 +20,7 @@ from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed, shown
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
+_MOST_RADIANS = 13.0  # two turns
 
 
 @dataclass(frozen=True)
@@ -55,9 +56,10 @@ def table_command(
         numbers, others = columns_of(table), _of_others(headings)
         words, could_be = _of_words(headings, numbers), [each for each in numbers if each.name not in others]
         options, provided = name_ends(could_be, "--column", {**words, **stated}, always)
-    angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(headings, path)
+    angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(table, path)
     found = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
-    return replace(found, names_more=bool(options) and not any(option.endswith("=NAME") for option in options))
+    named = [option for option in (*angle, *options) if option.startswith("--column")]
+    return replace(found, names_more=bool(named) and not any(option.endswith("=NAME") for option in named))
 
 
 def recording_command(
@@ -126,11 +128,27 @@ def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) ->
     table = read_table(path, HEAD)
     columns = candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))[WRAP_ANGLE.name]
     if not columns and WRAP_ANGLE.name not in named:
+        if stated:
+            _refuse_passed_over(path, table)
         return False
     if stated:
         what = f"has a column of wrap angles, {shown(table.header[columns[0].position])}" if columns else "is to have one"
         raise DatasetError(f"{path.name} {what}, and --wrap-angle states one angle for all rows; leave one of the two out.")
     return True
+
+
+def _refuse_passed_over(path: Path, table: RawTable) -> None:
+    """Refuse one angle for all rows of a table in which a column is likely to hold their wrap angles.
+
+    Raises:
+        DatasetError: There is such a column.
+    """
+    for name, unit in likely_wrap_angles(table).items():
+        raise DatasetError(
+            f"{path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and --wrap-angle "
+            f"states one angle for all rows. Name it instead: {naming('wrap_angle', name, unit)}; if it is another angle, take the "
+            "column out of the file."
+        )
 
 
 def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
@@ -152,20 +170,34 @@ def _split(heading: str, unit: str) -> tuple[str, str]:
     return both.name, both.unit
 
 
-def _wrap_angle(headings: Sequence[tuple[str, str]], path: Path) -> tuple[list[str], list[str]]:
+def _wrap_angle(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
     """What gives the wrap angle of a table: a column of its own, one that may be, or the user."""
-    if candidates(headings, (WRAP_ANGLE,))["wrap_angle"]:
+    if candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))["wrap_angle"]:
         return [], []
-    likely = [
-        heading
-        for heading, unit in headings
-        if (other := spelled(heading, unit)) and other.quantity == "wrap_angle" and other.unit
-    ]
-    if likely:
-        best = next((heading for heading in likely if "measured" in heading.lower()), likely[0])
-        rather = "" if len(likely) == 1 else f" rather than {listed([shown(each) for each in likely if each != best])}"
-        return [naming("wrap_angle", best)], [f"{shown(best)} is the wrap angle{rather}"]
-    return _one_angle(path)
+    likely = likely_wrap_angles(table)
+    if not likely:
+        return _one_angle(path)
+    best = next((name for name in likely if "measured" in name.lower()), next(iter(likely)))
+    others = [shown(name) for name in likely if name != best]
+    rather = f" rather than {listed(others)}" if others else ""
+    unit, clause = likely[best], f"{shown(best)} is the wrap angle{rather}"
+    return [naming("wrap_angle", best, unit)], [clause + (f", in {unit}" if unit else "")]
+
+
+def likely_wrap_angles(table: RawTable) -> dict[str, str]:
+    """Columns of numbers that are likely to be wrap angles, with the unit that must be said; empty where the heading has it.
+
+    A column without a unit is taken to be in rad where its values are none of degrees: whole turns at most, not all whole.
+    """
+    likely = dict[str, str]()
+    units = dict(zip(table.header, table.units, strict=True))
+    for column in columns_of(table):
+        unit = likely_wrap_angle(column.name, units[column.name])
+        if unit is not None and column.high > column.low:
+            has_unit = likely_wrap_angle(column.name, units[column.name] or "1") not in (None, "")
+            in_radians = column.high <= _MOST_RADIANS and column.mean != round(column.mean)
+            likely[column.name] = "" if unit and has_unit else unit or ("rad" if in_radians else "deg")
+    return likely
 
 
 def _named(stated: Mapping[str, ColumnSource], option: str) -> list[str]:

@@ -35,6 +35,9 @@ _FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # th
 _LEAST, _MOST = 0.15, 1.02  # efficiencies that such a factor must lead back to
 _NO_SWAP = 2.5  # output over input from which a unit is likelier than swapped columns
 _SLIGHT = 0.1  # log of a gain of force up to which load cells may differ
+# A row by itself is impossible, however few others show the noise, where it gains half of the smaller force and a tenth of
+# the table's largest: no load cell that reads the other rows errs by so much.
+_ANY_GAIN, _LARGE_GAIN = 1.5, 0.1
 _TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 
@@ -144,6 +147,9 @@ def gains(table: ForceTable, description: Description) -> Gained | None:
     if not np.any(excess > 0):
         return None
     alone, together = beyond_noise(excess, readings, description.sensors.largest_force_noise)
+    force_in, force_out = table.input_force[rows], table.output_force[rows]
+    large = np.abs(force_out - force_in) > _LARGE_GAIN * max(force_in.max(), force_out.max())
+    alone |= (excess > np.log(_ANY_GAIN)) & large
     return Gained(rows, table.stroke[rows], readings.log_gain, excess, alone & (excess > 0), together & (excess > 0))
 
 

@@ -194,7 +194,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
                 *route_cells(table.route[i], description),
                 *("" if np.isnan(angle) else f"{angle:.6g}" for angle in angles[i]),
                 table.run_names[table.run[i]],
-                STROKE_NAMES[int(table.stroke[i])],
+                STROKE_NAMES.get(int(table.stroke[i]), "hold"),
                 inputs[i],
                 outputs[i],
             ]

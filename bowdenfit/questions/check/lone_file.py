@@ -56,7 +56,7 @@ def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) 
     command = table_command(path, raw, found.kind, named)
     own = has_own_angles(path, found.kind, tuple(named), stated=False)
     asked = any(reading.values()) and not command.names_more
-    angle = None if own else _ANY_ANGLE
+    angle = None if own or "wrap_angle=" in command.text else _ANY_ANGLE
     data, why_not = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), check, asked)
     still = why_not
     if why_not and command.names_more:
@@ -64,7 +64,7 @@ def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) 
         columns = tuple(word for option, word in pairwise(words) if option == "--column")
         _, still = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), check, False)
         why_not += f"\n{still}" if still not in why_not else ""
-    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings, not still), not still
+    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings, not still), not why_not
 
 
 def _as_data_set(
@@ -94,7 +94,7 @@ def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> tup
     file, recordings, why_not = channels_of(path, channels)
     command = _command(path, file, channels)
     usable = not why_not or (not channels and "--channel" in command.text)
-    return channels_text(file, found.why, command, recordings, why_not, usable), usable
+    return channels_text(file, found.why, command, recordings, why_not, usable), not why_not
 
 
 def _command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:

@@ -1,0 +1,141 @@
+"""Tables that were once misread without a word: each is refused in a sentence that names the row, or read rightly."""
+
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.files.csv_table import read_csv
+
+HEADING = "input_force_N,output_force_N\n"
+
+
+def refused(tmp_path, text, name="table.csv"):
+    """The sentence with which a table is refused as it is read or checked."""
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(bf.BowdenfitError) as refusal:
+        bf.read(tmp_path / name, wrap_angle=(180.0, "deg"))
+    return str(refusal.value)
+
+
+def numbers(tmp_path, text):
+    """The numbers of a table, row by row."""
+    (tmp_path / "table.csv").write_text(text, encoding="utf-8")
+    return [[cell.number() for cell in row] for row in read_csv(tmp_path / "table.csv").rows]
+
+
+def test_a_row_that_ends_before_a_column_of_numbers_is_refused(tmp_path):
+    assert "table.csv, row 4: 1 cell where the headings have 2" in refused(tmp_path, HEADING + "10,8\n20,16\n30\n")
+
+
+def test_a_row_may_end_before_columns_that_hold_remarks_or_nothing(tmp_path):
+    text = "input_force_N,output_force_N,remark,\n10,8,first,\n20,16\n30,24,,\n"
+    (tmp_path / "table.csv").write_text(text)
+    assert len(read_csv(tmp_path / "table.csv").rows) == 3
+
+
+@pytest.mark.parametrize("row", ['"30,24"', "30;24", "30\t24", "30|24"])
+@pytest.mark.parametrize("last", [True, False])
+def test_a_reading_with_other_separators_is_no_remark(tmp_path, row, last):
+    rows = ["10,8", "20,16", row] if last else ["10,8", row, "20,16", "40,32"]
+    said = refused(tmp_path, HEADING + "\n".join(rows) + "\n")
+    assert "looks like a row of readings" in said or "is not a number" in said or "cell" in said
+
+
+def test_remarks_between_and_below_the_rows_are_left_out_as_before(tmp_path):
+    text = HEADING + "10,8\nrope changed here\n20,16\n30,24\n\nmeasured on Monday, by hand\n"
+    assert numbers(tmp_path, text) == [[10, 8], [20, 16], [30, 24]]
+
+
+@pytest.mark.parametrize("thousand", ["1.000", "1,000"])
+def test_three_digits_behind_a_mark_beside_whole_numbers_are_ambiguous(tmp_path, thousand):
+    text = f"input_force_N;output_force_N\n200;140\n400;271\n600;411\n800;546\n{thousand};686\n"
+    assert f"'{thousand}' may mean 1000 or 1.000" in refused(tmp_path, text)
+
+
+def test_a_whole_column_in_thousands_beside_whole_numbers_is_ambiguous(tmp_path):
+    text = "input_force_N;output_force_N\n1.000;686\n1.200;823\n1.400;961\n"
+    assert "'1.000' may mean 1000 or 1.000" in refused(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["450;10.000;7.654", "460;20.000;15.308"],  # three decimals throughout, as loggers write
+        ["450;10.0;7.5", "460;1.125;0.9"],
+        ["450;12;9.125", "460;24;18.250"],
+    ],
+)
+def test_three_decimals_are_decimals_where_the_column_has_no_whole_numbers(tmp_path, rows):
+    text = "cable_length_mm;input_force_N;output_force_N\n" + "\n".join(rows) + "\n"
+    assert numbers(tmp_path, text)[1][1] in (20.0, 1.125, 24.0)
+
+
+def test_an_output_of_seven_times_the_input_is_refused_among_few_rows(tmp_path):
+    text = HEADING + "200,140\n400,271\n600,411\n800,546\n100,686\n"
+    assert "686 N at input_force 100 N" in refused(tmp_path, text)
+
+
+def test_invisible_characters_make_no_other_run(tmp_path):
+    text = "run,input_force_N,output_force_N\nA,10,8\nA\u200e,20,16\n\ufeffA,30,24\n"
+    (tmp_path / "table.csv").write_text(text, encoding="utf-8")
+    assert {row[0].text for row in read_csv(tmp_path / "table.csv").rows} == {"A"}
+
+
+def test_a_ratio_of_two_symbols_is_no_clock():
+    from bowdenfit.files.clocks import names_time
+
+    assert not names_time("T/t")
+    assert names_time("bench/Time") and names_time("t (s)")
+
+
+ANGLES = [
+    "bend", "Bend (deg)", "curve", "curvature (deg)", "elbow (deg)", "Total direction change (deg)", "configuration (deg)",
+    "theta", "Winkel", "deg", "Turns", "Wraps", "Umlenkwinkel [°]", "bend_rad", "Cable angle (deg)", "x (rad)",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("heading", ANGLES)
+def test_a_column_that_may_be_wrap_angles_is_asked_about_and_never_passed_over(tmp_path, heading, run):
+    (tmp_path / "t.csv").write_text(f"{heading},Input force (N),Output force (N)\n0.5,20,18\n1.0,40,33\n2.0,60,40\n")
+    with pytest.raises(bf.DatasetError, match="likely to hold the wrap angle of each row"):
+        bf.read(tmp_path / "t.csv", wrap_angle=(180.0, "deg"))
+    code, out, _ = run("check", tmp_path / "t.csv")
+    assert code == 2
+    assert "--wrap-angle 180deg \\" not in out and "--column wrap_angle=" in out
+
+
+OTHERS = ["Motor angle (deg)", "joint_angle_deg", "Temperature (degC)", "configuration", "angle_sd_deg"]
+
+
+@pytest.mark.parametrize("heading", OTHERS)
+def test_other_angles_and_labels_are_not_taken_for_wrap_angles(tmp_path, heading):
+    (tmp_path / "t.csv").write_text(f"{heading},Input force (N),Output force (N)\n1,20,18\n2,40,33\n3,60,40\n")
+    assert "3 force readings" in str(bf.check(tmp_path / "t.csv", wrap_angle=(180.0, "deg")))
+
+
+def test_fractions_of_a_turn_are_numbers(tmp_path):
+    assert numbers(tmp_path, "Turns,input_force_N\n1/4,10\n2 1/4,20\n0,30\n")[:2] == [[0.25, 10], [2.25, 20]]
+
+
+def test_an_index_beside_a_tdms_file_is_not_believed(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    import numpy as np
+
+    def write(path, *names):
+        channels = [nptdms.ChannelObject("bench", name, np.arange(10.0) + 100 * (name == "in")) for name in names]
+        with nptdms.TdmsWriter(path, index_file=True) as writer:
+            writer.write_segment(channels)
+
+    from bowdenfit.files import read_channels
+
+    write(str(tmp_path / "b.tdms"), "out", "in")
+    write(str(tmp_path / "a.tdms"), "in", "out")
+    (tmp_path / "b.tdms_index").replace(tmp_path / "a.tdms_index")
+    read = {channel.name: channel.values[0] for channel in read_channels(tmp_path / "a.tdms").channels}
+    assert read == {"bench/in": 100.0, "bench/out": 0.0}
+
+
+def test_a_held_reading_in_the_first_row_can_be_checked(tmp_path, run):
+    (tmp_path / "t.csv").write_text("stroke,input_force_N,output_force_N\nhold,15,13\npull,20,13.7\npull,40,27.4\n")
+    code, out, err = run("check", tmp_path / "t.csv")
+    assert code == 0, err
+    assert "stroke hold" in out

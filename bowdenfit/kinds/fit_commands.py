@@ -146,8 +146,8 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
     for name, unit in likely_wrap_angles(table).items():
         raise DatasetError(
             f"{path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and --wrap-angle "
-            f"states one angle for all rows. Name it instead: {naming('wrap_angle', name, unit)}; if it is another angle, take the "
-            "column out of the file."
+            f"states one angle for all rows. Name it instead: {naming('wrap_angle', name, unit)}; if it is another angle, take "
+            "the column out of the file."
         )
 
 

@@ -287,10 +287,10 @@ def test_the_label_of_a_run_is_not_taken_for_a_force(run, tmp_path):
     assert code == 2 and "--column output_force=NAME" in out, out
 
 
-def test_what_the_command_mends_ends_with_0(run, tmp_path):
+def test_what_the_command_names_ends_with_2_until_it_is_named(run, tmp_path):
     output, load = trials()
     code, out, _ = run("check", write(tmp_path, ("Fin (N)", "Fout"), (output, load)))
-    assert code == 0 and "\nTo fit it:\n" in out
+    assert code == 2 and "\nTo fit it:\n" in out
 
 
 def test_a_recording_that_cannot_be_used_ends_with_2(run, tmp_path):

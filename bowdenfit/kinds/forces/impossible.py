@@ -35,9 +35,9 @@ _FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # th
 _LEAST, _MOST = 0.15, 1.02  # efficiencies that such a factor must lead back to
 _NO_SWAP = 2.5  # output over input from which a unit is likelier than swapped columns
 _SLIGHT = 0.1  # log of a gain of force up to which load cells may differ
-# A row by itself is impossible, however few others show the noise, where it gains half of the smaller force and a tenth of
-# the table's largest: no load cell that reads the other rows errs by so much.
-_ANY_GAIN, _LARGE_GAIN = 1.5, 0.1
+# A row by itself is impossible, however few others show the noise, where its forces differ by this factor and by this share of
+# the table's largest force: six standard deviations of cells with a noise of a tenth of the load.
+_ANY_GAIN, _LARGE_GAIN = 2.5, 0.1
 _TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 

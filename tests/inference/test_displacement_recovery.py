@@ -62,6 +62,7 @@ def recovered(folder, seeds):
     return held, errors
 
 
+@pytest.mark.slow
 def test_friction_and_spring_of_a_few_catheters_are_recovered(tmp_path):
     """None held of three happens once in a thousand."""
     held, errors = recovered(tmp_path, (4, 14, 16))  # of one bend and one motion

@@ -92,7 +92,7 @@ def estimates_of(tables, design, truth, seeds):
     return found, data
 
 
-USUAL = ("a single load", "one wrap angle", "a loop that is always slack")
+USUAL = ("one wrap angle",)
 
 
 @pytest.mark.parametrize("case", some_slow(CASES, USUAL))

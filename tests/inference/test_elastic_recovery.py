@@ -163,6 +163,7 @@ def all_on_the_way_up(dataset: Dataset) -> Dataset:
     return replace(dataset, measurements=dataset.measurements.with_tables(loading))
 
 
+@pytest.mark.slow
 def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
     """The negative control: friction that holds the stretch back while the load comes down, taken for noise."""
     wrong = Laboratory(all_on_the_way_up, QUICK)

@@ -198,6 +198,7 @@ def whole(narrow, surprised):
     return narrow.sampled(settings=lasting(1300), programs=surprised)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interrupted", [1150, 1250])
 def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interrupted, narrow, surprised, whole, tmp_path):
     path = tmp_path / "parts"

@@ -114,6 +114,7 @@ def test_nuts_reproduces_a_funnel_down_to_its_narrow_end(funnel):
     assert max(map(abs, z_scores(funnel, truths))) < limit
 
 
+@pytest.mark.slow
 def test_fine_steps_get_through_where_the_others_break_off(funnel):
     trajectories = funnel.trajectories
     assert trajectories.fine_diverged <= trajectories.fine / 1000

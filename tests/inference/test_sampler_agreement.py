@@ -129,6 +129,7 @@ def by_both():
     return fitted_by_both(YARN.name)
 
 
+@pytest.mark.slow
 def test_a_fit_by_both_samplers_says_that_they_agree(by_both):
     """The first sampler's draws are the result."""
     assert by_both.posterior.sampler == "emcee"

@@ -80,6 +80,7 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
     assert shown.parameter("mu").q05 < TRUE_MU < shown.parameter("mu").q95
 
 
+@pytest.mark.slow
 def test_scatter_that_is_stated_needs_no_digits(tmp_path):
     """Of one reading with what its last digit leaves open, and of efficiencies with a standard deviation."""
     (tmp_path / "cable.toml").write_text(CABLE + "[prior.sigma_F]\nfixed = 0.29\n")

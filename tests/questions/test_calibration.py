@@ -436,6 +436,7 @@ def angles_alone(undetected: str) -> Dataset:
     return designed(cable(1, {"angles": angles}, prior=prior), design_of(angles=DESIGN.angles))
 
 
+@pytest.mark.slow
 def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():
     """Zeros pull the curve down: eight replications reject a parameter at 0.01; a right likelihood, one seed in a hundred."""
     found = calibrated(Plan(angles_alone("censored"), angles_alone("zero"), 5), 8)

@@ -354,6 +354,7 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
 
 
+@pytest.mark.slow
 @pytest.mark.extended
 @pytest.mark.parametrize("scale", [0.05, 200.0], ids=["1 to 2.5 N", "4 to 10 kN"])
 def test_a_run_read_a_quarter_too_low_among_four_is_an_outlier(scale, tmp_path):

@@ -506,6 +506,7 @@ def test_a_window_that_is_not_shown_is_put_in_words():
     assert {"Preload (N)", "Friction felt (N)", "Bends 90 deg, input force up to 400 N"} <= shown
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_small_files(tmp_path):
     before = dict(mpl.rcParams)
     data = CASES["twelve angles"]()

@@ -88,6 +88,7 @@ def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(on
     assert "inf" not in text.replace("inform", "")
 
 
+@pytest.mark.slow
 def test_a_single_run_left_out_whole_is_refused(one_run):
     with pytest.raises(UsageError, match="nothing predicts it once it is left out"):
         bf.compare(one_run, leave_out="run")

@@ -39,6 +39,7 @@ def drag(tmp_path_factory):
     return fit, folder / "fit"
 
 
+@pytest.mark.slow
 def test_drag_is_said_as_the_hidden_tension_and_as_the_force_that_it_costs(drag):
     found = lost_force(drag[0])
     assert abs(found.hidden_tension.median - HIDDEN) < 4 * found.hidden_tension.sd < 0.8

@@ -30,6 +30,7 @@ def unmarked(folder):
     return [path.stem for path in drawn if MARK not in path.read_text()]
 
 
+@pytest.mark.slow
 def test_all_figures_of_a_refused_fit_and_their_captions_are_marked(unfinished, tmp_path):
     fit, folder = unfinished
     assert mark_of(fit.verdict().troubles) == "Do not use: this fit is not converged and not identifiable."

@@ -38,6 +38,7 @@ def test_a_hidden_tension_is_told_by_the_lowest_load(advice):
     assert share[64, 0] < share[4, 0] and share[64, 0] < share[0, 0]
 
 
+@pytest.mark.slow
 def test_the_advice_says_which_load_and_stroke(fit, advice):
     said = " ".join(next_measurement_text(advice, 5).split())
     assert "That is a run as those made so far: 6 readings at" in said and "pulling and returning" in said and "64 N" in said

@@ -77,6 +77,7 @@ def test_the_population_and_every_cable_are_found(fleet, found):
     assert abs(oil.share.mean - np.expm1(-0.2)) < 4 * oil.share.sd < 0.1
 
 
+@pytest.mark.slow
 def test_cables_unlike_the_rest_are_named_and_no_others(found):
     assert {each.cable for each in found.unlike} == {"cable-03", "cable-08"}
     assert "mu" in found.cable("cable-03").unlike and "above" in found.cable("cable-03").unlike

@@ -429,6 +429,7 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
     assert {"a", "b"} <= {text for text, _ in words(drawn("residuals", {"residuals": Residuals((points,))}))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["two", pytest.param("twenty, long names", marks=pytest.mark.slow)])
 def test_the_same_data_give_the_same_small_files(case, tmp_path):
     before = dict(mpl.rcParams)

@@ -103,6 +103,7 @@ def test_friction_that_no_sheath_has_is_no_fit_to_trust(tmp_path, degrees, shown
     assert _bends_of(tmp_path, degrees, degrees).verdict().trusted
 
 
+@pytest.mark.slow
 @pytest.mark.extended
 def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, tmp_path):
     """An angle of 28 deg written as 82: with normal noise the verdict names it, with Student noise it hardly counts."""

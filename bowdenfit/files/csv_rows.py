@@ -113,5 +113,5 @@ def too_few_cells(file: str, row: int, cells: Sequence[str], header: Sequence[st
         "cut off, and a value that was deleted together with its separator. Complete the row, delete it, or leave the cell "
         "blank behind a separator of its own if nothing was measured."
     )
-    error.alike, error.row = (file, "too few cells"), row
+    error.fault_key, error.row = (file, "too few cells"), row
     return error

@@ -11,7 +11,7 @@ from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.words import checks_page
 from bowdenfit.questions.figure_methods import FigureMethods
-from bowdenfit.questions.groups.answer import Groups, groups_of
+from bowdenfit.questions.groups.answer import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.identify.words import identifiability_text
@@ -71,7 +71,7 @@ class Fit(Record):
     @property
     def groups(self) -> Groups | None:
         """Groups of readings that have coefficients of their own, with their contrasts; None without such, or without draws."""
-        return groups_of(self)
+        return contrast_groups(self)
 
     def summary(self) -> Summary:
         """Everything on one page, for programs (the contents of summary.json)."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 
-from bowdenfit.device.transmission import Each
+from bowdenfit.device.transmission import Numbers
 
 
 @jax.tree_util.register_dataclass
@@ -29,20 +29,20 @@ class Controller:
         largest_torque: Of the motor [N m].
     """
 
-    coulomb: Each
-    dead_zone: Each
-    linear: Each
-    gain: Each
-    integral_gain: Each
-    active_zone: Each
-    count: Each
-    filter_time: Each
-    largest_torque: Each
+    coulomb: Numbers
+    dead_zone: Numbers
+    linear: Numbers
+    gain: Numbers
+    integral_gain: Numbers
+    active_zone: Numbers
+    count: Numbers
+    filter_time: Numbers
+    largest_torque: Numbers
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Memory:
+class ControllerMemory:
     """What a controller keeps from one sample to the next.
 
     Args:
@@ -52,19 +52,21 @@ class Memory:
         command: Torque for the motor, which acts a sample later [N m].
     """
 
-    counted: Each
-    speed: Each
-    integral: Each
-    command: Each
+    counted: Numbers
+    speed: Numbers
+    integral: Numbers
+    command: Numbers
 
     @classmethod
-    def empty(cls, like: Each) -> "Memory":
+    def empty(cls, template: Numbers) -> "ControllerMemory":
         """Nothing has been seen."""
-        zero = jnp.zeros_like(like)
+        zero = jnp.zeros_like(template)
         return cls(zero, zero, zero, zero)
 
 
-def see(control: Controller, memory: Memory, angle: Each, torque: Each, sample: float) -> Memory:
+def step_controller(
+    control: Controller, memory: ControllerMemory, angle: Numbers, torque: Numbers, sample: float
+) -> ControllerMemory:
     """The controller's next command, from the angle [rad] and the torque [N m] at the joint.
 
     Args:
@@ -80,12 +82,12 @@ def see(control: Controller, memory: Memory, angle: Each, torque: Each, sample: 
     is_active = jnp.abs(speed) < control.active_zone
     integral = jnp.where(is_active, memory.integral + sample * torque, 0.0)
     fed_back = -control.gain * torque - control.integral_gain * integral
-    wanted = jnp.where(is_active, fed_back, karnopp(control, speed))
-    command = jnp.clip(wanted, -control.largest_torque, control.largest_torque)
+    command = jnp.where(is_active, fed_back, karnopp_torque(control, speed))
+    command = jnp.clip(command, -control.largest_torque, control.largest_torque)
     return replace(memory, counted=counted, speed=speed, integral=integral, command=command)
 
 
-def karnopp(control: Controller, speed: Each) -> Each:
+def karnopp_torque(control: Controller, speed: Numbers) -> Numbers:
     """F_cst in the direction of motion outside the dead zone; inside nothing, or a share of it [N m]."""
     inside = control.linear * control.coulomb * speed / jnp.maximum(control.dead_zone, 1e-12)
     return jnp.where(jnp.abs(speed) > control.dead_zone, control.coulomb * jnp.sign(speed), inside)

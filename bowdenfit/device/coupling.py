@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bowdenfit.device.gains import exponential
+from bowdenfit.device.gains import matrix_exponential
 
 Number = float | np.ndarray
 _PLANT, _SIGNALS = 6, 6  # angles and speeds of motor, joint and slave; angle, speed and torque of either side
@@ -19,7 +19,7 @@ _ROUNDING = 1e-6  # of a spectral radius: the whole device, which nothing holds,
 
 
 @dataclass(frozen=True)
-class Gains:
+class CouplingGains:
     """What is sent, and how it acts.
 
     Args:
@@ -28,7 +28,7 @@ class Gains:
         torque_to_master: C_2 [1].
         torque_to_slave: C_3 [1].
         local_gain: K_f [1].
-        damps_alone: Whether d_m damps the master by itself, as with two channels, of which no position comes back.
+        local_damping: Whether d_m damps the master by itself, as with two channels, of which no position comes back.
         position_to_slave, position_to_master: C_1 and C_4, of which one is 1 over the other [1].
     """
 
@@ -39,21 +39,21 @@ class Gains:
     torque_to_master: float
     torque_to_slave: float
     local_gain: float = 0.0
-    damps_alone: bool = False
+    local_damping: bool = False
     position_to_slave: float = 1.0
     position_to_master: float = 1.0
 
-    def two_channels(self) -> "Gains":
+    def two_channels(self) -> "CouplingGains":
         """The slave's torque back and the master's position on, with the same damping: direct force feedback."""
-        return replace(self, master_stiffness=0.0, torque_to_slave=0.0, local_gain=0.0, damps_alone=True)
+        return replace(self, master_stiffness=0.0, torque_to_slave=0.0, local_gain=0.0, local_damping=True)
 
-    def with_local(self, gain: float) -> "Gains":
+    def with_local_gain(self, gain: float) -> "CouplingGains":
         """The same with another gain on the master's own torque."""
         return replace(self, local_gain=gain)
 
 
 @dataclass(frozen=True)
-class Pair:
+class MasterSlave:
     """Master, slave, hand and wall while everything slides; numbers or arrays over draws, in SI units.
 
     Args:
@@ -83,7 +83,9 @@ class Pair:
     filter_time: Number
 
 
-def free_torque(gains: Gains, rope_friction: Number, motor_friction: Number, slave_friction: Number) -> Number:
+def free_motion_torque(
+    gains: CouplingGains, rope_friction: Number, motor_friction: Number, slave_friction: Number
+) -> Number:
     r"""What a slow hand feels in free motion [N m].
 
     .. math:: T_h = \frac{T_f + F_m + C_4 (k_m/k_s) F_s}{1 + K_f + C_3 C_4 k_m/k_s}
@@ -100,7 +102,7 @@ def free_torque(gains: Gains, rope_friction: Number, motor_friction: Number, sla
     )
 
 
-def felt_stiffness(gains: Gains, stiffness: Number, wall: Number) -> Number:
+def transmitted_stiffness(gains: CouplingGains, stiffness: Number, wall: Number) -> Number:
     r"""Stiffness that a slow hand feels in contact [N m/rad], from the balance of torques at motor and slave.
 
     With equal stiffnesses, C_2 = C_3 = 1 and without local feedback it is :math:`1/(1/K + 1/k_e)`.
@@ -119,7 +121,7 @@ def felt_stiffness(gains: Gains, stiffness: Number, wall: Number) -> Number:
     return 1 / (master + 1 / stiffness)
 
 
-def contact_radius(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
+def spectral_radius_in_contact(system: MasterSlave, gains: CouplingGains, delay: int) -> np.ndarray:
     """Spectral radius of the sampled loop while master and slave move together, with the wall where there is one.
 
     Args:
@@ -127,7 +129,7 @@ def contact_radius(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
         gains: The coupling; its commands act a sample late.
         delay: Samples that all that is sent from side to side is late by.
     """
-    radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed_loop(pair, gains, delay))), axis=1)
+    radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed_loop(system, gains, delay))), axis=1)
     return radius
 
 
@@ -136,49 +138,51 @@ def is_stable(radius: np.ndarray) -> np.ndarray:
     return np.asarray(radius <= 1 + _ROUNDING)
 
 
-def closed_loop(pair: Pair, gains: Gains, delay: int) -> np.ndarray:
+def closed_loop(system: MasterSlave, gains: CouplingGains, delay: int) -> np.ndarray:
     """From one sample to the next: plant, angles before, filtered speeds, commands, and what is on its way."""
-    a, b, torques = _plant(pair)
+    a, b, torques = _discretize_plant(system)
     n, size = len(a), _PLANT + 6 + _SIGNALS * delay
-    before, speeds, commands, sent = slice(6, 8), slice(8, 10), slice(10, 12), slice(12, size)
-    sample, filter_time = (np.broadcast_to(x, n) for x in (pair.sample, pair.filter_time))
+    previous, speeds, commands, queue = slice(6, 8), slice(8, 10), slice(10, 12), slice(12, size)
+    sample, filter_time = (np.broadcast_to(x, n) for x in (system.sample, system.filter_time))
     share = 1 - np.exp(-sample / filter_time)
-    whole = np.zeros((n, size, size))
-    whole[:, :_PLANT, :_PLANT], whole[:, :_PLANT, commands] = a, b
+    matrix = np.zeros((n, size, size))
+    matrix[:, :_PLANT, :_PLANT], matrix[:, :_PLANT, commands] = a, b
     signals = np.zeros((n, _SIGNALS, size))  # angle, speed, torque of the master, then of the slave
     for side, angle in enumerate((0, 4)):
-        whole[:, before.start + side, angle] = 1
-        row = whole[:, speeds.start + side]
-        row[:, angle], row[:, before.start + side] = share / sample, -share / sample
+        matrix[:, previous.start + side, angle] = 1
+        row = matrix[:, speeds.start + side]
+        row[:, angle], row[:, previous.start + side] = share / sample, -share / sample
         row[:, speeds.start + side] = 1 - share
         signals[:, 3 * side, angle], signals[:, 3 * side + 1] = 1, row
         signals[:, 3 * side + 2, :_PLANT] = torques[:, side]
-    late = signals if delay == 0 else whole[:, :0]
+    received = signals if delay == 0 else matrix[:, :0]
     if delay:
-        whole[:, sent.start : sent.start + _SIGNALS] = signals
+        matrix[:, queue.start : queue.start + _SIGNALS] = signals
         for k in range(1, delay):
-            at = sent.start + _SIGNALS * k
-            whole[:, at : at + _SIGNALS, at - _SIGNALS : at] = np.eye(_SIGNALS)
-        late = np.zeros((n, _SIGNALS, size))
-        late[:, :, size - _SIGNALS :] = np.eye(_SIGNALS)
+            at = queue.start + _SIGNALS * k
+            matrix[:, at : at + _SIGNALS, at - _SIGNALS : at] = np.eye(_SIGNALS)
+        received = np.zeros((n, _SIGNALS, size))
+        received[:, :, size - _SIGNALS :] = np.eye(_SIGNALS)
     k_m, d_m, k_s, d_s = (
         gains.master_stiffness, gains.master_damping, gains.slave_stiffness, gains.slave_damping,
     )  # fmt: skip
-    comes_back = 0.0 if gains.damps_alone else d_m
+    returned_damping = 0.0 if gains.local_damping else d_m
     c_1, c_4 = gains.position_to_slave, gains.position_to_master
-    whole[:, commands.start] = np.einsum(
+    matrix[:, commands.start] = np.einsum(
         "i,nij->nj", np.array([-k_m, -d_m, -gains.local_gain, 0, 0, 0]), signals
-    ) + np.einsum("i,nij->nj", np.array([0, 0, 0, c_4 * k_m, c_4 * comes_back, -gains.torque_to_master]), late)
-    whole[:, commands.start + 1] = np.einsum("i,nij->nj", np.array([0, 0, 0, -k_s, -d_s, 0]), signals) + np.einsum(
-        "i,nij->nj", np.array([c_1 * k_s, c_1 * d_s, -gains.torque_to_slave, 0, 0, 0]), late
+    ) + np.einsum(
+        "i,nij->nj", np.array([0, 0, 0, c_4 * k_m, c_4 * returned_damping, -gains.torque_to_master]), received
     )
-    return whole
+    matrix[:, commands.start + 1] = np.einsum("i,nij->nj", np.array([0, 0, 0, -k_s, -d_s, 0]), signals) + np.einsum(
+        "i,nij->nj", np.array([c_1 * k_s, c_1 * d_s, -gains.torque_to_slave, 0, 0, 0]), received
+    )
+    return matrix
 
 
-def _plant(pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _discretize_plant(system: MasterSlave) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The sampled plant, and T_j and T_e of its states."""
     k, c, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, k_e, b_e, sample, _ = (
-        np.atleast_1d(part) for part in np.broadcast_arrays(*vars(pair).values())
+        np.atleast_1d(part) for part in np.broadcast_arrays(*vars(system).values())
     )
     zero, one, j = np.zeros_like(k), np.ones_like(k), j_j + j_h
     rows = [
@@ -191,7 +195,7 @@ def _plant(pair: Pair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         *([zero] * 8 for _ in range(2)),
     ]
     rates = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    moved = exponential(rates * sample[:, None, None])
+    moved = matrix_exponential(rates * sample[:, None, None])
     at_joint = np.stack([k, c, -k, -c, zero, zero], axis=-1)
     at_wall = np.stack([zero, zero, zero, zero, k_e, b_e], axis=-1)
     return moved[:, :_PLANT, :_PLANT], moved[:, :_PLANT, _PLANT:], np.stack([at_joint, at_wall], axis=1)

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.device.motion import Runs
+from bowdenfit.device.motion import DeviceRuns
 
-JUMP = 0.1  # of the largest command, from which on a change from one sample to the next is a jump
+JUMP_SHARE = 0.1  # of the largest command, from which on a change from one sample to the next is a jump
 
 
 @dataclass(frozen=True)
-class Felt:
+class TransmittedTorque:
     """Of every run.
 
     Args:
@@ -26,7 +26,7 @@ class Felt:
     jumps: np.ndarray
 
 
-def felt(runs: Runs, dead_zone: float, since: float = 0.0) -> Felt:
+def measure_transmitted_torque(runs: DeviceRuns, dead_zone: float, start: float = 0.0) -> TransmittedTorque:
     """What is felt of runs.
 
     Args:
@@ -34,19 +34,19 @@ def felt(runs: Runs, dead_zone: float, since: float = 0.0) -> Felt:
         dead_zone: Speed above which the mean is taken [rad/s].
         since: When to begin [s].
     """
-    now = runs.time >= since
-    at_joint, at_motor, speed = runs.joint_torque[now], runs.motor_torque[now], runs.speed[now]
+    selected = runs.time >= start
+    at_joint, at_motor, speed = runs.joint_torque[selected], runs.motor_torque[selected], runs.speed[selected]
     moving = np.abs(speed) > dead_zone
-    against = -at_joint * np.sign(speed)
-    mean = np.sum(against * moving, axis=0) / np.maximum(moving.sum(axis=0), 1)
+    resisting = -at_joint * np.sign(speed)
+    mean = np.sum(resisting * moving, axis=0) / np.maximum(moving.sum(axis=0), 1)
     centered = at_motor - at_motor.mean(axis=0), at_joint - at_joint.mean(axis=0)
     scale = np.sqrt(np.mean(centered[0] ** 2, axis=0) * np.mean(centered[1] ** 2, axis=0))
-    together = np.mean(centered[0] * centered[1], axis=0)
-    correlation = np.where(scale > 1e-12, together / np.where(scale > 1e-12, scale, 1.0), 0.0)
-    command = runs.command[now]
-    jumped = np.abs(np.diff(command, axis=0)) > JUMP * np.maximum(np.abs(command).max(axis=0), 1e-9)
+    covariance = np.mean(centered[0] * centered[1], axis=0)
+    correlation = np.where(scale > 1e-12, covariance / np.where(scale > 1e-12, scale, 1.0), 0.0)
+    command = runs.command[selected]
+    jumps = np.abs(np.diff(command, axis=0)) > JUMP_SHARE * np.maximum(np.abs(command).max(axis=0), 1e-9)
     turns = np.sum(np.diff(np.sign(speed), axis=0) != 0, axis=0)
-    seconds = runs.time[now][-1] - runs.time[now][0]
-    return Felt(
-        mean, np.abs(at_joint).max(axis=0), correlation, np.maximum(jumped.sum(axis=0) - 2 * turns, 0) / seconds
+    seconds = runs.time[selected][-1] - runs.time[selected][0]
+    return TransmittedTorque(
+        mean, np.abs(at_joint).max(axis=0), correlation, np.maximum(jumps.sum(axis=0) - 2 * turns, 0) / seconds
     )

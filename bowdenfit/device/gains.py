@@ -10,18 +10,18 @@ from typing import TypeAlias
 
 import numpy as np
 
-LARGEST, LEAST = 1e4, 1e-4  # gains that are looked for
+LARGEST_GAIN, LEAST_GAIN = 1e4, 1e-4  # gains that are looked for
 _HALVINGS = 17  # of a range of eight decades: to a part in 5000
 _ROUNDING = 1e-6  # of a spectral radius: undamped motion of the whole device stands at 1
 _FREQUENCIES = 240
-_NOTHING = 1e-9  # of an impedance, which rounding may take from it
+_IMPEDANCE_ROUNDING = 1e-9  # of an impedance, which rounding may take from it
 
 
-Numbers: TypeAlias = float | np.ndarray
+DrawNumbers: TypeAlias = float | np.ndarray
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearDevice:
     """The device while the rope slides; numbers or arrays over draws.
 
     Args:
@@ -34,22 +34,22 @@ class Linear:
         integral_gain: K_i, which is set [1/s].
     """
 
-    stiffness: Numbers
-    rope_damping: Numbers
-    motor_inertia: Numbers
-    joint_inertia: Numbers
-    motor_damping: Numbers
-    joint_damping: Numbers
-    hand_stiffness: Numbers
-    sample: Numbers
-    integral_gain: Numbers = 0.0
+    stiffness: DrawNumbers
+    rope_damping: DrawNumbers
+    motor_inertia: DrawNumbers
+    joint_inertia: DrawNumbers
+    motor_damping: DrawNumbers
+    joint_damping: DrawNumbers
+    hand_stiffness: DrawNumbers
+    sample: DrawNumbers
+    integral_gain: DrawNumbers = 0.0
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """All of them, as long as each other."""
         return tuple(np.atleast_1d(part) for part in np.broadcast_arrays(*vars(self).values()))
 
 
-def sampled(device: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def discretize(device: LinearDevice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A, B and C of the sampled plant: motor and joint angle and speed from one sample to the next, and T_j of them."""
     k, c, j_m, j_j, b_m, b_j, k_h, sample, _ = device.arrays()
     zero, one = np.zeros_like(k), np.ones_like(k)
@@ -60,11 +60,11 @@ def sampled(device: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         [k / j_j, c / j_j, -(k + k_h) / j_j, -(c + b_j) / j_j, zero],
         [zero] * 5,
     ]
-    together = exponential(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) * sample[:, None, None])
-    return together[:, :4, :4], together[:, :4, 4:], np.stack([k, c, -k, -c], axis=-1)[:, None, :]
+    transition = matrix_exponential(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) * sample[:, None, None])
+    return transition[:, :4, :4], transition[:, :4, 4:], np.stack([k, c, -k, -c], axis=-1)[:, None, :]
 
 
-def exponential(matrices: np.ndarray) -> np.ndarray:
+def matrix_exponential(matrices: np.ndarray) -> np.ndarray:
     """Matrix exponentials, by scaling, a Taylor series and squaring."""
     norm = float(np.max(np.abs(matrices).sum(axis=-1), initial=1e-9))
     halvings = max(0, int(np.ceil(np.log2(norm))) + 4)
@@ -91,23 +91,23 @@ def spectral_radius(
         integral: K_i T_s.
     """
     a, b, c = parts
-    n, adds = len(a), bool(np.any(integral))
-    closed = np.zeros((n, 5 + adds, 5 + adds))
+    n, has_integral = len(a), bool(np.any(integral))
+    closed = np.zeros((n, 5 + has_integral, 5 + has_integral))
     closed[:, :4, :4], closed[:, :4, 4:5] = a, b
     closed[:, 4, :4] = -np.reshape(gain + integral, (-1, 1)) * c[:, 0]
-    if adds:
+    if has_integral:
         closed[:, 4, 5], closed[:, 5, 5], closed[:, 5, :4] = -np.asarray(integral), 1.0, c[:, 0]
     radius: np.ndarray = np.max(np.abs(np.linalg.eigvals(closed)), axis=1)
     return radius
 
 
-def stable_gain(device: Linear) -> np.ndarray:
+def stable_gain(device: LinearDevice) -> np.ndarray:
     """Largest K_f with which the loop does not oscillate by itself, by draw; `LARGEST` where none does."""
-    parts, integral = sampled(device), (device.arrays()[8] * device.arrays()[7])
-    return _largest(lambda gain: spectral_radius(parts, gain, integral) <= 1 + _ROUNDING, len(parts[0]))
+    parts, integral = discretize(device), (device.arrays()[8] * device.arrays()[7])
+    return _largest_gain(lambda gain: spectral_radius(parts, gain, integral) <= 1 + _ROUNDING, len(parts[0]))
 
 
-def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
+def passive_gain(device: LinearDevice, stable: np.ndarray) -> np.ndarray:
     r"""Largest K_f up to which :math:`\min_\omega \text{Re}\,Z(j\omega) \ge 0`: no passive hand can make it oscillate.
 
     .. math:: Z = J_j s + b_j + \frac{1}{s} \frac{K + b_c s}{1 + (K + b_c s)(1 + G e^{-1.5 T_s s})/(J_m s^2 + b_m s)},
@@ -122,22 +122,22 @@ def passive_gain(device: Linear, stable: np.ndarray) -> np.ndarray:
     k, c, j_m, _, b_m, b_j, _, sample, k_i = (part[:, None] for part in device.arrays())
     s = 1j * np.geomspace(1e-3, 1.0, _FREQUENCIES) * np.pi / sample
     rope, motor = k + c * s, j_m * s**2 + b_m * s
-    given, fed_back = rope / s, rope / motor * np.exp(-1.5 * sample * s)
-    alone = 1 + rope / motor + fed_back * k_i * sample / (1 - np.exp(-sample * s))
+    rope_impedance, fed_back = rope / s, rope / motor * np.exp(-1.5 * sample * s)
+    without_gain = 1 + rope / motor + fed_back * k_i * sample / (1 - np.exp(-sample * s))
     # Re Z >= 0 is a quadratic inequality in K_f at each frequency: square K_f^2 + slope K_f + margin >= 0.
     square = b_j * np.abs(fed_back) ** 2
-    slope = 2 * b_j * (alone * fed_back.conj()).real + (given * fed_back.conj()).real
-    margin = b_j * np.abs(alone) ** 2 + (given * alone.conj()).real
-    margin = margin + _NOTHING * np.abs(given * alone)
-    under = slope**2 - 4 * square * margin
-    crosses = (slope < 0) & (under >= 0)
-    root = 2 * margin / np.where(crosses, np.sqrt(np.maximum(under, 0.0)) - slope, 1.0)
+    slope = 2 * b_j * (without_gain * fed_back.conj()).real + (rope_impedance * fed_back.conj()).real
+    margin = b_j * np.abs(without_gain) ** 2 + (rope_impedance * without_gain.conj()).real
+    margin = margin + _IMPEDANCE_ROUNDING * np.abs(rope_impedance * without_gain)
+    discriminant = slope**2 - 4 * square * margin
+    crosses = (slope < 0) & (discriminant >= 0)
+    root = 2 * margin / np.where(crosses, np.sqrt(np.maximum(discriminant, 0.0)) - slope, 1.0)
     return np.minimum(np.min(np.where(margin < 0, 0.0, np.where(crosses, root, np.inf)), axis=1), stable)
 
 
-def _largest(holds: Callable[[np.ndarray], np.ndarray], draws: int) -> np.ndarray:
+def _largest_gain(holds: Callable[[np.ndarray], np.ndarray], draws: int) -> np.ndarray:
     """Largest gain for which something holds, by draw; 0 where it does for none, `LARGEST` where for all."""
-    low, high = np.full(draws, LEAST), np.full(draws, LARGEST)
+    low, high = np.full(draws, LEAST_GAIN), np.full(draws, LARGEST_GAIN)
     always, never = holds(high), ~holds(low)
     for _ in range(_HALVINGS):
         middle = np.sqrt(low * high)

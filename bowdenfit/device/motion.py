@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.device.control import Controller, Memory, see
-from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle
-from bowdenfit.device.transmission import Each
+from bowdenfit.device.control import Controller, ControllerMemory, step_controller
+from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle_node
+from bowdenfit.device.transmission import Numbers
 
 STEP = 1e-4  # of the plant [s]
 
@@ -26,12 +26,12 @@ class Hand:
         damping: b_h [N m s/rad].
     """
 
-    stiffness: Each | float
-    damping: Each | float
+    stiffness: Numbers | float
+    damping: Numbers | float
 
 
 @dataclass(frozen=True)
-class Runs:
+class DeviceRuns:
     """What was seen at every sample (first axis) of every run.
 
     Args:
@@ -53,7 +53,7 @@ class Runs:
     angle: np.ndarray
 
 
-def simulate(
+def simulate_device(
     plant: Plant,
     control: Controller,
     hand: Hand,
@@ -64,7 +64,7 @@ def simulate(
     step: float = STEP,
     noise: float = 0.0,
     seed: int = 0,
-) -> Runs:
+) -> DeviceRuns:
     """Runs of a device, those of all entries of its numbers at once.
 
     Args:
@@ -78,54 +78,62 @@ def simulate(
     """
     with jax.enable_x64(True):
         first = start or Motion.at_rest(jnp.zeros(()))
-        given = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), (plant, control, hand, first))
-        shape = jnp.broadcast_shapes(*(leaf.shape for leaf in jax.tree.leaves(given)))
-        each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), given)
-        shaken = noise * np.random.default_rng(seed).standard_normal(len(path))
-        seen = _program(max(1, round(sample / step)))(*each, jnp.asarray(path), jnp.asarray(shaken), sample)
-        every = {name: np.asarray(value).reshape(len(path), *shape) for name, value in seen.items()}
-    return Runs(np.arange(len(path)) * sample, **every)
+        inputs = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), (plant, control, hand, first))
+        shape = jnp.broadcast_shapes(*(leaf.shape for leaf in jax.tree.leaves(inputs)))
+        runs = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), inputs)
+        sensor_noise = noise * np.random.default_rng(seed).standard_normal(len(path))
+        samples = _compile_runs(max(1, round(sample / step)))(
+            *runs, jnp.asarray(path), jnp.asarray(sensor_noise), sample
+        )
+        traces = {name: np.asarray(value).reshape(len(path), *shape) for name, value in samples.items()}
+    return DeviceRuns(np.arange(len(path)) * sample, **traces)
 
 
 @lru_cache
-def _program(steps: int) -> Callable[..., dict[str, Any]]:
+def _compile_runs(steps: int) -> Callable[..., dict[str, Any]]:
     """The compiled program of so many steps a sample, over runs."""
 
-    def run(plant: Plant, control: Controller, hand: Hand, first: Motion, path: Any, shaken: Any, sample: Any) -> Any:
+    def run(
+        plant: Plant, control: Controller, hand: Hand, first: Motion, path: Any, sensor_noise: Any, sample: Any
+    ) -> Any:
         step = sample / steps
 
-        def pulled(motion: Motion, at: Each, speed: Each) -> Each:
-            return hand.stiffness * (at - motion.joint) + hand.damping * (speed - motion.joint_speed)
+        def hand_torque(motion: Motion, target: Numbers, target_speed: Numbers) -> Numbers:
+            return hand.stiffness * (target - motion.joint) + hand.damping * (target_speed - motion.joint_speed)
 
-        def one(carry: tuple[Motion, Memory], now: tuple[Any, Any]) -> tuple[tuple[Motion, Memory], dict[str, Each]]:
-            (motion, memory), ((at, speed), error) = carry, now
+        def sample_step(
+            carry: tuple[Motion, ControllerMemory], now: tuple[Any, Any]
+        ) -> tuple[tuple[Motion, ControllerMemory], dict[str, Numbers]]:
+            (motion, memory), ((target, target_speed), error) = carry, now
             acting = memory.command  # which was worked out a sample ago
             at_motor, at_joint = rope_torques(plant, motion)  # of a node that is settled
-            memory = see(control, memory, motion.joint, at_joint + error, sample)
-            seen = {
-                "motor_torque": at_motor, "joint_torque": at_joint, "hand_torque": pulled(motion, at, speed),
+            memory = step_controller(control, memory, motion.joint, at_joint + error, sample)
+            observed = {
+                "motor_torque": at_motor, "joint_torque": at_joint, "hand_torque": hand_torque(motion, target, target_speed),
                 "command": acting, "speed": motion.joint_speed, "angle": motion.joint,
             }  # fmt: skip
 
-            def inside(i: Any, motion: Motion) -> Motion:
-                return advance(plant, motion, acting, pulled(motion, at + i * step * speed, speed), step)
+            def plant_step(i: Any, motion: Motion) -> Motion:
+                return advance(
+                    plant, motion, acting, hand_torque(motion, target + i * step * target_speed, target_speed), step
+                )
 
-            return (jax.lax.fori_loop(0, steps, inside, motion), memory), seen
+            return (jax.lax.fori_loop(0, steps, plant_step, motion), memory), observed
 
         counted = jnp.floor(first.joint / control.count) * control.count
-        memory = replace(Memory.empty(first.joint), counted=counted, speed=first.joint_speed)
-        return jax.lax.scan(one, (settle(plant, first), memory), (path, shaken))[1]
+        memory = replace(ControllerMemory.empty(first.joint), counted=counted, speed=first.joint_speed)
+        return jax.lax.scan(sample_step, (settle_node(plant, first), memory), (path, sensor_noise))[1]
 
     return jax.jit(jax.vmap(run, in_axes=(0, 0, 0, 0, None, None, None), out_axes=1))
 
 
-def swinging(seconds: float, sample: float, amplitude: float, period: float) -> np.ndarray:
+def oscillating_path(seconds: float, sample: float, amplitude: float, period: float) -> np.ndarray:
     """A hand's path to and fro, from rest: angle [rad] and speed [rad/s] at every sample.
 
     Args:
         seconds, sample, period: [s].
         amplitude: Half of the way [rad].
     """
-    turned = 2 * np.pi / period
-    phase = turned * sample * np.arange(round(seconds / sample))
-    return np.stack([amplitude * (1 - np.cos(phase)), amplitude * turned * np.sin(phase)], axis=1)
+    frequency = 2 * np.pi / period
+    phase = frequency * sample * np.arange(round(seconds / sample))
+    return np.stack([amplitude * (1 - np.cos(phase)), amplitude * frequency * np.sin(phase)], axis=1)

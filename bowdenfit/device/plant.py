@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 
-from bowdenfit.device.transmission import Each, Transmission
+from bowdenfit.device.transmission import LoopTransmission, Numbers
 
 
 @jax.tree_util.register_dataclass
@@ -21,13 +21,13 @@ class Plant:
         rope_damping: b_c, beside the loop [N m s/rad].
     """
 
-    loop: Transmission
-    motor_inertia: Each
-    motor_damping: Each
-    motor_friction: Each
-    joint_inertia: Each
-    joint_damping: Each
-    rope_damping: Each
+    loop: LoopTransmission
+    motor_inertia: Numbers
+    motor_damping: Numbers
+    motor_friction: Numbers
+    joint_inertia: Numbers
+    joint_damping: Numbers
+    rope_damping: Numbers
 
 
 @jax.tree_util.register_dataclass
@@ -35,32 +35,32 @@ class Plant:
 class Motion:
     """Angles [rad] and speeds [rad/s] of motor and joint, and the place of the friction node [rad]."""
 
-    motor: Each
-    motor_speed: Each
-    joint: Each
-    joint_speed: Each
-    node: Each
+    motor: Numbers
+    motor_speed: Numbers
+    joint: Numbers
+    joint_speed: Numbers
+    node: Numbers
 
     @classmethod
-    def at_rest(cls, like: Each) -> "Motion":
+    def at_rest(cls, template: Numbers) -> "Motion":
         """Nothing moves, and nothing is loaded."""
-        zero = jnp.zeros_like(like)
+        zero = jnp.zeros_like(template)
         return cls(zero, zero, zero, zero, zero)
 
 
-def settle(plant: Plant, motion: Motion) -> Motion:
+def settle_node(plant: Plant, motion: Motion) -> Motion:
     """The node put where it stands now; before torques are read, or they are those of a step ago."""
-    return replace(motion, node=plant.loop.settled(motion.node, motion.motor, motion.joint))
+    return replace(motion, node=plant.loop.settled_node(motion.node, motion.motor, motion.joint))
 
 
-def rope_torques(plant: Plant, motion: Motion) -> tuple[Each, Each]:
+def rope_torques(plant: Plant, motion: Motion) -> tuple[Numbers, Numbers]:
     """What the rope takes from the motor and gives the joint, damping included [N m]; of a motion that is settled."""
     at_motor, at_joint = plant.loop.torques(motion.node, motion.motor, motion.joint)
     damping = plant.rope_damping * (motion.motor_speed - motion.joint_speed)
     return at_motor + damping, at_joint + damping
 
 
-def advance(plant: Plant, motion: Motion, motor_torque: Each, joint_torque: Each, step: float | Each) -> Motion:
+def advance(plant: Plant, motion: Motion, motor_torque: Numbers, joint_torque: Numbers, step: float | Numbers) -> Motion:
     """One step of semi-implicit Euler; dry friction is a proximal step, so that it holds what it can hold.
 
     Args:
@@ -71,7 +71,7 @@ def advance(plant: Plant, motion: Motion, motor_torque: Each, joint_torque: Each
         step: h [s].
     """
     at_motor, at_joint = rope_torques(plant, motion)
-    motor_speed = slowed(
+    motor_speed = apply_dry_friction(
         motion.motor_speed
         + step * (motor_torque - at_motor - plant.motor_damping * motion.motor_speed) / plant.motor_inertia,
         step * plant.motor_friction / plant.motor_inertia,
@@ -83,16 +83,16 @@ def advance(plant: Plant, motion: Motion, motor_torque: Each, joint_torque: Each
     moved = Motion(
         motion.motor + step * motor_speed, motor_speed, motion.joint + step * joint_speed, joint_speed, motion.node
     )
-    return settle(plant, moved)
+    return settle_node(plant, moved)
 
 
-def slowed(speed: Each, by: Each) -> Each:
+def apply_dry_friction(speed: Numbers, loss: Numbers) -> Numbers:
     """A speed less what dry friction takes of it in a step, which never turns it round."""
-    return jnp.sign(speed) * jnp.maximum(jnp.abs(speed) - by, 0.0)
+    return jnp.sign(speed) * jnp.maximum(jnp.abs(speed) - loss, 0.0)
 
 
-def energy(plant: Plant, motion: Motion) -> Each:
+def mechanical_energy(plant: Plant, motion: Motion) -> Numbers:
     """Kinetic and elastic energy [J]."""
     kinetic = plant.motor_inertia * motion.motor_speed**2 + plant.joint_inertia * motion.joint_speed**2
     loop = plant.loop
-    return kinetic / 2 + loop.stored(motion.motor - motion.node) + loop.stored(motion.node - motion.joint)
+    return kinetic / 2 + loop.half_energy(motion.motor - motion.node) + loop.half_energy(motion.node - motion.joint)

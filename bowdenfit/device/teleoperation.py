@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.device.coupling import Gains
+from bowdenfit.device.coupling import CouplingGains
 from bowdenfit.device.motion import STEP, Hand
-from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle, slowed
-from bowdenfit.device.transmission import Each
+from bowdenfit.device.plant import Motion, Plant, advance, apply_dry_friction, rope_torques, settle_node
+from bowdenfit.device.transmission import Numbers
 
 
 @jax.tree_util.register_dataclass
@@ -26,18 +26,18 @@ class Slave:
         wall, wall_stiffness, wall_damping: Where the wall begins [rad], k_e [N m/rad], b_e [N m s/rad].
     """
 
-    inertia: Each
-    damping: Each
-    friction: Each
-    largest_torque: Each
-    wall: Each
-    wall_stiffness: Each
-    wall_damping: Each
+    inertia: Numbers
+    damping: Numbers
+    friction: Numbers
+    largest_torque: Numbers
+    wall: Numbers
+    wall_stiffness: Numbers
+    wall_damping: Numbers
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Sampled:
+class MasterController:
     """What samples and drives the master.
 
     Args:
@@ -46,13 +46,13 @@ class Sampled:
         largest_torque: Of the master's motor [N m].
     """
 
-    count: Each
-    filter_time: Each
-    largest_torque: Each
+    count: Numbers
+    filter_time: Numbers
+    largest_torque: Numbers
 
 
 @dataclass(frozen=True)
-class Together:
+class TeleoperationRuns:
     """What was seen at every sample (first axis) of every run.
 
     Args:
@@ -69,25 +69,25 @@ class Together:
     wall_torque: np.ndarray
 
 
-def touch(slave: Slave, angle: Each, speed: Each) -> Each:
+def contact_torque(slave: Slave, angle: Numbers, speed: Numbers) -> Numbers:
     """T_e, what the wall gives the slave: it pushes and never pulls [N m]."""
     depth = angle - slave.wall
-    pushed = jnp.maximum(slave.wall_stiffness * depth + slave.wall_damping * speed, 0.0)
-    return jnp.where(depth > 0, pushed, 0.0)
+    torque = jnp.maximum(slave.wall_stiffness * depth + slave.wall_damping * speed, 0.0)
+    return jnp.where(depth > 0, torque, 0.0)
 
 
-def teleoperated(
+def simulate_teleoperation(
     plant: Plant,
     hand: Hand,
     slave: Slave,
-    sampled: Sampled,
-    gains: Gains,
+    controller: MasterController,
+    gains: CouplingGains,
     path: np.ndarray,
     *,
     delay: int = 0,
     sample: float = 1e-3,
     step: float = STEP,
-) -> Together:
+) -> TeleoperationRuns:
     """Runs of master and slave from rest, those of all entries of their numbers at once.
 
     Args:
@@ -98,67 +98,80 @@ def teleoperated(
         sample: T_s [s].
         step: Of the plant, about; a sample is a whole number of them [s].
     """
-    sent = {name: value for name, value in vars(gains).items() if name != "damps_alone"}
-    sent["comes_back"] = 0.0 if gains.damps_alone else gains.master_damping
+    coupling = {name: value for name, value in vars(gains).items() if name != "local_damping"}
+    coupling["returned_damping"] = 0.0 if gains.local_damping else gains.master_damping
     with jax.enable_x64(True):
-        given = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), (plant, hand, slave, sampled, sent))
-        shape = jnp.broadcast_shapes(*(leaf.shape for leaf in jax.tree.leaves(given)))
-        each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), given)
-        seen = _program(max(1, round(sample / step)), delay)(*each, jnp.asarray(path), sample)
-        every = {name: np.asarray(value).reshape(len(path), *shape) for name, value in seen.items()}
-    return Together(np.arange(len(path)) * sample, **every)
+        inputs = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), (plant, hand, slave, controller, coupling))
+        shape = jnp.broadcast_shapes(*(leaf.shape for leaf in jax.tree.leaves(inputs)))
+        runs = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), inputs)
+        samples = _compile_teleoperation(max(1, round(sample / step)), delay)(*runs, jnp.asarray(path), sample)
+        traces = {name: np.asarray(value).reshape(len(path), *shape) for name, value in samples.items()}
+    return TeleoperationRuns(np.arange(len(path)) * sample, **traces)
 
 
 @lru_cache
-def _program(steps: int, delay: int) -> Callable[..., dict[str, Any]]:
+def _compile_teleoperation(steps: int, delay: int) -> Callable[..., dict[str, Any]]:
     """The compiled program of so many steps a sample, over runs."""
 
-    def run(plant: Plant, hand: Hand, slave: Slave, sampled: Sampled, sent: Any, path: Any, sample: Any) -> Any:
-        step, share = sample / steps, 1 - jnp.exp(-sample / sampled.filter_time)
-        limits = jnp.stack([sampled.largest_torque, slave.largest_torque])
+    def run(
+        plant: Plant, hand: Hand, slave: Slave, controller: MasterController, coupling: Any, path: Any, sample: Any
+    ) -> Any:
+        step, share = sample / steps, 1 - jnp.exp(-sample / controller.filter_time)
+        limits = jnp.stack([controller.largest_torque, slave.largest_torque])
 
-        def pulled(motion: Motion, at: Each, speed: Each) -> Each:
-            return hand.stiffness * (at - motion.joint) + hand.damping * (speed - motion.joint_speed)
+        def hand_torque(motion: Motion, target: Numbers, speed: Numbers) -> Numbers:
+            return hand.stiffness * (target - motion.joint) + hand.damping * (speed - motion.joint_speed)
 
-        def one(carry: Any, now: Any) -> Any:
-            (motion, angle, speed, before, speeds, commands, on_the_way), (at, its_speed) = carry, now
-            at_joint, at_wall = rope_torques(plant, motion)[1], touch(slave, angle, speed)
-            counted = jnp.floor(jnp.stack([motion.motor, angle]) / sampled.count) * sampled.count
-            speeds = speeds + share * ((counted - before) / sample - speeds)
+        def sample_step(carry: Any, now: Any) -> Any:
+            (motion, angle, speed, previous, speeds, commands, queue), (target, target_speed) = carry, now
+            at_joint, at_wall = rope_torques(plant, motion)[1], contact_torque(slave, angle, speed)
+            counted = jnp.floor(jnp.stack([motion.motor, angle]) / controller.count) * controller.count
+            speeds = speeds + share * ((counted - previous) / sample - speeds)
             signals = jnp.stack([counted[0], speeds[0], at_joint, counted[1], speeds[1], at_wall])
-            late = on_the_way[-1] if delay else signals
-            wanted = _commands(sent, signals, late)
-            seen = {
-                "joint": motion.joint, "slave": angle, "hand_torque": pulled(motion, at, its_speed), "wall_torque": at_wall,
-            }  # fmt: skip
+            received = queue[-1] if delay else signals
+            commanded = _commands(coupling, signals, received)
+            observed = {
+                "joint": motion.joint,
+                "slave": angle,
+                "hand_torque": hand_torque(motion, target, target_speed),
+                "wall_torque": at_wall,
+            }
 
-            def inside(i: Any, state: Any) -> Any:
+            def plant_step(i: Any, state: Any) -> Any:
                 motion, angle, speed = state
-                motion = advance(plant, motion, commands[0], pulled(motion, at + i * step * its_speed, its_speed), step)
-                drive = commands[1] - touch(slave, angle, speed) - slave.damping * speed
-                speed = slowed(speed + step * drive / slave.inertia, step * slave.friction / slave.inertia)
+                motion = advance(
+                    plant,
+                    motion,
+                    commands[0],
+                    hand_torque(motion, target + i * step * target_speed, target_speed),
+                    step,
+                )
+                drive = commands[1] - contact_torque(slave, angle, speed) - slave.damping * speed
+                speed = apply_dry_friction(speed + step * drive / slave.inertia, step * slave.friction / slave.inertia)
                 return motion, angle + step * speed, speed
 
-            motion, angle, speed = jax.lax.fori_loop(0, steps, inside, (motion, angle, speed))
-            on_the_way = jnp.concatenate([signals[None], on_the_way[:-1]]) if delay else on_the_way
-            return (motion, angle, speed, counted, speeds, jnp.clip(wanted, -limits, limits), on_the_way), seen
+            motion, angle, speed = jax.lax.fori_loop(0, steps, plant_step, (motion, angle, speed))
+            queue = jnp.concatenate([signals[None], queue[:-1]]) if delay else queue
+            return (motion, angle, speed, counted, speeds, jnp.clip(commanded, -limits, limits), queue), observed
 
         zero, two = jnp.zeros(()), jnp.zeros(2)
-        first = (settle(plant, Motion.at_rest(zero)), zero, zero, two, two, two, jnp.zeros((max(delay, 1), 6)))
-        return jax.lax.scan(one, first, path)[1]
+        first = (settle_node(plant, Motion.at_rest(zero)), zero, zero, two, two, two, jnp.zeros((max(delay, 1), 6)))
+        return jax.lax.scan(sample_step, first, path)[1]
 
     return jax.jit(jax.vmap(run, in_axes=(0, 0, 0, 0, 0, None, None), out_axes=1))
 
 
-def _commands(sent: Any, own: Each, late: Each) -> Each:
+def _commands(coupling: Any, own: Numbers, received: Numbers) -> Numbers:
     """Torques of master and slave, of what each side sees itself and of what came late from the other [N m]."""
-    k_m, d_m, k_s, d_s = (sent[f"{side}_{what}"] for side in ("master", "slave") for what in ("stiffness", "damping"))
-    c_1, c_4 = sent["position_to_slave"], sent["position_to_master"]
-    master = k_m * (c_4 * late[3] - own[0]) + sent["comes_back"] * c_4 * late[4] - d_m * own[1]
-    slave = k_s * (c_1 * late[0] - own[3]) + d_s * (c_1 * late[1] - own[4])
+    k_m, d_m, k_s, d_s = (
+        coupling[f"{side}_{what}"] for side in ("master", "slave") for what in ("stiffness", "damping")
+    )
+    c_1, c_4 = coupling["position_to_slave"], coupling["position_to_master"]
+    master = k_m * (c_4 * received[3] - own[0]) + coupling["returned_damping"] * c_4 * received[4] - d_m * own[1]
+    slave = k_s * (c_1 * received[0] - own[3]) + d_s * (c_1 * received[1] - own[4])
     return jnp.stack(
         [
-            master - sent["torque_to_master"] * late[5] - sent["local_gain"] * own[2],
-            slave - sent["torque_to_slave"] * late[2],
+            master - coupling["torque_to_master"] * received[5] - coupling["local_gain"] * own[2],
+            slave - coupling["torque_to_slave"] * received[2],
         ]
     )

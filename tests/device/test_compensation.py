@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from bowdenfit.device.control import Controller
-from bowdenfit.device.coulomb import largest_share, moves_by_itself
-from bowdenfit.device.felt import felt
-from bowdenfit.device.gains import Linear, passive_gain, sampled, spectral_radius, stable_gain
-from bowdenfit.device.motion import Hand, simulate, swinging
+from bowdenfit.device.coulomb import largest_safe_share, moves_by_itself
+from bowdenfit.device.felt import measure_transmitted_torque
+from bowdenfit.device.gains import LinearDevice, discretize, passive_gain, spectral_radius, stable_gain
+from bowdenfit.device.motion import Hand, oscillating_path, simulate_device
 from bowdenfit.device.plant import Motion, Plant
-from bowdenfit.device.transmission import Transmission
+from bowdenfit.device.transmission import LoopTransmission
 
 pytestmark = pytest.mark.extended
 
@@ -21,7 +21,7 @@ HAND, EXPONENT = Hand(200.0, 2.0), 0.2
 
 
 def plant(friction=T_F, motor_friction=F_M, rope_damping=0.02, damping=B, stiffness=20.0, joint_inertia=1e-3):
-    loop = Transmission(stiffness, np.asarray(friction) / (2 * EXPONENT), EXPONENT)
+    loop = LoopTransmission(stiffness, np.asarray(friction) / (2 * EXPONENT), EXPONENT)
     return Plant(loop, 7e-4, damping, motor_friction, joint_inertia, damping, rope_damping)
 
 
@@ -41,11 +41,13 @@ def moved(law: str):
         "linear": controller(T_F + F_M, linear=1.0),
         "active": controller(gain=np.array([1.0, 2.0]), active_zone=always),
     }[law]
-    return felt(simulate(plant(), how, HAND, swinging(3.0, 1e-3, 0.5, 1.25), noise=1e-3), 1.0, since=0.6)
+    return measure_transmitted_torque(
+        simulate_device(plant(), how, HAND, oscillating_path(3.0, 1e-3, 0.5, 1.25), noise=1e-3), 1.0, start=0.6
+    )
 
 
 def test_the_torques_differ_by_friction_and_what_is_felt_is_all_of_it():
-    runs = simulate(plant(), controller(), HAND, swinging(3.0, 1e-3, 0.5, 1.25))
+    runs = simulate_device(plant(), controller(), HAND, oscillating_path(3.0, 1e-3, 0.5, 1.25))
     moving = np.abs(runs.speed) > 1.0
     lost = (runs.motor_torque - runs.joint_torque) * np.sign(runs.speed)
     assert np.mean(lost[moving]) == pytest.approx(T_F, rel=2e-3)
@@ -76,7 +78,9 @@ def test_a_dead_zone_narrower_than_a_count_in_the_filters_time_chatters():
     of_count = COUNT / 6e-3
     zones = of_count * np.array([0.3, 0.9, 2.0])
     slow = np.stack([0.15 * np.arange(4000) * 1e-3, np.full(4000, 0.15)], axis=1)
-    jumps = felt(simulate(plant(), controller(0.9 * (T_F + F_M), zones), HAND, slow), 0.05, since=0.5).jumps
+    jumps = measure_transmitted_torque(
+        simulate_device(plant(), controller(0.9 * (T_F + F_M), zones), HAND, slow), 0.05, start=0.5
+    ).jumps
     assert jumps[0] > 20
     assert jumps[1] > 20
     assert jumps[2] == 0
@@ -84,16 +88,16 @@ def test_a_dead_zone_narrower_than_a_count_in_the_filters_time_chatters():
 
 @pytest.mark.parametrize("gain", [1.0, 2.0])
 def test_the_active_law_leaves_friction_over_one_and_the_gain(gain):
-    slow = 0.25 * swinging(6.0, 1e-3, 1.0, 3.0)
-    runs = simulate(plant(), controller(gain=gain, active_zone=np.inf), HAND, slow)
-    left = felt(runs, 0.3, since=1.0).mean
+    slow = 0.25 * oscillating_path(6.0, 1e-3, 1.0, 3.0)
+    runs = simulate_device(plant(), controller(gain=gain, active_zone=np.inf), HAND, slow)
+    left = measure_transmitted_torque(runs, 0.3, start=1.0).mean
     assert left == pytest.approx((T_F + F_M + B * 0.45) / (1 + gain), rel=0.02)
 
 
 DEVICES = {
-    "a soft hand": (Linear(20.0, 0.02, 7e-4, 1e-3, B, B + 0.05, 5.0, 1e-3), Hand(5.0, 0.05)),
-    "a heavy bar": (Linear(20.0, 0.03, 7e-4, 3e-3, B, B + 0.1, 2.0, 1e-3), Hand(2.0, 0.1)),
-    "a damped rope": (Linear(20.0, 0.05, 7e-4, 3e-3, B, B + 0.1, 2.0, 1e-3), Hand(2.0, 0.1)),
+    "a soft hand": (LinearDevice(20.0, 0.02, 7e-4, 1e-3, B, B + 0.05, 5.0, 1e-3), Hand(5.0, 0.05)),
+    "a heavy bar": (LinearDevice(20.0, 0.03, 7e-4, 3e-3, B, B + 0.1, 2.0, 1e-3), Hand(2.0, 0.1)),
+    "a damped rope": (LinearDevice(20.0, 0.05, 7e-4, 3e-3, B, B + 0.1, 2.0, 1e-3), Hand(2.0, 0.1)),
 }
 
 
@@ -108,15 +112,15 @@ def test_the_largest_gain_is_that_of_the_simulated_device(device):
     path = np.stack([2e-3 * np.arange(900), np.full(900, 2.0)], axis=1)
     start = replace(Motion.at_rest(np.zeros(())), motor_speed=np.asarray(2.0), joint_speed=np.asarray(2.0))
     law = replace(controller(gain=gains, active_zone=np.inf), largest_torque=1e9)
-    torque = np.diff(simulate(moving, law, hand, path, start=start, step=1e-5).joint_torque, axis=0)
+    torque = np.diff(simulate_device(moving, law, hand, path, start=start, step=1e-5).joint_torque, axis=0)
     early, late = (np.mean(torque[part] ** 2, axis=0) for part in (slice(200, 400), slice(600, 800)))
     first = np.flatnonzero(late > early)[0]
     assert (gains[first - 1] + gains[first]) / 2 == pytest.approx(largest, rel=0.02)
 
 
 def test_above_the_largest_gain_an_eigenvalue_leaves_the_unit_circle():
-    device = Linear(20.0, np.array([0.01, 0.02, 0.05]), 7e-4, 1e-3, B, B, 0.0, 1e-3)
-    largest, parts = stable_gain(device), sampled(device)
+    device = LinearDevice(20.0, np.array([0.01, 0.02, 0.05]), 7e-4, 1e-3, B, B, 0.0, 1e-3)
+    largest, parts = stable_gain(device), discretize(device)
     assert np.all(spectral_radius(parts, 0.99 * largest) < 1 + 1e-6)
     assert np.all(spectral_radius(parts, 1.01 * largest) > 1 + 1e-4)
 
@@ -130,25 +134,25 @@ def test_the_largest_gain_beside_an_integral_is_that_of_the_simulated_device(int
     path = np.stack([2e-3 * np.arange(900), np.full(900, 2.0)], axis=1)
     start = replace(Motion.at_rest(np.zeros(())), motor_speed=np.asarray(2.0), joint_speed=np.asarray(2.0))
     law = replace(controller(gain=gains, active_zone=np.inf), integral_gain=integral, largest_torque=1e9)
-    torque = np.diff(simulate(moving, law, hand, path, start=start, step=1e-5).joint_torque, axis=0)
+    torque = np.diff(simulate_device(moving, law, hand, path, start=start, step=1e-5).joint_torque, axis=0)
     early, late = (np.mean(torque[part] ** 2, axis=0) for part in (slice(200, 400), slice(600, 800)))
     assert late[0] < 0.5 * early[0]
     assert late[1] > 0.9 * early[1], "it goes on; slack of the return side bounds it"
 
 
 def test_an_integral_lets_less_gain_be_and_makes_what_is_left_fade():
-    device = Linear(20.0, 0.02, 7e-4, 1e-3, B, B + 0.05, 5.0, 1e-3, np.array([0.0, 100.0, 1000.0]))
+    device = LinearDevice(20.0, 0.02, 7e-4, 1e-3, B, B + 0.05, 5.0, 1e-3, np.array([0.0, 100.0, 1000.0]))
     assert np.all(np.diff(stable_gain(device)) < 0)
     one_way = np.stack([0.5 * np.arange(1500) * 1e-3, np.full(1500, 0.5)], axis=1)
     law = replace(controller(gain=1.0, active_zone=np.inf), integral_gain=np.array([0.0, 5.0]))
-    left = -simulate(plant(), law, HAND, one_way).joint_torque
+    left = -simulate_device(plant(), law, HAND, one_way).joint_torque
     at = [np.mean(left[part], axis=0) for part in (slice(280, 320), slice(680, 720))]
     assert at[1][0] == pytest.approx(at[0][0], rel=0.03)
     assert at[1][1] / at[0][1] == pytest.approx(np.exp(-0.4 * 5.0 / 2.0), rel=0.1), "with 1 + K_f over K_i"
 
 
 def test_with_an_integral_a_hand_may_be_found_that_shakes_it():
-    device = Linear(20.0, 0.02, 7e-4, 1e-3, B, B, 0.0, 1e-3, np.array([0.0, 200.0]))
+    device = LinearDevice(20.0, 0.02, 7e-4, 1e-3, B, B, 0.0, 1e-3, np.array([0.0, 200.0]))
     passive = passive_gain(device, stable_gain(device))
     assert passive[0] > 0
     assert passive[1] == 0
@@ -161,7 +165,7 @@ def impedance(gain, b_c, s, sample=1e-3):
 
 @pytest.mark.parametrize("b_c", [0.01, 0.02, 0.05])
 def test_the_passive_gain_is_where_the_impedance_first_loses_its_real_part(b_c):
-    device = Linear(20.0, b_c, 7e-4, 1e-3, B, B, 0.0, 1e-3)
+    device = LinearDevice(20.0, b_c, 7e-4, 1e-3, B, B, 0.0, 1e-3)
     largest = passive_gain(device, stable_gain(device))[0]
     s = 1j * np.geomspace(1e-3, 1.0, 2000) * np.pi / 1e-3
     shares = [np.min(impedance(share * largest, b_c, s).real) for share in (0.2, 0.6, 0.98, 1.02)]
@@ -170,7 +174,7 @@ def test_the_passive_gain_is_where_the_impedance_first_loses_its_real_part(b_c):
 
 
 def test_what_no_passive_hand_can_shake_is_several_times_less():
-    device = Linear(20.0, np.array([0.01, 0.02, 0.05]), 7e-4, 1e-3, B, B, 0.0, 1e-3)
+    device = LinearDevice(20.0, np.array([0.01, 0.02, 0.05]), 7e-4, 1e-3, B, B, 0.0, 1e-3)
     largest = stable_gain(device)
     ratio = largest / passive_gain(device, largest)
     assert np.all((ratio > 2) & (ratio < 12))
@@ -186,7 +190,7 @@ def foretold(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     fed, pushed = limit * draw.uniform(0.3, 1.7, runs), dead_zone * 2.0
     start = replace(Motion.at_rest(np.zeros(runs)), motor_speed=pushed, joint_speed=pushed)
     moving = plant(friction, motor_friction, 0.02, damping)
-    seen = simulate(moving, controller(fed, dead_zone), Hand(0.0, held), np.zeros((3000, 2)), start=start)
+    seen = simulate_device(moving, controller(fed, dead_zone), Hand(0.0, held), np.zeros((3000, 2)), start=start)
     goes_on = np.abs(seen.speed[-50:]).max(axis=0) > 0.5 * dead_zone
     return moves_by_itself(fed, friction + motor_friction, 2 * damping + held, dead_zone), goes_on
 
@@ -230,11 +234,11 @@ def test_two_hundred_cables_move_by_themselves_as_often_as_was_accepted_and_ofte
         drawn = known_of(one[:6] + noise * draw.standard_normal(6), noise, draw)
         margins = [2 * torque * exponent[:, None] + F_M + 2 * B * DEAD_ZONE for exponent in drawn]
         usual = [np.median(2 * torque * exponent) + F_M for exponent in drawn]
-        fed.append([largest_share(m, np.array([u]), risk) * u for m, u in zip(margins, usual, strict=True)])
+        fed.append([largest_safe_share(m, np.array([u]), risk) * u for m, u in zip(margins, usual, strict=True)])
     pushed = np.full((cables, 2), 2.0 * DEAD_ZONE)
     start = replace(Motion.at_rest(np.zeros((cables, 2))), motor_speed=pushed, joint_speed=pushed)
     friction = np.repeat(2 * torque * mounted[:, 6:], 2, axis=1)
-    seen = simulate(plant(friction), controller(np.array(fed)), Hand(0.0, 0.0), np.zeros((3000, 2)), start=start)
+    seen = simulate_device(plant(friction), controller(np.array(fed)), Hand(0.0, 0.0), np.zeros((3000, 2)), start=start)
     went_on = np.sum(np.abs(seen.speed[-50:]).max(axis=0) > 0.5 * DEAD_ZONE, axis=0)
     assert 4 <= went_on[0] <= 17, "95 % of a binomial of 200 at 5 %"
     assert went_on[1] > 2 * went_on[0], "what coefficients alone promise"
@@ -242,6 +246,6 @@ def test_two_hundred_cables_move_by_themselves_as_often_as_was_accepted_and_ofte
 
 def test_the_share_keeps_the_risk_it_is_asked_for():
     margin = np.random.default_rng(1).lognormal(0.0, 0.1, (4001, 3))
-    share = largest_share(margin, np.ones(3), 0.05)
+    share = largest_safe_share(margin, np.ones(3), 0.05)
     assert 0.045 < np.mean(np.any(share > margin, axis=1)) <= 0.05
     assert np.mean(np.any(1.01 * share > margin, axis=1)) > 0.05

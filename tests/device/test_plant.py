@@ -10,17 +10,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bowdenfit.device.plant import Motion, Plant, advance, energy, rope_torques, settle, slowed
-from bowdenfit.device.transmission import Transmission
+from bowdenfit.device.plant import (
+    Motion,
+    Plant,
+    advance,
+    apply_dry_friction,
+    mechanical_energy,
+    rope_torques,
+    settle_node,
+)
+from bowdenfit.device.transmission import LoopTransmission
 from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 
-LOOP = Transmission(jnp.asarray(20.0), jnp.asarray(0.35), jnp.asarray(0.2))
+LOOP = LoopTransmission(jnp.asarray(20.0), jnp.asarray(0.35), jnp.asarray(0.2))
 PLANT = Plant(LOOP, *(jnp.asarray(v) for v in (7e-4, 0.0, 0.01, 1e-3, 0.0, 0.0)))
 
 
 def loop(stiffness=20.0, preload=0.35, exponent=0.2):
-    return Transmission(*(jnp.asarray(float(v)) for v in (stiffness, preload, exponent)))
+    return LoopTransmission(*(jnp.asarray(float(v)) for v in (stiffness, preload, exponent)))
 
 
 @pytest.mark.parametrize("preload", [0.0, 0.05, 0.35, 40.0])
@@ -34,7 +42,7 @@ def test_the_node_is_the_loops_own_play_operator_under_any_motor_torque(preload,
     motor = placed + cable.twist(torque[:, 0])
 
     def follow(node, angle):
-        node = cable.settled(node, angle, jnp.zeros(()))
+        node = cable.settled_node(node, angle, jnp.zeros(()))
         return node, cable.torques(node, angle, jnp.zeros(()))
 
     at_motor, at_joint = jax.lax.scan(follow, jnp.zeros(()), motor)[1]
@@ -47,7 +55,7 @@ def test_torques_stay_inside_the_loops_band_however_both_ends_move():
     angles = jnp.asarray(np.cumsum(turn.standard_normal((5000, 2)) * 0.01, axis=0))
 
     def follow(node, at):
-        node = LOOP.settled(node, *at)
+        node = LOOP.settled_node(node, *at)
         return node, jnp.stack(LOOP.torques(node, *at))
 
     at_motor, at_joint = jax.lax.scan(follow, jnp.zeros(()), angles)[1].T
@@ -58,7 +66,7 @@ def test_torques_stay_inside_the_loops_band_however_both_ends_move():
 
 def test_a_twist_is_the_inverse_of_the_torque_it_passes():
     torque = jnp.linspace(-3.0, 3.0, 101)
-    np.testing.assert_allclose(LOOP.passed(LOOP.twist(torque)), torque, atol=1e-14)
+    np.testing.assert_allclose(LOOP.half_torque(LOOP.twist(torque)), torque, atol=1e-14)
 
 
 angles = st.floats(-0.3, 0.3)
@@ -67,8 +75,8 @@ angles = st.floats(-0.3, 0.3)
 @jax.jit
 def stored_by(cable, node, motor, joint):
     """Energy of a cable with its node where it settles and where it was."""
-    where = jnp.stack([cable.settled(node, motor, joint), node])
-    return jax.vmap(lambda at: cable.stored(motor - at) + cable.stored(at - joint))(where)
+    where = jnp.stack([cable.settled_node(node, motor, joint), node])
+    return jax.vmap(lambda at: cable.half_energy(motor - at) + cable.half_energy(at - joint))(where)
 
 
 @settings(max_examples=200, deadline=None)
@@ -84,9 +92,9 @@ def released(plant, start, seconds, step):
 
     def one(motion, _):
         motion = advance(plant, motion, jnp.zeros(()), jnp.zeros(()), step)
-        return motion, (motion, energy(plant, motion))
+        return motion, (motion, mechanical_energy(plant, motion))
 
-    return jax.lax.scan(one, settle(plant, start), None, length=round(seconds / step))[1]
+    return jax.lax.scan(one, settle_node(plant, start), None, length=round(seconds / step))[1]
 
 
 @settings(max_examples=20, deadline=None)
@@ -94,7 +102,7 @@ def released(plant, start, seconds, step):
 def test_a_device_that_is_let_go_never_gains_energy(motor, joint, motor_speed, joint_speed):
     start = Motion(*(jnp.asarray(v) for v in (motor, motor_speed, joint, joint_speed, 0.0)))
     plant = replace(PLANT, rope_damping=jnp.asarray(0.002), joint_damping=jnp.asarray(0.001))
-    before = energy(plant, settle(plant, start))
+    before = mechanical_energy(plant, settle_node(plant, start))
     after = released(plant, start, 0.5, 1e-4)[1]
     swing = 1e-4 * np.sqrt(20.0 * 2 * (1 / 7e-4 + 1 / 1e-3))  # a step's share of the fastest swing
     assert float(jnp.max(after)) <= float(before) * (1 + swing) + 1e-12
@@ -106,7 +114,7 @@ def test_a_mass_on_a_spring_with_dry_friction_loses_twice_f_over_k_a_half_swing(
 
     def one(state, _):
         at, speed = state
-        speed = slowed(speed - step * stiffness * at / mass, jnp.asarray(step * friction / mass))
+        speed = apply_dry_friction(speed - step * stiffness * at / mass, jnp.asarray(step * friction / mass))
         return (at + step * speed, speed), (at + step * speed, speed)
 
     at, speed = jax.lax.scan(one, (jnp.asarray(0.1), jnp.asarray(0.0)), None, length=60_000)[1]
@@ -128,6 +136,6 @@ def test_halving_the_step_halves_the_error():
 
 def test_torques_that_are_read_are_those_of_a_settled_node():
     motion = replace(Motion.at_rest(jnp.zeros(())), motor=jnp.asarray(0.05))
-    stale, fresh = rope_torques(PLANT, motion)[1], rope_torques(PLANT, settle(PLANT, motion))[1]
+    stale, fresh = rope_torques(PLANT, motion)[1], rope_torques(PLANT, settle_node(PLANT, motion))[1]
     assert stale == 0
     assert fresh > 0

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle
-from bowdenfit.device.transmission import Transmission
+from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle_node
+from bowdenfit.device.transmission import LoopTransmission
 
 pytestmark = pytest.mark.extended
 
@@ -26,7 +26,11 @@ TENDON = """<fixed stiffness="{stiffness}" damping="{damping}">
 def in_mujoco(friction):
     """Angles of motor and joint [rad], and the torque that the rope gives the joint [N m], at every step."""
     node = 4 * 2 * STIFFNESS * STEP**2  # the inertia that its springs still bear
-    bodies = {"motor": (B_M, F_M, 0.0, J_M), "joint": (B_J + HAND[1], 0.0, HAND[0], J_J), "node": (0.0, friction, 0.0, node)}
+    bodies = {
+        "motor": (B_M, F_M, 0.0, J_M),
+        "joint": (B_J + HAND[1], 0.0, HAND[0], J_J),
+        "node": (0.0, friction, 0.0, node),
+    }
     half = {"stiffness": 2 * STIFFNESS, "damping": 0.0}
     tendons = [
         TENDON.format(one="motor", other="node", **half),
@@ -34,7 +38,8 @@ def in_mujoco(friction):
         TENDON.format(one="motor", other="joint", stiffness=0.0, damping=B_C),
     ]
     shown = "".join(
-        BODY.format(name=name, damping=b, friction=f, spring=k, inertia=f"{j:.9g}") for name, (b, f, k, j) in bodies.items()
+        BODY.format(name=name, damping=b, friction=f, spring=k, inertia=f"{j:.9g}")
+        for name, (b, f, k, j) in bodies.items()
     )
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{STEP}" gravity="0 0 0" integrator="implicitfast" iterations="200" tolerance="1e-12"/>'
@@ -51,7 +56,7 @@ def in_mujoco(friction):
 
 
 def here():
-    loop = Transmission(jnp.asarray(STIFFNESS), jnp.asarray(0.7), jnp.asarray(T_F / 1.4))
+    loop = LoopTransmission(jnp.asarray(STIFFNESS), jnp.asarray(0.7), jnp.asarray(T_F / 1.4))
     plant = Plant(loop, *(jnp.asarray(v) for v in (J_M, B_M, F_M, J_J, B_J, B_C)))
 
     def one(motion, torque):
@@ -59,7 +64,7 @@ def here():
         hand = -HAND[0] * motion.joint - HAND[1] * motion.joint_speed
         return advance(plant, motion, torque, hand, STEP), seen
 
-    return np.asarray(jax.lax.scan(one, settle(plant, Motion.at_rest(jnp.zeros(()))), jnp.asarray(TORQUE))[1])
+    return np.asarray(jax.lax.scan(one, settle_node(plant, Motion.at_rest(jnp.zeros(()))), jnp.asarray(TORQUE))[1])
 
 
 def test_the_plant_moves_as_mujoco_says_and_otherwise_with_other_friction():

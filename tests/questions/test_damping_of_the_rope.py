@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bowdenfit.description.device import read_device
-from bowdenfit.device.known import drawn
+from bowdenfit.device.known import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.ringdown.table import RingDownTable
 from bowdenfit.questions.bends import ring_down
@@ -61,7 +61,7 @@ def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_
     found = device_for(Fitted(rings=False), device(tmp_path))
     assert asked == [tmp_path / "../bar"], "as seen from device.toml"
     keys = "rope.damping", "joint.damping"
-    rope, joint = drawn(found.needed("an answer", *keys), 40_000, 7).values()
+    rope, joint = draw_device(found.needed("an answer", *keys), 40_000, 7).values()
     assert rope.mean() == pytest.approx(0.014, rel=0.01)
     assert np.std(rope + joint) == pytest.approx(0.001, rel=0.03), "what is known is the sum"
     assert np.corrcoef(rope, joint)[0, 1] < -0.2
@@ -71,7 +71,7 @@ def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_
 def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(tmp_path):
     path = device(tmp_path, "mounting", ('inertia = { value = 1e-3, unit = "kg*m^2", sd = 0.1e-3 }\n', ""))
     found = device_for(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
-    draws = drawn(found, 5000, 1)
+    draws = draw_device(found, 5000, 1)
     np.testing.assert_allclose(draws["joint.inertia"], 1e-3 + 0.02 * (draws["rope.damping"] + draws["joint.damping"]))
     assert device_for(Fitted(rings=False), DEVICE) == read_device(DEVICE)
 
@@ -102,5 +102,7 @@ def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):
 
 
 def test_where_nothing_tells_it_a_ring_down_is_the_remedy(tmp_path):
-    with pytest.raises(DescriptionError, match=r"damping = \{.* under \[rope\] of device.toml, or ringdown = .*released"):
+    with pytest.raises(
+        DescriptionError, match=r"damping = \{.* under \[rope\] of device.toml, or ringdown = .*released"
+    ):
         read_device(device(tmp_path, "mounting")).needed("the largest gain", "rope.damping")

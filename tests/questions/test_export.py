@@ -9,10 +9,10 @@ from exported import HOSTILE, cable
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.lookup import table_of_draws
-from bowdenfit.questions.export.tables import transmission
+from bowdenfit.questions.export.lookup import draws_table
+from bowdenfit.questions.export.tables import tabulate_transmission
 from bowdenfit.questions.export.transmission import LEVELS
-from bowdenfit.questions.export.words import plain
+from bowdenfit.questions.export.words import ascii_text
 
 pytestmark = pytest.mark.extended
 
@@ -59,11 +59,11 @@ def test_the_lookup_table_says_what_predict_says(fit, tmp_path):
 
 @pytest.mark.parametrize("stroke", ["pull", "return"])
 def test_quantiles_of_friction_give_the_intervals_of_predictions(of_load, stroke):
-    found = transmission(of_load, points=3)
-    at, reference = found.places.at, found.reference_force
+    found = tabulate_transmission(of_load, points=3)
+    at, reference = found.points.values, found.reference_force
     rows = bf.predict(of_load, wrap_angles=[(x, "rad") for x in at], input_force=(reference, "N"), stroke=stroke)
     row, sign = (0, 1) if stroke == "pull" else (1, -1)
-    assert found.of_load
+    assert found.depends_on_load
     quantiles = ("q95", "output_force_N", "q05")[::sign]
     for level, quantile in zip(("q05", "q50", "q95"), quantiles, strict=True):
         one = found.levels[LEVELS.index(level)]
@@ -75,12 +75,14 @@ def test_quantiles_of_friction_give_the_intervals_of_predictions(of_load, stroke
 
 
 def test_draws_are_cables_of_the_posterior_in_mountings_of_their_own(fit):
-    found = transmission(fit, points=2, draws=400)
+    found = tabulate_transmission(fit, points=2, draws=400)
     drawn = np.array([level.exponent[0] for level in found.levels[len(LEVELS) :]])
     of_mountings = [found.levels[LEVELS.index(f"mounting_{q}")].exponent[0] for q in ("q05", "q95")]
     inside = np.mean((drawn > of_mountings[0]) & (drawn < of_mountings[1]))
-    assert 0.9 - 4.4 * 0.011 < inside < 0.9 + 4.4 * 0.011  # binomial of 800, half of them dependent: less than 1 in 10^4
-    columns = read_back(table_of_draws(found))
+    assert (
+        0.9 - 4.4 * 0.011 < inside < 0.9 + 4.4 * 0.011
+    )  # binomial of 800, half of them dependent: less than 1 in 10^4
+    columns = read_back(draws_table(found))
     assert len(columns["draw"]) == 800
     np.testing.assert_array_equal(np.array(columns["friction_exponent_pull"], dtype=float).reshape(-1, 2), drawn)
 
@@ -114,11 +116,13 @@ def test_a_loop_is_exported_with_its_stiffness_at_the_wrap_angle_asked_for(tmp_p
     assert code in (0, 3)
     assert "Friction is that at wrap_angle 100 deg.\nIt holds up to" in out
     text = (tmp_path / "synthetic_haptic_loop.xml").read_text()
-    found = transmission(fit, 5)
-    rows = bf.predict(fit, quantity="stiffness", wrap_angles=[(x, "rad") for x in found.places.at], input_force=(1e-6, "N"))
+    found = tabulate_transmission(fit, 5)
+    rows = bf.predict(
+        fit, quantity="stiffness", wrap_angles=[(x, "rad") for x in found.points.values], input_force=(1e-6, "N")
+    )
     np.testing.assert_allclose(found.median.stiffness, [row["stiffness_N_per_mm"] for row in rows], rtol=1e-6)
     assert found.radii == (20.0, 20.0)
-    assert repr(2000 * float(np.interp(np.deg2rad(100), found.places.at, found.median.stiffness))) in text
+    assert repr(2000 * float(np.interp(np.deg2rad(100), found.points.values, found.median.stiffness))) in text
     assert "is asked of mujoco" in refuse("export", "fits", "--to", "c", "--at", "100deg")
     assert "--at 100mm" in refuse("export", "fits", "--to", "mujoco", "--force", "--at", "100mm")
 
@@ -130,12 +134,12 @@ def test_a_fit_without_draws_is_refused_in_words(on_body_squares, tmp_path):
 
 
 def test_hostile_names_are_harmless_in_csv():
-    text = table_of_draws(cable("rope", name=HOSTILE))
+    text = draws_table(cable("rope", name=HOSTILE))
     columns = read_back(text)
     assert list(columns) == ["draw", "wrap_angle_rad", "friction_exponent_pull", "friction_exponent_return"]
     assert text.isascii()
 
 
 def test_plain_text_holds_nothing_that_steers():
-    assert plain(HOSTILE).isascii() and plain(HOSTILE).isprintable()
-    assert not any(bad in plain(HOSTILE + "/*/*/-->") for bad in ("*/", "/*", "??", "--", "\\", "%{", "%}"))
+    assert ascii_text(HOSTILE).isascii() and ascii_text(HOSTILE).isprintable()
+    assert not any(bad in ascii_text(HOSTILE + "/*/*/-->") for bad in ("*/", "/*", "??", "--", "\\", "%{", "%}"))

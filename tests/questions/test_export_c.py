@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
 
-from bowdenfit.questions.export.c import header
+from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.transmission import LEVELS
 
 pytestmark = pytest.mark.extended
@@ -52,7 +52,7 @@ def build(request, tmp_path):
     """Compile the header of a cable with a program that asks it."""
 
     def make(found):
-        (tmp_path / "bowden.h").write_text(header(found))
+        (tmp_path / "bowden.h").write_text(c_header(found))
         (tmp_path / "driver.c").write_text(DRIVER)
         program = tmp_path / "driver"
         done = subprocess.run(
@@ -83,7 +83,7 @@ def test_c_says_what_the_equations_say_at_twenty_thousand_points(case, build):
     np.testing.assert_allclose(back[there], asked["force"][there], rtol=1e-9)
     least = of_equations(found, asked | {"level": np.full(20_000, LEVELS.index("mounting_q05"))}, inverse=True)
     np.testing.assert_allclose(compensation, least - asked["force"], rtol=1e-12, atol=1e-10)
-    at = found.places.at
+    at = found.points.values
     outside = ((asked["place"] < at[0]) | (asked["place"] > at[-1])) & (case != "one place")
     np.testing.assert_array_equal(flags.astype(int) & 1, outside)
     np.testing.assert_array_equal((flags.astype(int) & 2) == 2, (output == 0) & (not found.is_loop))
@@ -94,7 +94,7 @@ def test_c_follows_twenty_thousand_steps_as_the_play_operator_does(case, build):
     found, n = cable(case), 20_000
     force, ask = motion(found, n), build(found)
     for level in (1, 4, 6):
-        place, speed = float(np.mean(found.places.at)) + 0.01, 31.0
+        place, speed = float(np.mean(found.points.values)) + 0.01, 31.0
         same = {"level": level, "place": place, "speed": speed, "stroke": 1.0}
         asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force}
         stepped, state, *_ = ask(asked, "step")
@@ -118,13 +118,13 @@ def test_c_tells_what_it_cannot_answer(build):
 def test_hostile_names_are_harmless_in_c(build):
     found = cable("rope", name=HOSTILE)
     about = replace(found.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    places = replace(found.places, variable=HOSTILE, unit=HOSTILE)
-    output, *_ = build(replace(found, about=about, places=places))(points(found, 10, seed=1))
+    table_points = replace(found.points, variable=HOSTILE, unit=HOSTILE)
+    output, *_ = build(replace(found, about=about, points=table_points))(points(found, 10, seed=1))
     assert np.all(np.isfinite(output))
 
 
 def test_the_header_allocates_nothing_and_says_where_it_is_from():
-    text = header(cable("loop"))
+    text = c_header(cable("loop"))
     assert not re.search(r"\b(malloc|calloc|realloc|free|static double)\b", text)
     assert "seed 7" in text and "bowdenfit 0.1.0" in text and "Range: wrap_angle" in text
     assert max(map(len, text.splitlines())) < 130

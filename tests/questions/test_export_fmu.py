@@ -11,8 +11,8 @@ import pytest
 from exported import HOSTILE, cable, motion
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.c import header
-from bowdenfit.questions.export.fmu import unit
+from bowdenfit.questions.export.c import c_header
+from bowdenfit.questions.export.fmu import build_fmu
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")
@@ -41,12 +41,18 @@ int main(void)
     return 0;
 }
 """
-OUTPUTS = ("output_force", "output_force_pulling", "output_force_returning", "input_force_pulling", "input_force_returning")
+OUTPUTS = (
+    "output_force",
+    "output_force_pulling",
+    "output_force_returning",
+    "input_force_pulling",
+    "input_force_returning",
+)
 
 
 def in_c(found, rows, folder):
     """What the header says, compiled with another compiler than the unit where there is one."""
-    (folder / "bowden.h").write_text(header(found))
+    (folder / "bowden.h").write_text(c_header(found))
     (folder / "driver.c").write_text(DRIVER)
     command = shutil.which("clang") or shutil.which("gcc") or "cc"
     subprocess.run([command, "-O1", "-ffp-contract=off", "-o", "driver", "driver.c", "-lm"], cwd=folder, check=True)
@@ -56,7 +62,7 @@ def in_c(found, rows, folder):
 
 def written(found, folder, name="a cable"):
     path = folder / "cable.fmu"
-    path.write_bytes(unit(found, name))
+    path.write_bytes(build_fmu(found, name))
     return path
 
 
@@ -65,7 +71,7 @@ def test_a_unit_driven_by_fmpy_says_what_c_says_to_the_last_bit(case, tmp_path):
     found, n, level = cable(case), 2000, 3
     path = written(found, tmp_path)
     assert validation.validate_fmu(str(path)) == []
-    time, at = np.arange(n) * 1e-3, found.places.at
+    time, at = np.arange(n) * 1e-3, found.points.values
     place = np.linspace(at[0] - 0.2, at[-1] + 0.2, n)
     names = ("time", "input_force", "place", "speed", "wanted_force")
     columns = (time, motion(found, n), place, 40 * np.sin(7 * time), 20 + motion(found, n))
@@ -104,8 +110,14 @@ def test_a_unit_can_be_reset_copied_and_told_wrong_things(tmp_path):
     assert made.getReal([4])[0] > first
     made.setFMUState(kept)
     assert made.getReal([4]) == [first]
-    assert made.serializeFMUstate(made.deSerializeFMUstate(made.serializeFMUstate(kept))) == made.serializeFMUstate(kept)
-    for wrong in (lambda: made.setInteger([0], [99]), lambda: made.setReal([0], [np.nan]), lambda: made.setReal([4], [1.0])):
+    assert made.serializeFMUstate(made.deSerializeFMUstate(made.serializeFMUstate(kept))) == made.serializeFMUstate(
+        kept
+    )
+    for wrong in (
+        lambda: made.setInteger([0], [99]),
+        lambda: made.setReal([0], [np.nan]),
+        lambda: made.setReal([4], [1.0]),
+    ):
         with pytest.raises(fmpy.fmi1.FMICallException):
             wrong()
     assert made.getReal([0, 4]) == [100.0, first]
@@ -118,7 +130,7 @@ def test_a_unit_can_be_reset_copied_and_told_wrong_things(tmp_path):
 def test_hostile_names_are_harmless_in_an_fmu(tmp_path):
     found = cable("rope", name=HOSTILE)
     about = replace(found.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    hostile = replace(found, about=about, places=replace(found.places, variable=HOSTILE, unit="<&\"'"))
+    hostile = replace(found, about=about, points=replace(found.points, variable=HOSTILE, unit="<&\"'"))
     path = written(hostile, tmp_path, HOSTILE)
     assert validation.validate_fmu(str(path)) == []
     assert all(name.isascii() and ".." not in name for name in zipfile.ZipFile(path).namelist())
@@ -128,22 +140,24 @@ def test_an_fmu_says_where_it_is_from_and_is_the_same_each_time(tmp_path):
     path = written(cable("rope"), tmp_path)
     description = fmpy.read_model_description(str(path))
     assert description.generationTool == "bowdenfit 0.1.0, seed 7"
-    assert all(words in description.description for words in ("test cable", "Range: wrap_angle", "Levels: q05, q50, q95"))
-    assert path.read_bytes() == unit(cable("rope"), "a cable")
+    assert all(
+        words in description.description for words in ("test cable", "Range: wrap_angle", "Levels: q05, q50, q95")
+    )
+    assert path.read_bytes() == build_fmu(cable("rope"), "a cable")
 
 
 def test_without_a_compiler_a_sentence_says_so(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     with pytest.raises(UsageError, match=r"no C compiler here: none of cc, gcc, clang is there.*--to c"):
-        unit(cable("rope"), "x")
+        build_fmu(cable("rope"), "x")
     monkeypatch.setenv("CC", "nocc -m64")
     with pytest.raises(UsageError, match="CC names nocc, which is not there"):
-        unit(cable("rope"), "x")
+        build_fmu(cable("rope"), "x")
     bad = tmp_path / "bad"
     bad.write_text("#!/bin/sh\necho 'x: error: it is broken' >&2\nexit 1\n")
     bad.chmod(0o755)
     monkeypatch.setenv("CC", str(bad))
     monkeypatch.setenv("PATH", "/usr/bin:/bin")
     with pytest.raises(UsageError, match="fails: x: error: it is broken"):
-        unit(cable("rope"), "x")
+        build_fmu(cable("rope"), "x")

@@ -10,14 +10,16 @@ import pytest
 from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.matlab import function, function_name
+from bowdenfit.questions.export.matlab import function_name, matlab_function
 from bowdenfit.questions.export.transmission import LEVELS
 
 pytestmark = pytest.mark.extended
 
 OCTAVE = shutil.which("octave-cli")
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="Octave is not installed")
-ON_LEAVING = "error: ignoring const execution_exception& while preparing to exit"  # of some builds of Octave, whatever is run
+ON_LEAVING = (
+    "error: ignoring const execution_exception& while preparing to exit"  # of some builds of Octave, whatever is run
+)
 SCRIPT = """
 1;
 function check(f, in)
@@ -63,8 +65,10 @@ def test_octave_says_what_the_equations_say_and_follows_the_play_operator(tmp_pa
     for case, name in zip(CASES, names, strict=True):
         found = cable(case, name=HOSTILE if case == "rope" else "plain")
         asked[case] = points(found, 1000, seed=4)
-        (tmp_path / f"{name}.m").write_text(function(found, name))
-        columns = [asked[case][key] + (1 if key == "level" else 0) for key in ("level", "place", "speed", "force", "stroke")]
+        (tmp_path / f"{name}.m").write_text(matlab_function(found, name))
+        columns = [
+            asked[case][key] + (1 if key == "level" else 0) for key in ("level", "place", "speed", "force", "stroke")
+        ]
         np.savetxt(tmp_path / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.17g")
         np.savetxt(tmp_path / f"{name}.motion", [3, *motion(found, 4000)[::100]], fmt="%.17g")
     (tmp_path / "ask.m").write_text(SCRIPT % ", ".join(f"'{name}'" for name in names))
@@ -79,7 +83,7 @@ def test_octave_says_what_the_equations_say_and_follows_the_play_operator(tmp_pa
         np.testing.assert_allclose(needed, of_equations(found, questions, inverse=True), rtol=1e-9, atol=1e-9)
         least = of_equations(found, questions | {"level": np.full(1000, LEVELS.index("mounting_q05"))}, inverse=True)
         np.testing.assert_allclose(compensation, least - questions["force"], rtol=1e-9, atol=1e-8)
-        at = found.places.at
+        at = found.points.values
         outside = ((questions["place"] < at[0]) | (questions["place"] > at[-1])) & (case != "one place")
         np.testing.assert_array_equal(flags.astype(int) & 1, outside)
         place = float(questions["place"][0])
@@ -93,5 +97,5 @@ def test_a_function_is_named_as_its_file_and_names_stay_comments():
         with pytest.raises(UsageError, match="the name of a function"):
             function_name(Path(bad))
     about = replace(cable("rope").about, cable=HOSTILE)
-    top = function(replace(cable("rope"), about=about), "bowden").splitlines()[1:8]
+    top = matlab_function(replace(cable("rope"), about=about), "bowden").splitlines()[1:8]
     assert all(line.startswith("%") for line in top)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from exported import HOSTILE, cable, with_rope
 
-from bowdenfit.device.transmission import Transmission as Loop
+from bowdenfit.device.transmission import LoopTransmission as Loop
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.mujoco import model
+from bowdenfit.questions.export.mujoco import mujoco_model
 
 pytestmark = pytest.mark.extended
 
@@ -41,8 +41,10 @@ def swings(amplitude):
 
 def loop_of(found, place):
     """The device's loop in newtons and meters."""
-    median, at = found.median, found.places.at
-    exponent, lost, k = (np.interp(place, at, table) for table in (median.exponent[0], median.taut_loss, median.stiffness))
+    median, at = found.median, found.points.values
+    exponent, lost, k = (
+        np.interp(place, at, table) for table in (median.exponent[0], median.taut_loss, median.stiffness)
+    )
     return Loop(jnp.asarray(1000 * k), jnp.asarray(lost / (2 * exponent)), jnp.asarray(exponent))
 
 
@@ -51,7 +53,7 @@ def by_node(loop, motor):
     with jax.enable_x64(True):
 
         def step(node, at):
-            node = loop.settled(node, at, jnp.zeros(()))
+            node = loop.settled_node(node, at, jnp.zeros(()))
             return node, jnp.stack(loop.torques(node, at, jnp.zeros(())))
 
         return np.asarray(jax.lax.scan(step, jnp.zeros(()), jnp.asarray(motor))[1])
@@ -75,7 +77,7 @@ def driven(simulated, motion, forces):
 def test_a_taut_loop_in_mjcf_follows_the_node_to_a_small_part_of_its_hysteresis(tmp_path, integrator, stiffness):
     found, place = with_rope(cable("loop"), stiffness), 1.3
     path = tmp_path / "cable.xml"
-    path.write_text(model(found, place, path)[0])
+    path.write_text(mujoco_model(found, place, path)[0])
     text = MAIN.format(step=STEP, integrator=integrator, include='<include file="cable.xml"/>')
     (tmp_path / "main.xml").write_text(text)
     simulated = mujoco.MjModel.from_xml_path(str(tmp_path / "main.xml"))
@@ -107,7 +109,7 @@ def test_a_slack_loop_as_a_callback_is_the_node_itself(tmp_path, stiffness, no_c
 
 def called_back(found, place, folder, **options):
     path = folder / "cable.py"
-    path.write_text(model(found, place, path)[0])
+    path.write_text(mujoco_model(found, place, path)[0])
     spec = importlib.util.spec_from_file_location("exported_cable", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -122,7 +124,7 @@ def test_a_single_rope_as_a_callback_keeps_to_the_capstan_equation(case, tmp_pat
     mujoco.set_mjcb_passive(made)
     angle, speed = swings(0.3)
     ends = driven(simulated, (angle, speed), lambda data: [made.motor_force, made.joint_force])
-    level, at = found.levels[2], found.places.at
+    level, at = found.levels[2], found.points.values
     factor = 1.0
     if case == "rate":
         a, v, c = level.rate
@@ -143,11 +145,11 @@ def test_a_single_rope_as_a_callback_keeps_to_the_capstan_equation(case, tmp_pat
 def test_a_callback_clamps_its_place_and_says_so(tmp_path):
     found = with_rope(cable("loop"))
     made, _ = called_back(found, 1.3, tmp_path)
-    made.place = found.places.at[-1] + 1
+    made.place = found.points.values[-1] + 1
     beyond = made.forces(0.01, 0.0)
     assert made.clamped
     made.reset()
-    made.place = found.places.at[-1]
+    made.place = found.points.values[-1]
     assert made.forces(0.01, 0.0) == beyond and not made.clamped
 
 
@@ -160,25 +162,25 @@ def test_what_mujoco_cannot_express_is_refused_with_what_can():
         (with_rope(cable("loop")), "cable.txt", "from cable.xml, or a callback from cable.py"),
     ):
         with pytest.raises(UsageError, match=words):
-            model(found, None, Path(file))
+            mujoco_model(found, None, Path(file))
     with pytest.raises(UsageError, match="outside the range of this fit, which is wrap_angle"):
-        model(with_rope(cable("loop")), 9.0, Path("cable.xml"))
+        mujoco_model(with_rope(cable("loop")), 9.0, Path("cable.xml"))
 
 
 def test_both_files_say_where_they_are_from_and_where_they_hold():
     found = with_rope(cable("loop"))
     for file in ("cable.xml", "cable.py"):
-        text, remarks = model(found, None, Path(file))
+        text, remarks = mujoco_model(found, None, Path(file))
         assert all(words in text for words in ("seed 7", "bowdenfit 0.1.0", "Range: wrap_angle"))
         assert "the middle of the range; --at names another place" in remarks[0]
-    assert "above which the return side goes slack" in model(found, 1.0, Path("x.xml"))[1][1]
+    assert "above which the return side goes slack" in mujoco_model(found, 1.0, Path("x.xml"))[1][1]
 
 
 def test_hostile_names_are_harmless_in_mujoco(tmp_path):
     found = with_rope(cable("loop"))
     about = replace(found.about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    hostile = replace(found, about=about, places=replace(found.places, variable=HOSTILE + '"""', unit=HOSTILE))
-    text, _ = model(hostile, None, Path("cable.xml"))
+    hostile = replace(found, about=about, points=replace(found.points, variable=HOSTILE + '"""', unit=HOSTILE))
+    text, _ = mujoco_model(hostile, None, Path("cable.xml"))
     assert text.isascii()
     assert ElementTree.fromstring(text).tag == "mujocoinclude"
     made, _ = called_back(hostile, 1.3, tmp_path)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from exported import CASES, HOSTILE, cable
 
-from bowdenfit.questions.export.parameters import lines, parameters
+from bowdenfit.questions.export.parameters import yaml_lines, yaml_parameters
 from bowdenfit.questions.export.transmission import LEVELS
 
 pytestmark = pytest.mark.extended
@@ -20,8 +20,8 @@ def read(text):
 @pytest.mark.parametrize("case", CASES)
 def test_every_number_is_read_back_to_its_last_bit(case):
     found = cable(case)
-    page = read(parameters(found))
-    np.testing.assert_array_equal(page["place"]["values"], found.places.at)
+    page = read(yaml_parameters(found))
+    np.testing.assert_array_equal(page["place"]["values"], found.points.values)
     for level in found.levels:
         for row, stroke in enumerate(("pull", "return")):
             np.testing.assert_array_equal(page["friction_exponent"][stroke][level.name], level.exponent[row])
@@ -39,36 +39,39 @@ def test_every_number_is_read_back_to_its_last_bit(case):
 
 def test_what_may_be_fed_forward_is_a_torque_where_the_pulley_is_known():
     found = replace(cable("loop"), radii=(20.0, 15.0))
-    page = read(parameters(found))
+    page = read(yaml_parameters(found))
     least = found.levels[LEVELS.index("mounting_q05")].taut_loss
     np.testing.assert_allclose(page["feed_forward"]["coulomb_N_m"], 0.015 * least, rtol=1e-15)
     np.testing.assert_allclose(page["coulomb_N_m"]["q50"], 0.015 * found.median.taut_loss, rtol=1e-15)
     assert page["feed_forward"]["probability_that_friction_exceeds_it"] == 0.95
-    assert "coulomb_N_m" not in read(parameters(cable("loop")))
+    assert "coulomb_N_m" not in read(yaml_parameters(cable("loop")))
 
 
 def test_fit_seed_version_and_range_are_said_in_the_parameters_too():
-    page, top = read(parameters(cable("rope"))), parameters(cable("rope"))
+    page, top = read(yaml_parameters(cable("rope"))), yaml_parameters(cable("rope"))
     assert (page["cable"], page["seed"], page["version"], page["trusted"]) == ("test cable", 7, "0.1.0", True)
     assert "# Fitted by bowdenfit 0.1.0, seed 7" in top and "# Range: wrap_angle" in top
 
 
 def test_hostile_names_are_harmless_in_yaml():
-    about = replace(cable("rope").about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    found = replace(cable("rope"), about=about, places=replace(cable("rope").places, variable=HOSTILE, unit=HOSTILE))
-    text = parameters(found, {HOSTILE: HOSTILE, "share": {"q05": 1e-7}})
+    about = replace(
+        cable("rope").about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE
+    )
+    found = replace(cable("rope"), about=about, points=replace(cable("rope").points, variable=HOSTILE, unit=HOSTILE))
+    text = yaml_parameters(found, {HOSTILE: HOSTILE, "share": {"q05": 1e-7}})
     page = read(text)
     assert text.isascii()
-    assert set(page) == {*read(parameters(cable("rope"), {"x": 1})), "warning", "group"}
+    assert set(page) == {*read(yaml_parameters(cable("rope"), {"x": 1})), "warning", "group"}
     assert all(isinstance(page[name], str) for name in ("cable", "group", "warning", "version"))
     assert list(page["compensation"].values()) == [page["cable"], {"q05": 1e-7}]
 
 
 @pytest.mark.parametrize(
-    "value", [True, 1, 1.0, 1e-7, -2.5e30, 5e-324, float("inf"), "true", "1", "1e3", "no", "~", "", "2026-01-01", "a: b"]
+    "value",
+    [True, 1, 1.0, 1e-7, -2.5e30, 5e-324, float("inf"), "true", "1", "1e3", "no", "~", "", "2026-01-01", "a: b"],
 )
 def test_values_keep_their_kind(value):
     for name in ("name", "y", "no", "1", "on", "null"):
-        page = yaml.safe_load("\n".join(lines({name: value, "several": [value, value]})))
+        page = yaml.safe_load("\n".join(yaml_lines({name: value, "several": [value, value]})))
         assert page == {name: value, "several": [value, value]}
         assert type(page[name]) is type(value)

@@ -11,7 +11,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference.engines import make_slurm_executor
-from bowdenfit.questions.fleet.store import KEPT
+from bowdenfit.questions.fleet.store import PIECES_FOLDER
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import FLEET_DRAWS
 
@@ -101,7 +101,7 @@ def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, fleet
 def test_a_client_that_is_killed_goes_on_and_writes_the_same_file(whole, fleet, tmp_path, engine, request):
     where = by_dask(request.getfixturevalue("cluster")) if engine == "dask" else engine
     words = [sys.executable, "-m", "bowdenfit", "fleet", fleet, "-o", tmp_path / "results", "--engine", where]
-    pieces = tmp_path / "results" / KEPT
+    pieces = tmp_path / "results" / PIECES_FOLDER
     with subprocess.Popen([*words, "--seed", str(SEED)], stderr=subprocess.DEVNULL) as client:
         while client.poll() is None and not list(pieces.glob("*.npz")):
             time.sleep(0.005)

@@ -12,7 +12,7 @@ from bowdenfit.inference import engines
 from bowdenfit.inference.engines import Engine, EngineError, versions
 from bowdenfit.questions.fleet.cases import read_cases
 from bowdenfit.questions.fleet.inspections import read_inspections
-from bowdenfit.questions.fleet.store import KEPT, FleetStore
+from bowdenfit.questions.fleet.store import PIECES_FOLDER, FleetStore
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
 
 pytestmark = pytest.mark.extended
@@ -74,7 +74,12 @@ def test_broken_inspections_are_named_and_the_others_go_on(fleet):
     (other / "readings" / "cable-02-25000.csv").write_bytes(b"\x00\xff\x13 no table")
     own = other / "own"
     (own / "readings").mkdir(parents=True)
-    text = (FLEET / "fleet.toml").read_text().replace("mu_edge", "mu_ring").replace("forces.csv", "readings/cable-04-0.csv")
+    text = (
+        (FLEET / "fleet.toml")
+        .read_text()
+        .replace("mu_edge", "mu_ring")
+        .replace("forces.csv", "readings/cable-04-0.csv")
+    )
     (own / "cable.toml").write_text(text)
     shutil.copy(FLEET / "readings" / "cable-04-0.csv", own / "readings")
     found = list(read_cases(other, read_inspections(other), {}))
@@ -176,7 +181,7 @@ def test_a_full_disk_is_a_sentence_and_what_was_kept_goes_on(run, fleet, tmp_pat
         disk.setattr(FleetStore, "keep", full)
         code, _, error = run(*begin)
     assert code == 1 and "No space left" in error and "Traceback" not in error
-    assert len(list((results / KEPT).glob("*.npz"))) == 1 and not (results / FLEET_DRAWS).exists()
+    assert len(list((results / PIECES_FOLDER).glob("*.npz"))) == 1 and not (results / FLEET_DRAWS).exists()
     code, _, error = run(*begin)
     assert code == 2 and "go on with --resume" in " ".join(error.split())
     code, out, _ = run(*begin, "--resume")

@@ -48,7 +48,7 @@ def test_a_contrast_is_said_in_summary_json_and_notebook(fitted):
     page = (fitted / "by-group" / "summary.txt").read_text()
     said = " ".join(page.split())
     assert faults(page) == []
-    assert f"new less old: {contrast.difference.median:.4f}, 90 % interval" in said and "different (lower) with prob" in said
+    assert f"new minus old: {contrast.difference.median:.4f}, 90 % interval" in said and "different (lower) with prob" in said
     (page,) = json.loads((fitted / "by-group" / "summary.json").read_text())["groups"]["contrasts"]
     assert page["difference"]["q95"] == contrast.difference.q95 and page["in_words"] == str(contrast)
     other = fit.groups.contrast("old", "new").difference

@@ -19,25 +19,25 @@ from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.pool import pooling
-from bowdenfit.questions.pool.answer import Asked
-from bowdenfit.questions.pool.figures import captions, figures_of
-from bowdenfit.questions.pool.inspected import given
-from bowdenfit.questions.pool.life import cycles_until, life_of
-from bowdenfit.questions.pool.next import next_inspections
-from bowdenfit.questions.pool.pooling import pooled
-from bowdenfit.questions.pool.unlike import anderson_darling, chances
+from bowdenfit.questions.pool.answer import ServiceLimit
+from bowdenfit.questions.pool.figures import captions, draw_figures
+from bowdenfit.questions.pool.inspected import select_inspections
+from bowdenfit.questions.pool.life import cycles_to_failure, summarize_life
+from bowdenfit.questions.pool.next import rank_next_inspections
+from bowdenfit.questions.pool.pooling import pool_cables
+from bowdenfit.questions.pool.unlike import anderson_darling_p_value, outlier_p_values
 from bowdenfit.questions.pool.words import pool_text
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
 
 pytestmark = pytest.mark.extended
 
-ASKED = Asked(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
+ASKED = ServiceLimit(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
 
 
 def pool(drawn, asked=None, seed=1):
     with jax.enable_x64(True):
-        return pooled(drawn, asked, seed)
+        return pool_cables(drawn, asked, seed)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def few():
 @pytest.fixture(scope="module")
 def population(fleet):
     """What is known of the fleet, and draws of its population."""
-    known = given(fleet[0])
+    known = select_inspections(fleet[0])
     return known, draw_population(known.inspected, 1)
 
 
@@ -79,29 +79,37 @@ def test_the_population_and_every_cable_are_found(fleet, found):
 
 @pytest.mark.slow
 def test_cables_unlike_the_rest_are_named_and_no_others(found):
-    assert {each.cable for each in found.unlike} == {"cable-03", "cable-08"}
-    assert "mu" in found.cable("cable-03").unlike and "above" in found.cable("cable-03").unlike
-    assert "wear lies" in found.cable("cable-08").unlike
-    assert found.mixed == {}, "those that are named are no heap of another make"
+    assert {each.cable for each in found.outliers} == {"cable-03", "cable-08"}
+    assert "mu" in found.cable("cable-03").departure and "above" in found.cable("cable-03").departure
+    assert "wear lies" in found.cable("cable-08").departure
+    assert found.mixtures == {}, "those that are named are no heap of another make"
 
 
 def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, found):
     """Of one line through both coefficients, by least squares: within half a standard deviation, as errors have heavy tails."""
     for i, name in ((2, "cable-03"), (7, "cable-08")):
         odd, rows = found.cable(name), slice(3 * i, 3 * i + 3)
-        seen = [np.median(np.log(each[rows]), axis=1) + 0.2 * fleet[0].lubricated[rows] for each in fleet[0].values.values()]
+        seen = [
+            np.median(np.log(each[rows]), axis=1) + 0.2 * fleet[0].lubricated[rows] for each in fleet[0].values.values()
+        ]
         design = np.column_stack([np.repeat(np.eye(2), 3, axis=0), np.tile(fleet[0].cycles[rows] / REFERENCE, 2)])
         weight = np.repeat([2.0, 1.0], 3)  # errors of the second are twice as large
         line, *_ = np.linalg.lstsq(design * weight[:, None], np.concatenate(seen) * weight, rcond=None)
         assert odd.pooled == () and found.cable("cable-01").pooled == ("mu_0", "mu_1", "wear")
-        for interval, value in zip((*odd.coefficients.values(), odd.wear), (*np.exp(line[:2]), np.expm1(line[2])), strict=True):
+        for interval, value in zip(
+            (*odd.coefficients.values(), odd.wear), (*np.exp(line[:2]), np.expm1(line[2])), strict=True
+        ):
             assert abs(interval.median - value) < 0.5 * interval.sd
-    assert all(each.median < 0.4 for each in found.spreads.values())  # of the others; 0.5 with the one that is five times off
+    assert all(
+        each.median < 0.4 for each in found.spreads.values()
+    )  # of the others; 0.5 with the one that is five times off
     text = " ".join(pool_text(found).split())
     assert "They are shown by their own inspections alone" in text and "said without them" in text
     assert "Only the wear" not in text
     cables = tuple(replace(each, pooled=("wear",)) if each.cable == "cable-03" else each for each in found.cables)
-    assert "Only the wear of cable-03 is that of the others" in " ".join(pool_text(replace(found, cables=cables)).split())
+    assert "Only the wear of cable-03 is that of the others" in " ".join(
+        pool_text(replace(found, cables=cables)).split()
+    )
     rows = csv.DictReader(io.StringIO(found.to_csv()))
     said = {row["cable"]: row["pooled"] for row in rows if row["quantity"] == "wear"}
     assert (said["cable-01"], said["cable-03"]) == ("yes", "no")
@@ -143,7 +151,7 @@ def test_cables_are_drawn_toward_the_rest_as_far_as_their_data_allow(fleet, foun
 
 
 def test_figures_can_be_read(found):
-    drawn = [(name, width, figure) for width in (None, NARROW) for name, figure in figures_of(found, width).items()]
+    drawn = [(name, width, figure) for width in (None, NARROW) for name, figure in draw_figures(found, width).items()]
     assert len(drawn) == 6
     wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
     assert not wrong, "\n".join(wrong)
@@ -152,12 +160,12 @@ def test_figures_can_be_read(found):
 
 def test_life_is_the_closed_formula():
     logs, wear = np.log([[0.1, 0.15]] * 3), np.array([0.2, 0.0, 0.2])
-    cycles = cycles_until(ASKED, logs, wear, 50_000.0)
+    cycles = cycles_to_failure(ASKED, logs, wear, 50_000.0)
     at = np.exp(-np.exp(0.2 * cycles[0] / 50_000.0) * (0.1 * np.pi + 0.15 * 0.3))
     assert at == pytest.approx(0.6) and np.isinf(cycles[1])
-    life = life_of(ASKED, cycles, 50_000.0)
+    life = summarize_life(ASKED, cycles, 50_000.0)
     assert life.lasts == pytest.approx(1 / 3) and life.extrapolated and life.fails == pytest.approx(2 / 3)
-    assert cycles_until(replace(ASKED, efficiency=0.9), logs, wear, 1.0).tolist() == [0.0, 0.0, 0.0]
+    assert cycles_to_failure(replace(ASKED, efficiency=0.9), logs, wear, 1.0).tolist() == [0.0, 0.0, 0.0]
 
 
 def weighed(known, drawn, target, outcomes=100):
@@ -182,13 +190,13 @@ def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(p
     """The best by either lies within 5 % of the best of the other, and its uncertainty after it within 5 %."""
 
     def fails(values):
-        return (cycles_until(ASKED, values[:, :2], values[:, 2], REFERENCE) < ASKED.cycles).astype(float)
+        return (cycles_to_failure(ASKED, values[:, :2], values[:, 2], REFERENCE) < ASKED.cycles).astype(float)
 
     def wear(values):
         return values[:, 2]
 
     (known, drawn), target = population, wear if asked is None else fails
-    best, *_ = next_inspections(known, drawn, asked, 1)
+    best, *_ = rank_next_inspections(known, drawn, asked, 1)
     before = np.array([target(each).var(ddof=1) for each in drawn.cables.transpose(1, 0, 2)])
     after = weighed(known, drawn, target)
     gained, chosen = before - after, known.cables.index(best.cable)
@@ -205,16 +213,20 @@ def test_what_to_inspect_next_is_what_pooling_again_after_every_inspection_says(
     Variances of 60 fleets pooled again are known to some 10 % a cable; the chosen one gains no less than 0.8 of the best.
     """
     fleet, _ = fleet_draws(15, cables=6, cycles=(0.0, 50_000.0), truth=Truth(wear_spread=0.15))
-    known = given(fleet)
+    known = select_inspections(fleet)
     inspected, s = known.inspected, known.inspected.summaries
     scale, freedom = np.median(s.scale, axis=0), float(np.median(s.freedom))
     generator, after, targets = np.random.default_rng(2), [], []
 
     def target(values):
-        return values[:, 2] if asked is None else cycles_until(asked, values[:, :2], values[:, 2], REFERENCE) < asked.cycles
+        return (
+            values[:, 2]
+            if asked is None
+            else cycles_to_failure(asked, values[:, :2], values[:, 2], REFERENCE) < asked.cycles
+        )
 
     drawn = draw_population(inspected, 1)
-    (best, *_) = next_inspections(known, drawn, asked, 1)
+    (best, *_) = rank_next_inspections(known, drawn, asked, 1)
     for i in range(6):
         left, values = [], drawn.cables[:, i]
         targets.append(target(values).var())
@@ -244,10 +256,10 @@ def test_what_to_inspect_next_is_what_pooling_again_after_every_inspection_says(
 def test_a_normal_sample_passes_and_two_heaps_do_not():
     """Of 400 normal samples of 20, 1 % at most; 13 would be chance in a thousand. Two heaps six spreads apart are seen."""
     generator = np.random.default_rng(5)
-    small = sum(anderson_darling(generator.standard_normal(20)) < 0.01 for _ in range(400))
+    small = sum(anderson_darling_p_value(generator.standard_normal(20)) < 0.01 for _ in range(400))
     assert small <= 13
     heaps = generator.standard_normal(20) + 6 * (np.arange(20) % 2)
-    assert anderson_darling(heaps) < 0.01
+    assert anderson_darling_p_value(heaps) < 0.01
 
 
 def made_of(shift, error=1.0):
@@ -264,7 +276,7 @@ def made_of(shift, error=1.0):
 def test_the_probability_of_a_cable_as_far_off_is_the_share_of_simulated_ones(shift):
     """Of 400,000 cables of the population, each with errors of its own; within 6 % and four standard errors."""
     inspected, population = made_of(shift)
-    ((found,), generator, count) = chances(inspected, population, 1, (0,)), np.random.default_rng(9), 400_000
+    ((found,), generator, count) = outlier_p_values(inspected, population, 1, (0,)), np.random.default_rng(9), 400_000
     which = generator.integers(1000, size=count)
     mean, spread = population.mean[which], population.spread[which]
     design, scale = inspected.design.reshape(6, 3), block_diag(*inspected.summaries.scale)
@@ -285,37 +297,39 @@ def test_the_probability_of_a_cable_as_far_off_is_the_share_of_simulated_ones(sh
 
 def test_one_among_ten_thousand_cables_can_be_named():
     """Seven spreads off, by Holm's procedure; four spreads off it may be one of them. Both are known to a few percent."""
-    far, near = (chances(*made_of(shift, 0.1), 1, (0,))[0] for shift in (1.6, 0.9))
+    far, near = (outlier_p_values(*made_of(shift, 0.1), 1, (0,))[0] for shift in (1.6, 0.9))
     adjusted = [adjust_p_values(np.append(np.full(9_999, 0.5), p_value))[-1] for p_value in (far, near)]
     assert adjusted[0] < 0.05 < adjusted[1]
-    again = [chances(*made_of(1.6, 0.1), seed, (0,))[0] for seed in (2, 3)]
+    again = [outlier_p_values(*made_of(1.6, 0.1), seed, (0,))[0] for seed in (2, 3)]
     assert again == pytest.approx([far, far], rel=0.1) and far > 0
 
 
 def test_what_cannot_be_told_is_said(few):
     drawn = few
-    same = given(replace(drawn, cycles=np.zeros(36)))
+    same = select_inspections(replace(drawn, cycles=np.zeros(36)))
     assert same.inspected.cycles is None and "nothing is told of wear" in " ".join(same.notes)
     some = drawn.lubricated.copy()
     some[4] = np.nan
-    assert "does not say whether the cable was lubricated" in " ".join(given(replace(drawn, lubricated=some)).notes)
+    assert "does not say whether the cable was lubricated" in " ".join(
+        select_inspections(replace(drawn, lubricated=some)).notes
+    )
     undated = drawn.cycles.copy()
     undated[0] = np.nan
-    left = given(replace(drawn, cycles=undated)).left_out
+    left = select_inspections(replace(drawn, cycles=undated)).left_out
     assert [each.inspection for each in left] == ["cable-01 after 0 cycles"] and "how many cycles" in left[0].why
     trusted = drawn.stats["trusted"].copy()
     trusted[5] = 0
-    (left,) = given(replace(drawn, stats=drawn.stats | {"trusted": trusted})).left_out
+    (left,) = select_inspections(replace(drawn, stats=drawn.stats | {"trusted": trusted})).left_out
     assert "must not be trusted" in left.why
     with pytest.raises(bf.StoreError, match="no friction coefficient"):
-        given(replace(drawn, attributes={name: {"role": "noise"} for name in drawn.values}))
+        select_inspections(replace(drawn, attributes={name: {"role": "noise"} for name in drawn.values}))
 
 
 def test_coefficients_that_mean_different_things_are_pooled_apart(few):
     drawn = few
     shape = np.array(["one"] * 18 + ["two"] * 18, dtype=object)
     about = dict(drawn.about) | {"meanings": {"one": {"mu_0": "sheath"}, "two": {"mu_0": "ring"}}}
-    apart = given(replace(drawn, stats=drawn.stats | {"shape": shape}, about=about))
+    apart = select_inspections(replace(drawn, stats=drawn.stats | {"shape": shape}, about=about))
     assert apart.coefficients == ("mu_0 (1)", "mu_0 (2)", "mu_1")
     assert "mu_0 (2) is ring" in " ".join(apart.notes)
     assert apart.inspected.known.sum(axis=0).tolist() == [18, 18, 36]
@@ -370,7 +384,10 @@ def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, an
     """The command asks for what was found, of the draws in the file; the slow one draws it anew."""
 
     def as_found(drawn, asked, seed, measurements):
-        assert asked == replace(ASKED, wrap_angles=pytest.approx(ASKED.wrap_angles)) and (seed, measurements) == (1, None)
+        assert asked == replace(ASKED, wrap_angles=pytest.approx(ASKED.wrap_angles)) and (seed, measurements) == (
+            1,
+            None,
+        )
         assert all(np.array_equal(drawn.values[name], draws) for name, draws in fleet[0].values.items())
         return found
 
@@ -381,7 +398,7 @@ def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, an
     code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")
     page = json.loads(out)
     assert code == 0 and page["is_trusted"] and len(page["cables"]) == 12
-    assert page["new"]["fails"] == found.new.fails
+    assert page["new"]["fails"] == found.new_cable.fails
     page_file = (tmp_path / "out" / "pool.html").read_text()
     assert "cable-03 is unlike the rest" in page_file and page_file.count("<img") == 3
     assert json.loads((tmp_path / "out" / "pool.json").read_text()) == page
@@ -394,7 +411,7 @@ def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, an
 def test_one_cable_has_no_population():
     drawn, _ = fleet_draws(1, cables=1)
     alone = pool(drawn, ASKED)
-    assert alone.new is None and not alone.unlike and not alone.spreads
+    assert alone.new_cable is None and not alone.outliers and not alone.spreads
     assert "one cable only" in pool_text(alone)
 
 
@@ -402,7 +419,7 @@ def test_one_cable_has_no_population():
 def test_fleets_without_and_with_nothing_in_common():
     """Of one kind to the last digit, and of two times the spread that anybody expects."""
     alike = pool(fleet_draws(21, truth=Truth(spread=0.0, wear_spread=0.0))[0])
-    assert "all cables are alike" in pool_text(alike) and not alike.unlike
+    assert "all cables are alike" in pool_text(alike) and not alike.outliers
     unlike = pool(fleet_draws(22, cables=16, truth=Truth(spread=1.0))[0])
     assert "All cables are unlike in mu_0" in pool_text(unlike)
 
@@ -411,6 +428,6 @@ def test_fleets_without_and_with_nothing_in_common():
 def test_two_makes_pooled_as_one_are_seen():
     drawn, _ = fleet_draws(11, cables=20, shifts=dict.fromkeys(range(10), 1.5), truth=Truth(spread=0.15))
     found = pool(drawn)
-    assert found.mixed and "do not look like one population" in pool_text(found)
+    assert found.mixtures and "do not look like one population" in pool_text(found)
     alike, _ = fleet_draws(12, cables=20)
-    assert not pool(alike).mixed
+    assert not pool(alike).mixtures

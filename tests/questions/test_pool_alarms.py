@@ -25,7 +25,10 @@ def like_cables(seed, cables, inspections=3, error=0.03, freedom=5.0, draws=0, s
     g = np.random.default_rng(seed)
     start = np.log([0.1, 0.15]) + 0.2 * g.standard_normal((cables, COUNT))
     start[0] += shift
-    wear, cycles = 0.2 + 0.08 * g.standard_normal(cables), np.linspace(0, 1, inspections) if inspections > 1 else np.zeros(1)
+    wear, cycles = (
+        0.2 + 0.08 * g.standard_normal(cables),
+        np.linspace(0, 1, inspections) if inspections > 1 else np.zeros(1),
+    )
     oiled = (g.uniform(size=(cables, inspections)) < 0.5) * 1.0
     true = (start[:, None] + (wear[:, None] * cycles - 0.2 * oiled)[..., None]).reshape(-1, COUNT)
     root = (np.exp(g.normal(np.log(error), 0.3, (len(true), 1))) * np.array([1.0, 2.0]))[:, :, None] * TURNED
@@ -40,7 +43,9 @@ def like_cables(seed, cables, inspections=3, error=0.03, freedom=5.0, draws=0, s
         log = -np.sum(((likely - MEAN) / SD) ** 2, axis=2) / 2
         weights = np.exp(log - log.max(axis=1, keepdims=True))
         rows = [g.choice(len(w), draws, p=w / w.sum()) for w in weights]
-        summaries = summarize_likelihoods(np.stack([each[row] for each, row in zip(likely, rows, strict=True)]), MEAN, SD)
+        summaries = summarize_likelihoods(
+            np.stack([each[row] for each, row in zip(likely, rows, strict=True)]), MEAN, SD
+        )
     else:
         summaries = Summaries(seen, root @ root.transpose(0, 2, 1), np.full(len(true), freedom))
     worn = np.tile(cycles, cables) if inspections > 1 else None
@@ -57,7 +62,7 @@ def least_chances(fleets, seed, sweeps=600):
         def without(cables, fleet=fleet, i=i):
             return gibbs([fleet], [cables], seed + i, sweeps)[0]
 
-        found.append(unlike.judged(fleet, population, without, seed)[1])
+        found.append(unlike.separate_outliers(fleet, population, without, seed)[1])
     return np.array([chances.min() for chances in found]), found
 
 
@@ -73,7 +78,7 @@ def test_who_is_named_is_unlike_a_population_that_was_drawn_without_it(monkeypat
     named = [(i, int(cable)) for i, each in enumerate(found) for cable in np.flatnonzero(each < unlike.FALSE_ALARM)]
     others = gibbs([fleets[i] for i, _ in named], [(cable,) for _, cable in named], 77)
     for (i, cable), population in zip(named, others, strict=True):
-        assert 8 * unlike.chances(fleets[i], population, 2, (cable,))[cable] < 2 * unlike.FALSE_ALARM
+        assert 8 * unlike.outlier_p_values(fleets[i], population, 2, (cable,))[cable] < 2 * unlike.FALSE_ALARM
 
 
 def test_a_cable_that_is_unlike_few_others_is_found(monkeypatch):
@@ -89,7 +94,7 @@ def test_what_is_off_is_what_its_own_inspections_say(monkeypatch):
     monkeypatch.setattr(unlike, "_POPULATIONS", 250)
     fleet = like_cables([5, 0], 20, inspections=1, freedom=3.0, shift=2.0)
     (core,) = gibbs([fleet], [(0,)], 5, 600)
-    number, off = unlike.departure(fleet, core, 0, 1)
+    number, off = unlike.find_departure(fleet, core, 0, 1)
     assert number in (0, 1) and 6 < off < 15
 
 

@@ -23,7 +23,7 @@ from bowdenfit.inference.population.model import (
     log_likelihood,
 )
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool.inspected import given
+from bowdenfit.questions.pool.inspected import select_inspections
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import read_fleet_draws
 
@@ -47,7 +47,7 @@ def test_pooled_draws_are_those_of_all_readings_at_once(cables, tmp_path):
         made, truth = simulate_fleet(plan, 20 + cables)
         write_fleet(plan, made, truth, tmp_path / "fleet")
         bf.fleet(tmp_path / "fleet", output=tmp_path / "fits", seed=1)
-        known = given(read_fleet_draws(tmp_path / "fits"))
+        known = select_inspections(read_fleet_draws(tmp_path / "fits"))
         pooled = draw_population(known.inspected, 2)
         joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, pooled, 800, 3)
     every = joint.population.transpose(2, 0, 1)
@@ -63,7 +63,11 @@ def test_pooled_draws_are_those_of_all_readings_at_once(cables, tmp_path):
     single = joint.cables.reshape(-1, *joint.cables.shape[2:])
     of_cables = np.abs(pooled.cables.mean(axis=0) - single.mean(axis=0)) / single.std(axis=0)
     widths = np.abs(pooled.cables.std(axis=0) / single.std(axis=0) - 1)
-    print("cables", np.quantile(of_cables, (0.5, 0.9, 1), axis=0).round(3), np.quantile(widths, (0.5, 0.9, 1), axis=0).round(3))
+    print(
+        "cables",
+        np.quantile(of_cables, (0.5, 0.9, 1), axis=0).round(3),
+        np.quantile(widths, (0.5, 0.9, 1), axis=0).round(3),
+    )
     assert np.all(np.abs(away) < 0.2) and np.all(np.abs(wider) < 0.15)
     assert np.all(np.quantile(of_cables, 0.9, axis=0) < 0.2) and np.all(np.quantile(widths, 0.9, axis=0) < 0.15)
 
@@ -72,11 +76,16 @@ def drawn_fleet(generator, cables=20, inspections=3, draws=768):
     """Truths from the priors, and draws of single fits of them: t-distributed errors, under the prior of single fits."""
     count = 2
     mean = PRIOR_MEAN + PRIOR_SD * generator.standard_normal(count)
-    spread, wear_spread = (abs(sd * generator.standard_normal(n)) for sd, n in ((SPREAD.sd, count), (WEAR_SPREAD.sd, 1)))
+    spread, wear_spread = (
+        abs(sd * generator.standard_normal(n)) for sd, n in ((SPREAD.sd, count), (WEAR_SPREAD.sd, 1))
+    )
     wear, oil = WEAR.sd * generator.standard_normal(), LUBRICATION.sd * generator.standard_normal()
     start = mean + spread * generator.standard_normal((cables, count))
     wears = wear + wear_spread * generator.standard_normal(cables)
-    cycles, oiled = np.tile(np.linspace(0, 1, inspections), cables), generator.integers(0, 2, cables * inspections) * 1.0
+    cycles, oiled = (
+        np.tile(np.linspace(0, 1, inspections), cables),
+        generator.integers(0, 2, cables * inspections) * 1.0,
+    )
     cable = np.repeat(np.arange(cables), inspections)
     true = start[cable] + (wears[cable] * cycles + oil * oiled)[:, None]
     error = np.exp(generator.normal(np.log(0.05), 0.5, (len(cable), 1))) * np.array([1.0, 2.0])
@@ -126,7 +135,9 @@ def test_ranks_of_truths_are_uniform_over_fleets():
             ranks.append([np.mean(draws < truth) + ties.uniform() * np.mean(draws == truth) for draws, truth in pairs])
             if fleet % 20 == 19:
                 tests = [float(stats.kstest(column, "uniform").pvalue) for column in np.array(ranks).T]
-                print(fleet + 1, "fleets; p of uniform ranks", np.round(tests, 4), "mean", np.mean(ranks, axis=0).round(3))
+                print(
+                    fleet + 1, "fleets; p of uniform ranks", np.round(tests, 4), "mean", np.mean(ranks, axis=0).round(3)
+                )
     assert min(stats.kstest(column, "uniform").pvalue for column in np.array(ranks).T) > 0.001
 
 
@@ -140,7 +151,7 @@ def test_without_a_population_cables_are_as_single_fits_say():
     with jax.enable_x64(True):
         prior = {"mean": inspected.prior_mean, "spread": inspected.prior_sd, "effects": np.zeros(2)}
 
-        def cables_of(z):
+        def cables_at(z):
             return density.cables_at(z, inspected.data, prior)
 
         z = 1.5 * generator.standard_t(3, (100_000, density.size))  # tails as heavy as those of single fits
@@ -161,7 +172,7 @@ def test_without_a_population_cables_are_as_single_fits_say():
 def test_the_density_is_that_of_the_model_written_out():
     """Differences of the log density between points, against the model in SciPy's words; no coordinates are shared."""
     drawn, _ = fleet_draws(4, cables=3, draws=256)
-    inspected = given(drawn).inspected
+    inspected = select_inspections(drawn).inspected
     summaries = inspected.summaries
     density = PopulationDensity(2, True, ("lubrication",), 3)
 

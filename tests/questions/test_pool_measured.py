@@ -12,8 +12,8 @@ from joint_fleets import joint_draws
 import bowdenfit as bf
 from bowdenfit.inference.population.sampling import draw_population
 from bowdenfit.questions.pool import pooling
-from bowdenfit.questions.pool.inspected import given
-from bowdenfit.questions.pool.worth import readings_of, worth
+from bowdenfit.questions.pool.inspected import select_inspections
+from bowdenfit.questions.pool.worth import count_effective_draws, load_readings
 from bowdenfit.results.fleet_folder import FLEET_TABLE, read_fleet_draws
 
 pytestmark = pytest.mark.extended
@@ -38,10 +38,17 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
     """Differences between points: the log density of the fit, without the prior of what is pooled."""
     folder, fits = fleet
     with jax.enable_x64(True):
-        known = given(read_fleet_draws(fits))
-        (part,) = readings_of(known, (1, 0), folder)
-        posterior, space, z = part.posterior, part.posterior.model.space, np.random.default_rng(1).standard_normal((3, 2, 4))
-        assert part.names == {"mu_sheath": 0, "mu_edge": 1} and [space.free[i].name for i in part.others] == ["tau", "sigma_F"]
+        known = select_inspections(read_fleet_draws(fits))
+        (part,) = load_readings(known, (1, 0), folder)
+        posterior, space, z = (
+            part.posterior,
+            part.posterior.model.space,
+            np.random.default_rng(1).standard_normal((3, 2, 4)),
+        )
+        assert part.names == {"mu_sheath": 0, "mu_edge": 1} and [space.free[i].name for i in part.others] == [
+            "tau",
+            "sigma_F",
+        ]
         differences = []
         for point in z:
             pairs = list(zip(point, part.data, strict=True))
@@ -68,9 +75,12 @@ def test_measurements_that_are_not_those_of_the_fleet_are_refused(run, fleet, tm
     folder, fits = fleet
     shutil.copytree(folder, tmp_path / "other")
     (tmp_path / "other" / FLEET_TABLE).write_text((folder / FLEET_TABLE).read_text().replace("01-0.csv", "02-0.csv"))
-    known = given(read_fleet_draws(fits))
-    with jax.enable_x64(True), pytest.raises(bf.StoreError, match="does not hold what cable-01 after 0 cycles was fitted from"):
-        readings_of(known, (0, 1), tmp_path / "other")
+    known = select_inspections(read_fleet_draws(fits))
+    with (
+        jax.enable_x64(True),
+        pytest.raises(bf.StoreError, match="does not hold what cable-01 after 0 cycles was fitted from"),
+    ):
+        load_readings(known, (0, 1), tmp_path / "other")
     code, _, error = run("pool", fits, "--measurements", tmp_path / "none")
     assert code == 2 and "is no folder" in " ".join(error.split())
 
@@ -117,11 +127,15 @@ def test_cables_pooled_by_their_readings_are_those_of_all_readings_at_once(tmp_p
     write_few(tmp_path / "fleet", np.random.default_rng([2, 0]))
     bf.fleet(tmp_path / "fleet", output=tmp_path / "fits", seed=1)
     with jax.enable_x64(True):
-        known = given(read_fleet_draws(tmp_path / "fits"))
-        rows = np.flatnonzero(worth(known, draw_population(known.inspected, 2)) < pooling.LEAST)
+        known = select_inspections(read_fleet_draws(tmp_path / "fits"))
+        rows = np.flatnonzero(
+            count_effective_draws(known, draw_population(known.inspected, 2)) < pooling.LEAST_EFFECTIVE_DRAWS
+        )
         mine = sorted({int(known.inspected.cable[j]) for j in rows})
         assert mine
-        ours = draw_population(known.inspected, 2, readings=readings_of(known, list(map(int, rows)), tmp_path / "fleet"))
+        ours = draw_population(
+            known.inspected, 2, readings=load_readings(known, list(map(int, rows)), tmp_path / "fleet")
+        )
         joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, ours, 500, 3)
     theirs = joint.cables.reshape(-1, *joint.cables.shape[2:])[:, mine]
     cables = ours.cables[:, mine]

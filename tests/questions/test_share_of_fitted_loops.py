@@ -10,10 +10,10 @@ from mounted_loops import ANGLE, RADIUS, fitted, measured
 
 from bowdenfit.description.device import read_device
 from bowdenfit.device.control import Controller
-from bowdenfit.device.motion import Hand, simulate
+from bowdenfit.device.motion import Hand, simulate_device
 from bowdenfit.device.plant import Motion, Plant
-from bowdenfit.device.transmission import Transmission
-from bowdenfit.questions.compensate.ranking import compensation_of
+from bowdenfit.device.transmission import LoopTransmission
+from bowdenfit.questions.compensate.ranking import estimate_compensation
 
 pytestmark = pytest.mark.extended
 
@@ -34,7 +34,7 @@ def fed_forward(records, device):
     """Torque that is chosen for each cable, and what would be without the scatter of mountings [N m]."""
     fed = []
     for record in records:
-        answer, draws = compensation_of(record, device, ((ANGLE, "rad"), (ANGLE, "rad")), "karnopp", 0.05)
+        answer, draws = estimate_compensation(record, device, ((ANGLE, "rad"), (ANGLE, "rad")), "karnopp", 0.05)
         assert answer.scatter_from_fit
         forgotten = answer.share_without_scatter * (np.median(draws.without_mounting[:, 0]) + MOTOR)
         fed.append((answer.scheduled.torque, forgotten))
@@ -44,12 +44,12 @@ def fed_forward(records, device):
 def goes_on(exponent, preload, fed):
     """Whether each cable, pushed and let go, moves by itself with each torque."""
     shape = np.broadcast_to(exponent[:, None], fed.shape)
-    loop = Transmission(20.0, np.broadcast_to(RADIUS * preload[:, None], fed.shape), shape)
+    loop = LoopTransmission(20.0, np.broadcast_to(RADIUS * preload[:, None], fed.shape), shape)
     plant = Plant(loop, 7e-4, DAMPING, MOTOR, 1e-3, DAMPING, 0.02)
     pushed = np.full(fed.shape, 2 * DEAD_ZONE)
     start = replace(Motion.at_rest(np.zeros(fed.shape)), motor_speed=pushed, joint_speed=pushed)
     control = Controller(fed, DEAD_ZONE, 0.0, 0.0, 0.0, 0.0, 2 * np.pi / 2000, 6e-3, 2.5)
-    seen = simulate(plant, control, Hand(0.0, 0.0), np.zeros((2500, 2)), start=start)
+    seen = simulate_device(plant, control, Hand(0.0, 0.0), np.zeros((2500, 2)), start=start)
     return np.abs(seen.speed[-50:]).max(axis=0) > 0.5 * DEAD_ZONE
 
 

@@ -14,7 +14,7 @@ from fuzzing_results import SHAPES, begun_fleet, resume_fleet
 
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
-from bowdenfit.questions.fleet.store import KEPT
+from bowdenfit.questions.fleet.store import PIECES_FOLDER
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
 from bowdenfit.results.netcdf import read_groups, write_groups
 from bowdenfit.results.serialization import read_arrays
@@ -129,7 +129,7 @@ def test_a_checkpoint_and_pieces_of_a_fleet_hold_no_such_arrays(tmp_path, what):
     with pytest.raises(bf.StoreError, match=r"chain\.checkpoint is damaged"):
         read_records(path, SHAPES)
     folder = begun_fleet(tmp_path / "fleet")
-    (piece,) = (folder / KEPT).glob("*.npz")
+    (piece,) = (folder / PIECES_FOLDER).glob("*.npz")
     shutil.copy(tmp_path / "x.npz", piece)
     resume_fleet(folder)  # which fits it again
     assert not piece.exists()

@@ -9,7 +9,14 @@ import numpy as np
 
 from bowdenfit.physics.friction import force_from_scale, force_scale, play_operator, rate_factor
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
-from bowdenfit.questions.export.transmission import DRAW, LEVELS, About, Level, Places, Transmission
+from bowdenfit.questions.export.transmission import (
+    DRAW,
+    LEVELS,
+    FitLabel,
+    FrictionLevel,
+    TablePoints,
+    TransmissionTables,
+)
 
 HOSTILE = (
     "*/ int x; /* ??/ \\ \n#error </x> & ]]> --> <!-- \" ' : - { [ # %{ %} ... \r\u2028\x1b[31m \u202e $about ${place} "
@@ -18,7 +25,7 @@ HOSTILE = (
 CASES = ("loop", "rope", "load", "rate", "stroke", "one place")
 
 
-def cable(case: str, draws: int = 3, name: str = "test cable") -> Transmission:
+def cable(case: str, draws: int = 3, name: str = "test cable") -> TransmissionTables:
     """A cable of one of the `CASES`, with friction that differs by level and place."""
     rng = np.random.default_rng(CASES.index(case))
     at = np.sort(rng.uniform(0.2, 3.0, 1 if case == "one place" else 37))
@@ -27,29 +34,33 @@ def cable(case: str, draws: int = 3, name: str = "test cable") -> Transmission:
         exponent = (0.05 + 0.02 * i) * at * (1 + 0.1 * rng.standard_normal(at.shape))
         both = np.stack([exponent, exponent * (0.9 if case == "stroke" else 1.0)])
         levels.append(
-            Level(
+            FrictionLevel(
                 called, both, 2 * (10 + i + at) * exponent if case == "loop" else 0 * at,
                 (0.0 if i == 1 else 0.1 * i) if case == "load" else 0.0, 0.5 * i if case == "load" else 0.0,
                 (0.3 + 0.01 * i, 4.0, 0.002) if case == "rate" else (0.0, 1.0, 0.0),
             )
         )  # fmt: skip
-    places = Places("place", "", np.zeros(1)) if case == "one place" else Places("wrap_angle", "rad", at)
-    about = About(name, 7, "0.1.0", "2026-01-01T00:00:00+00:00", ("loads 5 to 200 N",))
-    options = {"load": ("drag", "load-dependent"), "rate": ("rate-dependent",), "stroke": ("stroke-dependent",)}.get(case, ())
+    places = TablePoints("place", "", np.zeros(1)) if case == "one place" else TablePoints("wrap_angle", "rad", at)
+    about = FitLabel(name, 7, "0.1.0", "2026-01-01T00:00:00+00:00", ("loads 5 to 200 N",))
+    options = {"load": ("drag", "load-dependent"), "rate": ("rate-dependent",), "stroke": ("stroke-dependent",)}.get(
+        case, ()
+    )
     speed = (20.0, "mm/s") if case == "rate" else (0.0, "")
-    return Transmission(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
+    return TransmissionTables(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
 
 
-def with_rope(found: Transmission, stiffness: float = 100.0, radii: tuple[float, float] = (15.0, 20.0)) -> Transmission:
+def with_rope(
+    found: TransmissionTables, stiffness: float = 100.0, radii: tuple[float, float] = (15.0, 20.0)
+) -> TransmissionTables:
     """The same, of a rope whose stiffness is known [N/mm], on pulleys [mm]."""
-    by_place = stiffness * (1 + 0.1 * np.arange(len(found.places.at)) / len(found.places.at))
+    by_place = stiffness * (1 + 0.1 * np.arange(len(found.points.values)) / len(found.points.values))
     return replace(found, levels=tuple(replace(level, stiffness=by_place) for level in found.levels), radii=radii)
 
 
-def points(found: Transmission, n: int, seed: int) -> dict[str, np.ndarray]:
+def points(found: TransmissionTables, n: int, seed: int) -> dict[str, np.ndarray]:
     """Questions of all kinds: any level, places inside and outside the range, forces of every size."""
     rng = np.random.default_rng(seed)
-    low, high = found.places.at[0], found.places.at[-1]
+    low, high = found.points.values[0], found.points.values[-1]
     force = np.exp(rng.uniform(np.log(0.1), np.log(2000.0), n))
     return {
         "level": rng.integers(0, len(found.levels), n),
@@ -60,16 +71,16 @@ def points(found: Transmission, n: int, seed: int) -> dict[str, np.ndarray]:
     }
 
 
-def _there(found: Transmission, asked: dict[str, np.ndarray], stroke: np.ndarray):
+def _there(found: TransmissionTables, asked: dict[str, np.ndarray], stroke: np.ndarray):
     """Exponent and taut loss of each question."""
-    at, places = asked["place"], found.places.at
+    at, places = asked["place"], found.points.values
     exponent, taut = np.zeros(len(at)), np.zeros(len(at))
     for k, level in enumerate(found.levels):
         for row, sign in enumerate((1.0, -1.0)):
             mine = (asked["level"] == k) & (stroke == sign)
             exponent[mine] = np.interp(at[mine], places, level.exponent[row])
             taut[mine] = np.interp(at[mine], places, level.taut_loss)
-    if found.of_rate:
+    if found.depends_on_rate:
         rate = [_of_levels(found, asked, [level.rate[i] for level in found.levels]) for i in range(3)]
         reference = jnp.asarray(found.reference_speed)
         ratio = jax.vmap(lambda speed, *rate: rate_factor(speed, *rate) / rate_factor(reference, *rate))
@@ -77,12 +88,12 @@ def _there(found: Transmission, asked: dict[str, np.ndarray], stroke: np.ndarray
     return exponent, taut
 
 
-def _of_levels(found: Transmission, asked: dict[str, np.ndarray], numbers: Sequence[float]) -> jax.Array:
+def _of_levels(found: TransmissionTables, asked: dict[str, np.ndarray], numbers: Sequence[float]) -> jax.Array:
     """The number of each question's level."""
     return jnp.asarray(np.array(numbers)[asked["level"]])
 
 
-def of_equations(found: Transmission, asked: dict[str, np.ndarray], *, inverse: bool = False) -> np.ndarray:
+def of_equations(found: TransmissionTables, asked: dict[str, np.ndarray], *, inverse: bool = False) -> np.ndarray:
     """Output forces (input forces) by `bowdenfit.physics`."""
     stroke, force = asked["stroke"], asked["force"]
     exponent, taut = _there(found, asked, stroke)
@@ -101,7 +112,7 @@ def of_equations(found: Transmission, asked: dict[str, np.ndarray], *, inverse: 
     return np.maximum(np.asarray(answers), 0.0)
 
 
-def followed(found: Transmission, level: int, place: float, speed: float, force: np.ndarray) -> np.ndarray:
+def followed(found: TransmissionTables, level: int, place: float, speed: float, force: np.ndarray) -> np.ndarray:
     """Output forces through a motion, from the middle of the band on, by the package's play operator on its own scale."""
     n = len(force)
     asked = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
@@ -115,7 +126,7 @@ def followed(found: Transmission, level: int, place: float, speed: float, force:
     return np.asarray(force_from_scale(play_operator(low, high, start)[0], *scale))
 
 
-def motion(found: Transmission, n: int) -> np.ndarray:
+def motion(found: TransmissionTables, n: int) -> np.ndarray:
     """An input force that goes to and fro by much and little."""
     t = np.linspace(0, 1, n)
     walk = np.sin(40 * t) + 0.3 * np.sin(313 * t) + 0.05 * np.sin(2011 * t)

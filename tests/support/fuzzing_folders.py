@@ -13,7 +13,7 @@ from mangling import DESCRIPTIONS, ODD_CELLS, TABLES
 import bowdenfit as bf
 from bowdenfit.description.device import read_device
 from bowdenfit.description.device_keys import KEYS
-from bowdenfit.questions.fleet.cases import read_cases, refuse_where_none
+from bowdenfit.questions.fleet.cases import read_cases, refuse_if_none_usable
 from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.metabolic.words import metabolic_text
 from bowdenfit.results.serialization import plain_data
@@ -110,7 +110,7 @@ def meet_fleet(folder: Path) -> None:
     with jax.enable_x64(True):
         cases = list(read_cases(folder, read_inspections(folder), {}))
     broken = [each for each in cases if hasattr(each, "why")]
-    refuse_where_none([each for each in cases if not hasattr(each, "why")], broken)
+    refuse_if_none_usable([each for each in cases if not hasattr(each, "why")], broken)
     for each in broken:
         if len(each.why) > 2000 or "Traceback" in each.why:
             raise Wrong(each.why)

@@ -24,7 +24,7 @@ from bowdenfit.inference.engines import versions
 from bowdenfit.inference.ensemble import CheckpointedBackend
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
-from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, begun_before
+from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.results import folder as names
 from bowdenfit.results.answer_cache import file_checksum, read_answers
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
@@ -200,7 +200,7 @@ def begun_fleet(place: Path) -> Path:
 
 def resume_fleet(folder: Path) -> None:
     """What `fleet --resume` reads."""
-    before = begun_before(folder)
+    before = read_start(folder)
     found = FleetStore(folder, {"seed": int(before["seed"]), "versions": versions()}).open(resume=True, force=False)
     assert all(isinstance(fit, PieceFit) and fit.values.ndim == 2 for fit in found.values())
 

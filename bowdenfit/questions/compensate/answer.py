@@ -1,10 +1,11 @@
 """How much friction may be hidden: what is fed forward and fed back, with which probability, and what is left to feel."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.compensate.simulated import Simulated
+from bowdenfit.questions.compensate.simulated import DeviceSimulation
 
 ROPE_DAMPING = "the damping of the rope"
 """The input that usually decides the largest gain, and that a ring-down tells."""
@@ -30,7 +31,7 @@ class FeedForward(Part):
 
 
 @dataclass(frozen=True, repr=False)
-class Bend(Part):
+class BendCompensation(Part):
     """What is known at one wrap angle.
 
     Args:
@@ -48,7 +49,7 @@ class Bend(Part):
 
 
 @dataclass(frozen=True, repr=False)
-class Gain(Part):
+class FeedbackGain(Part):
     """K_f on the torque measured at the joint.
 
     Args:
@@ -75,7 +76,7 @@ class Gain(Part):
 
 
 @dataclass(frozen=True, repr=False)
-class Preload(Part):
+class PreloadOption(Part):
     """What another preload would do.
 
     Args:
@@ -85,8 +86,10 @@ class Preload(Part):
     """
 
     preload: float
-    felt: Interval
+    friction: Interval
     slack_from: Interval
+
+    JSON: ClassVar = ("preload", ("felt", "friction"), "slack_from")
 
 
 @dataclass(frozen=True, repr=False)
@@ -128,15 +131,15 @@ class Compensation(Display):
     fixed: FeedForward | None
     scheduled: FeedForward | None
     share_without_scatter: float
-    by_bend: tuple[Bend, ...]
-    gain: Gain | None
+    by_bend: tuple[BendCompensation, ...]
+    gain: FeedbackGain | None
     missing: tuple[str, ...]
-    preloads: tuple[Preload, ...]
+    preloads: tuple[PreloadOption, ...]
     slack: float
-    simulated: Simulated | None = None
+    simulated: DeviceSimulation | None = None
 
     @property
-    def most(self) -> Bend:
+    def most(self) -> BendCompensation:
         """The bend at which friction is most."""
         return max(self.by_bend, key=lambda bend: bend.friction.median)
 

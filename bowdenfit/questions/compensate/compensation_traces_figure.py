@@ -12,7 +12,7 @@ from bowdenfit.words import counted
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.compensate.answer import Compensation
-    from bowdenfit.questions.compensate.simulated import Law
+    from bowdenfit.questions.compensate.simulated import SimulatedLaw
 
 HEADING = "Torques while a hand moves the device"
 _TITLES = {NONE: "Nothing hidden", KARNOPP: "Fed forward", ACTIVE: "Fed back"}
@@ -20,9 +20,9 @@ _HEIGHT = 1.9  # in
 _TORQUE = "Torque (N m)"
 
 
-def caption(found: Compensation) -> str:
+def caption(answer: Compensation) -> str:
     """What is drawn, in plain words."""
-    n = len(found.simulated.laws) if found.simulated is not None else 0
+    n = len(answer.simulated.laws) if answer.simulated is not None else 0
     return (
         "Simulated torques at the motor and at the joint while a hand moves the device to and fro, a panel for each way of "
         f"hiding friction. n = {counted(n, 'simulation')}."
@@ -30,19 +30,19 @@ def caption(found: Compensation) -> str:
 
 
 @in_paper_style
-def draw(found: Compensation) -> Figure:
+def draw(answer: Compensation) -> Figure:
     """Torques at motor and joint while a hand moves the device to and fro, a panel a law."""
-    seen = found.simulated
-    assert seen is not None  # asked only of a simulation
-    figure, shown = panels([_HEIGHT], len(seen.laws), TITLE, (0.25, 0), sharey=True)
-    for axes, law in zip(shown, seen.laws, strict=True):
-        _torques(axes, law)
-    shown[0].set_ylabel(_TORQUE)
-    legend_above(figure, shown, columns=2)
+    simulation = answer.simulated
+    assert simulation is not None  # asked only of a simulation
+    figure, axes_by_law = panels([_HEIGHT], len(simulation.laws), TITLE, (0.25, 0), sharey=True)
+    for axes, law in zip(axes_by_law, simulation.laws, strict=True):
+        _draw_torques(axes, law)
+    axes_by_law[0].set_ylabel(_TORQUE)
+    legend_above(figure, axes_by_law, columns=2)
     return figure
 
 
-def _torques(axes: Axes, law: Law) -> None:
+def _draw_torques(axes: Axes, law: SimulatedLaw) -> None:
     axes.plot(law.trace.time, law.trace.motor, color=BLUE, linewidth=0.9, label="At the motor")
     axes.plot(
         law.trace.time,

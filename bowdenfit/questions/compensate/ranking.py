@@ -5,16 +5,22 @@ from collections.abc import Mapping
 import numpy as np
 
 from bowdenfit.description.device import Device, Known
-from bowdenfit.device.coulomb import largest_share, moves_by_itself, shares
-from bowdenfit.device.known import drawn
+from bowdenfit.device.coulomb import largest_safe_share, moves_by_itself, safe_shares
+from bowdenfit.device.known import draw_device
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
-from bowdenfit.questions.compensate.answer import Bend, Compensation, FeedForward, Gain, Preload
-from bowdenfit.questions.compensate.gain import NEEDED, gain_of
+from bowdenfit.questions.compensate.answer import (
+    BendCompensation,
+    Compensation,
+    FeedbackGain,
+    FeedForward,
+    PreloadOption,
+)
+from bowdenfit.questions.compensate.gain import NEEDED, estimate_feedback_gain
 from bowdenfit.results.record import Record
 
-PRELOADS = np.array([0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])  # shares of the cable's own
-HELPING = (
+PRELOAD_RATIOS = np.array([0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])  # shares of the cable's own
+STABILIZING = (
     "motor.friction",
     "motor.damping",
     "joint.damping",
@@ -22,7 +28,7 @@ HELPING = (
 DEAD_ZONE, FILTER = "controller.dead_zone", "controller.filter_time"
 
 
-def compensation_of(
+def estimate_compensation(
     fit: Record, device: Device | None, stated: str | tuple[tuple[float, str], tuple[float, str]] | None, law: str | None,
     risk: float,
 ) -> tuple[Compensation, LoopDraws]:  # fmt: skip
@@ -41,25 +47,30 @@ def compensation_of(
     if law == "active":
         (device or Device(name="-")).needed("the gain of the active law", *NEEDED)
     bends = range_of_bends(fit, stated)
-    loop = loop_draws(fit, bends, device, PRELOADS)
-    known = device.known(*HELPING, DEAD_ZONE, FILTER) if device is not None else {}
-    dry, helping, zone = _helping(known, len(loop.friction), fit.provenance.seed)
-    felt = loop.friction + dry[:, None]
-    margin, nominal = felt + helping[:, None], np.median(felt, axis=0)
-    alone = loop.without_mounting + dry[:, None]
-    share = largest_share(margin, nominal, risk)
+    loop = loop_draws(fit, bends, device, PRELOAD_RATIOS)
+    known = device.known(*STABILIZING, DEAD_ZONE, FILTER) if device is not None else {}
+    motor_friction, damping, dead_zone = _draw_stabilizing(known, len(loop.friction), fit.provenance.seed)
+    friction = loop.friction + motor_friction[:, None]
+    margin, nominal = friction + damping[:, None], np.median(friction, axis=0)
+    without_mounting = loop.without_mounting + motor_friction[:, None]
+    share = largest_safe_share(margin, nominal, risk)
     constant = float(np.quantile(np.min(margin, axis=1), risk, method="lower"))
-    fixed, scheduled = (_fed(fed, margin, felt, bends) for fed in (np.full_like(nominal, constant), share * nominal))
-    gain, missing = (None, []) if law == "karnopp" else _gain(fit, device, loop, felt[:, np.argmax(nominal)], risk)
+    fixed, scheduled = (
+        _summarize_feed_forward(torque, margin, friction, bends)
+        for torque in (np.full_like(nominal, constant), share * nominal)
+    )
+    gain, missing = (
+        (None, []) if law == "karnopp" else _gain_or_missing(fit, device, loop, friction[:, np.argmax(nominal)], risk)
+    )
     answer = Compensation(
         fit.name, device.name if device is not None else "", law, (float(np.rad2deg(bends[0])), float(np.rad2deg(bends[-1]))),
-        risk, len(felt), loop.scatter, loop.scatter_from_fit, zone, _chatters_below(device, known),
+        risk, len(friction), loop.scatter, loop.scatter_from_fit, dead_zone, _chatters_below(device, known),
         fixed if law != "active" else None, scheduled if law != "active" else None,
-        largest_share(alone + helping[:, None], np.median(alone, axis=0), risk),
-        tuple(_bend(bends[i], felt[:, i], share * nominal[i], constant) for i in range(len(bends))),
+        largest_safe_share(without_mounting + damping[:, None], np.median(without_mounting, axis=0), risk),
+        tuple(_summarize_bend(bends[i], friction[:, i], share * nominal[i], constant) for i in range(len(bends))),
         gain, tuple(missing),
         tuple(
-            Preload(float(p), Interval.of(loop.felt[:, i]), Interval.of(loop.slack_from[:, i]))
+            PreloadOption(float(p), Interval.of(loop.felt[:, i]), Interval.of(loop.slack_from[:, i]))
             for i, p in enumerate(loop.references)
         ),
         float(np.mean(np.any(loop.preload <= 0, axis=1))),
@@ -67,11 +78,15 @@ def compensation_of(
     return answer, loop
 
 
-def _helping(known: Mapping[str, Known], n: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+def _draw_stabilizing(known: Mapping[str, Known], n: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Draws of F_m and of b dv [N m], and dv [rad/s]; nothing of what is not stated."""
-    draws, zero = drawn(known, n, seed), np.zeros(n)
-    zone = known[DEAD_ZONE].value if DEAD_ZONE in known else 0.0
-    return draws.get(HELPING[0], zero), sum((draws.get(name, zero) for name in HELPING[1:]), zero) * zone, zone
+    draws, zero = draw_device(known, n, seed), np.zeros(n)
+    dead_zone = known[DEAD_ZONE].value if DEAD_ZONE in known else 0.0
+    return (
+        draws.get(STABILIZING[0], zero),
+        sum((draws.get(name, zero) for name in STABILIZING[1:]), zero) * dead_zone,
+        dead_zone,
+    )
 
 
 def _chatters_below(device: Device | None, known: Mapping[str, Known]) -> float | None:
@@ -81,27 +96,31 @@ def _chatters_below(device: Device | None, known: Mapping[str, Known]) -> float 
     return device.count / known[FILTER].value
 
 
-def _gain(
-    fit: Record, device: Device | None, loop: LoopDraws, felt: np.ndarray, risk: float
-) -> tuple[Gain | None, list[str]]:
+def _gain_or_missing(
+    fit: Record, device: Device | None, loop: LoopDraws, friction: np.ndarray, risk: float
+) -> tuple[FeedbackGain | None, list[str]]:
     """The gain, or what would have to be stated for it."""
     if device is None:
         return None, list(NEEDED)
     missing = device.lacking(*NEEDED, *(("rope.stiffness",) if loop.stiffness is None else ()))
-    return (None, missing) if missing else (gain_of(fit, device, loop, felt, risk), [])
+    return (None, missing) if missing else (estimate_feedback_gain(fit, device, loop, friction, risk), [])
 
 
-def _fed(fed: np.ndarray, margin: np.ndarray, felt: np.ndarray, bends: np.ndarray) -> FeedForward:
+def _summarize_feed_forward(
+    torque: np.ndarray, margin: np.ndarray, friction: np.ndarray, bends: np.ndarray
+) -> FeedForward:
     """What is fed forward by bend."""
-    usual = np.median(felt, axis=0)
-    most = int(np.argmax(usual))
-    risk = float(np.mean(np.any(moves_by_itself(fed, margin, 0.0, 0.0), axis=1)))
-    limits = np.bincount(np.argmin(shares(margin, fed), axis=1)).argmax()
-    share = float(fed[most] / max(usual[most], 1e-300))
-    return FeedForward(share, float(fed[most]), risk, float(usual[most] - fed[most]), float(np.rad2deg(bends[limits])))
+    median = np.median(friction, axis=0)
+    most = int(np.argmax(median))
+    risk = float(np.mean(np.any(moves_by_itself(torque, margin, 0.0, 0.0), axis=1)))
+    limits = np.bincount(np.argmin(safe_shares(margin, torque), axis=1)).argmax()
+    share = float(torque[most] / max(median[most], 1e-300))
+    return FeedForward(
+        share, float(torque[most]), risk, float(median[most] - torque[most]), float(np.rad2deg(bends[limits]))
+    )
 
 
-def _bend(angle: float, felt: np.ndarray, scheduled: float, fixed: float) -> Bend:
-    known = Interval.of(felt)
-    left = known.median - scheduled, known.median - fixed
-    return Bend(float(np.rad2deg(angle)), known, float(scheduled), *map(float, left))
+def _summarize_bend(angle: float, friction: np.ndarray, scheduled: float, fixed: float) -> BendCompensation:
+    interval = Interval.of(friction)
+    left = interval.median - scheduled, interval.median - fixed
+    return BendCompensation(float(np.rad2deg(angle)), interval, float(scheduled), *map(float, left))

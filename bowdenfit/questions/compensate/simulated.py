@@ -1,28 +1,29 @@
 """The device through time: what its sensors show, as figures 9 to 11 of the haptic paper, and whether it moves by itself."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from bowdenfit.device.control import Controller
-from bowdenfit.device.felt import felt
-from bowdenfit.device.motion import Hand, Runs, simulate, swinging
+from bowdenfit.device.felt import measure_transmitted_torque
+from bowdenfit.device.motion import DeviceRuns, Hand, oscillating_path, simulate_device
 from bowdenfit.device.plant import Motion, Plant
 from bowdenfit.display import Part
 from bowdenfit.inference.interval import Interval
 
 NONE, KARNOPP, ACTIVE = "none", "karnopp", "active"
-HALF_WAY = 0.5  # of the hand's path [rad]
+AMPLITUDE = 0.5  # of the hand's path [rad]
 _PERIOD, _SECONDS, _SINCE = 1.25, 2.5, 0.625  # of the movement to and fro [s]
-_FASTER = 2.0  # times the dead zone, which a push and the movement reach at least
+_SPEED_FACTOR = 2.0  # times the dead zone, which a push and the movement reach at least
 _PUSH = 3.0  # s
-_LATE = 50  # samples at the end of a push, which tell whether it goes on
-_KEPT = 4  # every so many samples are kept of a trace
-_AT_REST = 0.05  # rad/s, where there is no dead zone
+_LAST_SAMPLES = 50  # samples at the end of a push, which tell whether it goes on
+_TRACE_STEP = 4  # every so many samples are kept of a trace
+_LEAST_SPEED = 0.05  # rad/s, where there is no dead zone
 
 
 @dataclass(frozen=True, repr=False)
-class Trace(Part):
+class TorqueTrace(Part):
     """The torques of one device, that of the middle friction, while a hand moves it to and fro.
 
     Args:
@@ -36,7 +37,7 @@ class Trace(Part):
 
 
 @dataclass(frozen=True, repr=False)
-class Law(Part):
+class SimulatedLaw(Part):
     """One law, in every simulated device.
 
     Args:
@@ -47,13 +48,15 @@ class Law(Part):
     """
 
     name: str
-    felt: Interval
-    peak: Interval
-    trace: Trace
+    mean_torque: Interval
+    peak_torque: Interval
+    trace: TorqueTrace
+
+    JSON: ClassVar = ("name", ("felt", "mean_torque"), ("peak", "peak_torque"), "trace")
 
 
 @dataclass(frozen=True, repr=False)
-class Simulated(Part):
+class DeviceSimulation(Part):
     """The device through time.
 
     Args:
@@ -67,13 +70,15 @@ class Simulated(Part):
 
     draws: int
     wrap_angle: float
-    laws: tuple[Law, ...]
-    went_on: float | None
+    laws: tuple[SimulatedLaw, ...]
+    runaway_share: float | None
     speed: float
+
+    JSON: ClassVar = ("draws", "wrap_angle", "laws", ("went_on", "runaway_share"), "speed")
 
 
 @dataclass(frozen=True)
-class Devices:
+class SimulatedDevices:
     """Devices that are simulated, a number each, or one for all.
 
     Args:
@@ -95,7 +100,7 @@ class Devices:
     hand_inertia: np.ndarray
     sample: float
     noise: float
-    fed_forward: float | None
+    feed_forward: float | None
     gain: float | None
     active_zone: float
     control: Controller
@@ -103,38 +108,42 @@ class Devices:
     seed: int
 
 
-def moved(devices: Devices, middle: int) -> tuple[tuple[Law, ...], float]:
+def simulate_hand_motion(devices: SimulatedDevices, middle: int) -> tuple[tuple[SimulatedLaw, ...], float]:
     """Every law while a hand moves the device to and fro, and the hand's largest speed [rad/s].
 
     Args:
         devices: The devices.
         middle: Number of the one of which traces are kept.
     """
-    period = min(_PERIOD, 2 * np.pi * HALF_WAY / (_FASTER * max(float(devices.control.dead_zone), 1e-9)))
-    path = swinging(2 * period, devices.sample, HALF_WAY, period)
+    period = min(_PERIOD, 2 * np.pi * AMPLITUDE / (_SPEED_FACTOR * max(float(devices.control.dead_zone), 1e-9)))
+    path = oscillating_path(2 * period, devices.sample, AMPLITUDE, period)
     plant = replace(devices.plant, joint_inertia=devices.plant.joint_inertia + devices.hand_inertia)
     laws = {NONE: devices.control}
-    if devices.fed_forward is not None:
-        laws[KARNOPP] = replace(devices.control, coulomb=devices.fed_forward)
+    if devices.feed_forward is not None:
+        laws[KARNOPP] = replace(devices.control, coulomb=devices.feed_forward)
     if devices.gain is not None:
         laws[ACTIVE] = replace(devices.control, gain=devices.gain, active_zone=devices.active_zone)
-    found = []
+    results = []
     for name, control in laws.items():
-        runs = simulate(
+        runs = simulate_device(
             plant, control, devices.hand, path, sample=devices.sample, noise=devices.noise, seed=devices.seed
         )
-        known = felt(runs, max(float(devices.control.dead_zone), _AT_REST), since=_SINCE * period / _PERIOD)
-        found.append(Law(name, Interval.of(known.mean), Interval.of(known.peak), _trace(runs, middle)))
-    return tuple(found), 2 * np.pi * HALF_WAY / period
+        torque = measure_transmitted_torque(
+            runs, max(float(devices.control.dead_zone), _LEAST_SPEED), start=_SINCE * period / _PERIOD
+        )
+        results.append(SimulatedLaw(name, Interval.of(torque.mean), Interval.of(torque.peak), _trace(runs, middle)))
+    return tuple(results), 2 * np.pi * AMPLITUDE / period
 
 
-def _trace(runs: Runs, middle: int) -> Trace:
-    return Trace(
-        runs.time[::_KEPT], runs.motor_torque[::_KEPT, middle].copy(), runs.joint_torque[::_KEPT, middle].copy()
+def _trace(runs: DeviceRuns, middle: int) -> TorqueTrace:
+    return TorqueTrace(
+        runs.time[::_TRACE_STEP],
+        runs.motor_torque[::_TRACE_STEP, middle].copy(),
+        runs.joint_torque[::_TRACE_STEP, middle].copy(),
     )
 
 
-def goes_on(plant: Plant, control: Controller, sample: float) -> np.ndarray:
+def find_runaways(plant: Plant, control: Controller, sample: float) -> np.ndarray:
     """Whether each device goes on by itself after a push, with no hand on.
 
     Args:
@@ -142,10 +151,12 @@ def goes_on(plant: Plant, control: Controller, sample: float) -> np.ndarray:
         control: Which feeds forward.
         sample: T_s [s].
     """
-    zone = np.maximum(np.asarray(control.dead_zone), _AT_REST)
-    pushed = np.broadcast_to(_FASTER * zone, np.shape(plant.loop.preload))
-    start = replace(Motion.at_rest(np.zeros(np.shape(pushed))), motor_speed=pushed, joint_speed=pushed)
+    zone = np.maximum(np.asarray(control.dead_zone), _LEAST_SPEED)
+    initial_speed = np.broadcast_to(_SPEED_FACTOR * zone, np.shape(plant.loop.preload))
+    start = replace(
+        Motion.at_rest(np.zeros(np.shape(initial_speed))), motor_speed=initial_speed, joint_speed=initial_speed
+    )
     path = np.zeros((round(_PUSH / sample), 2))
-    seen = simulate(plant, control, Hand(0.0, 0.0), path, start=start, sample=sample)
-    late: np.ndarray = np.abs(seen.speed[-_LATE:]).max(axis=0) > zone / 2
-    return late
+    runs = simulate_device(plant, control, Hand(0.0, 0.0), path, start=start, sample=sample)
+    still_moving: np.ndarray = np.abs(runs.speed[-_LAST_SAMPLES:]).max(axis=0) > zone / 2
+    return still_moving

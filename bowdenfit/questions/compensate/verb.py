@@ -22,7 +22,7 @@ ACCEPTED = _PERCENT[0] / 100
 
 @read_first
 def compensate(
-    found: Annotated["Record", RESULTS, FIT],
+    fit: Annotated["Record", RESULTS, FIT],
     device: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     *,
     wrap_angle: Bends = None,
@@ -56,26 +56,26 @@ def compensate(
     from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.compensate.gain import NEEDED
-    from bowdenfit.questions.compensate.ranking import compensation_of
-    from bowdenfit.questions.compensate.simulation import simulated
+    from bowdenfit.questions.compensate.ranking import estimate_compensation
+    from bowdenfit.questions.compensate.simulation import simulate_devices
 
     if schedule and not (simulate and law != "active"):
         raise UsageError(
             "--schedule says what --simulate feeds forward; add --simulate, without --law active, or leave it out: what may be "
             "fed forward by bend is part of every answer."
         )
-    described = None if device is None else device_for(found, Path(device))
-    answer, loop = compensation_of(found, described, wrap_angle, law, _share(risk))
+    description = None if device is None else device_for(fit, Path(device))
+    answer, loop = estimate_compensation(fit, description, wrap_angle, law, _parse_risk(risk))
     if simulate:
-        if described is None:
+        if description is None:
             raise asked_for("a simulation", NEEDED)
-        answer = replace(answer, simulated=simulated(found, described, loop, answer, schedule))
+        answer = replace(answer, simulated=simulate_devices(fit, description, loop, answer, schedule))
     if output is not None:
-        _write(answer, Path(output), found.name)
+        _write(answer, Path(output), fit.name)
     return answer
 
 
-def _share(risk: Quantity | None) -> float:
+def _parse_risk(risk: Quantity | None) -> float:
     """A probability, from 0.1 % to a half.
 
     Raises:
@@ -104,14 +104,14 @@ def _write(answer: "Compensation", folder: Path, cable: str) -> None:
     write_answer(folder, NAME, answer, compensation_text(answer), figures, cable)
 
 
-def _reply(found: "Compensation", asked: dict[str, Any]) -> Reply:
+def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compensate.words import compensation_text
 
-    files = files_of(asked["output"], NAME) if asked["output"] else []
-    if files and found.simulated is not None:
-        files += figures_of(asked["output"], TRACES)
+    files = files_of(options["output"], NAME) if options["output"] else []
+    if files and answer.simulated is not None:
+        files += figures_of(options["output"], TRACES)
     notes = tuple(f"Wrote {path}." for path in files)
-    return Reply(compensation_text(found), lambda: found, notes, csv=found.to_csv)
+    return Reply(compensation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 
 
 VERB = Verb(

@@ -8,7 +8,7 @@ from bowdenfit.display import Display, Rows
 
 
 @dataclass(frozen=True, repr=False)
-class Exported(Display):
+class ExportedFile(Display):
     """A file written for another program.
 
     Args:

@@ -4,75 +4,75 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bowdenfit.questions.export.transmission import Transmission
-from bowdenfit.questions.export.words import comment, filled_template, plain
+from bowdenfit.questions.export.transmission import TransmissionTables
+from bowdenfit.questions.export.words import ascii_text, comment, fill_template
 
 _ACROSS = 4  # numbers in a line
 
 
-def header(found: Transmission) -> str:
+def c_header(tables: TransmissionTables) -> str:
     """The header.
 
     Args:
         found: The tables.
     """
-    places, levels = found.places, found.levels
-    anywhere = not places.unit
+    points, levels = tables.points, tables.levels
+    constant = not points.unit
     speed = "not used: friction does not depend on it"
-    if found.of_rate:
-        speed = f"in {found.speed_unit}; the coefficients hold at BOWDEN_REFERENCE_SPEED"
-    return filled_template(
+    if tables.depends_on_rate:
+        speed = f"in {tables.speed_unit}; the coefficients hold at BOWDEN_REFERENCE_SPEED"
+    return fill_template(
         "bowden.h",
-        about=comment(found.sentences, " * "),
-        place_words="not used: friction is the same everywhere" if anywhere else plain(places.words),
+        about=comment(tables.sentences, " * "),
+        place_words="not used: friction is the same everywhere" if constant else ascii_text(points.words),
         speed_words=speed,
-        version=plain(found.about.version).replace('"', "'"),
-        seed=found.about.seed,
-        n_places=len(places.at),
+        version=ascii_text(tables.about.version).replace('"', "'"),
+        seed=tables.about.seed,
+        n_places=len(points.values),
         n_levels=len(levels),
-        anywhere=int(anywhere),
-        is_loop=int(found.is_loop),
-        of_load=int(found.of_load),
-        of_rate=int(found.of_rate),
-        reference_speed=float(found.reference_speed).hex(),
-        place=numbers(places.at, "    "),
-        exponent=",\n".join(_strokes(level.exponent) for level in levels),
-        more_tables=_more_tables(found),
-        law=filled_template("loop.h" if found.is_loop else "rope.h"),
+        anywhere=int(constant),
+        is_loop=int(tables.is_loop),
+        of_load=int(tables.depends_on_load),
+        of_rate=int(tables.depends_on_rate),
+        reference_speed=float(tables.reference_speed).hex(),
+        place=hexadecimal(points.values, "    "),
+        exponent=",\n".join(_format_strokes(level.exponent) for level in levels),
+        more_tables=_optional_tables(tables),
+        law=fill_template("loop.h" if tables.is_loop else "rope.h"),
     )
 
 
-def numbers(values: Iterable[float], before: str) -> str:
+def hexadecimal(values: Iterable[float], before: str) -> str:
     """Numbers as hexadecimal with commas between them, some in a line."""
     texts = [float(value).hex() for value in np.ravel(np.asarray(list(values)))]
     lines = [", ".join(texts[i : i + _ACROSS]) for i in range(0, len(texts), _ACROSS)]
     return ",\n".join(before + line for line in lines)
 
 
-def _strokes(exponent: np.ndarray) -> str:
+def _format_strokes(exponent: np.ndarray) -> str:
     """Exponents of both strokes."""
-    return "    {\n" + ",\n".join(_row(one, "        ") for one in exponent) + "\n    }"
+    return "    {\n" + ",\n".join(_format_row(one, "        ") for one in exponent) + "\n    }"
 
 
-def _row(values: Iterable[float], before: str) -> str:
-    return f"{before}{{\n{numbers(values, before + '    ')}\n{before}}}"
+def _format_row(values: Iterable[float], before: str) -> str:
+    return f"{before}{{\n{hexadecimal(values, before + '    ')}\n{before}}}"
 
 
-def _more_tables(found: Transmission) -> str:
+def _optional_tables(tables: TransmissionTables) -> str:
     """What not every cable has."""
     parts = []
-    if found.is_loop:
-        rows = ",\n".join(_row(level.taut_loss, "    ") for level in found.levels)
+    if tables.is_loop:
+        rows = ",\n".join(_format_row(level.taut_loss, "    ") for level in tables.levels)
         parts.append(
             "\n/* What the loop loses while both sides are taut, 2 P lambda, in newtons, by level and place. */\n"
             f"static const double bowden_taut_loss[BOWDEN_LEVELS][BOWDEN_PLACES] = {{\n{rows}\n}};\n"
         )
-    if found.of_load:
-        load = [(level.load_exponent, level.drag) for level in found.levels]
-        reference = float(found.reference_force).hex()
-        parts.append("\n" + filled_template("load.h", reference_force=reference, load=_tuples(load)))
-    if found.of_rate:
-        rate = _tuples([level.rate for level in found.levels])
+    if tables.depends_on_load:
+        load = [(level.load_exponent, level.drag) for level in tables.levels]
+        reference = float(tables.reference_force).hex()
+        parts.append("\n" + fill_template("load.h", reference_force=reference, load=_format_tuples(load)))
+    if tables.depends_on_rate:
+        rate = _format_tuples([level.rate for level in tables.levels])
         parts.append(
             "\n/* Stribeck rise, Stribeck speed and viscous coefficient, by level. */\n"
             f"static const double bowden_rate_coefficients[BOWDEN_LEVELS][3] = {{\n{rate}\n}};\n"
@@ -80,5 +80,5 @@ def _more_tables(found: Transmission) -> str:
     return "".join(parts)
 
 
-def _tuples(rows: Iterable[tuple[float, ...]]) -> str:
+def _format_tuples(rows: Iterable[tuple[float, ...]]) -> str:
     return ",\n".join("    {" + ", ".join(float(value).hex() for value in row) + "}" for row in rows)

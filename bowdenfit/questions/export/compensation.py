@@ -3,7 +3,7 @@
 from typing import Any
 
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.compensate.answer import Compensation, FeedForward, Gain
+from bowdenfit.questions.compensate.answer import Compensation, FeedbackGain, FeedForward
 
 
 def compensation_parameters(answer: Compensation) -> dict[str, Any]:
@@ -29,27 +29,34 @@ def compensation_parameters(answer: Compensation) -> dict[str, Any]:
         "chatters_below_rad_per_s": answer.chatters_below,
     }
     if answer.fixed is not None:
-        page["fixed"] = {"torque_N_m": answer.fixed.torque, **_fed(answer.fixed)}
+        page["fixed"] = {"torque_N_m": answer.fixed.torque, **_feed_forward_parameters(answer.fixed)}
     if answer.scheduled is not None:
-        page["scheduled"] = {"torque_N_m": [bend.scheduled for bend in bends], **_fed(answer.scheduled)}
+        page["scheduled"] = {
+            "torque_N_m": [bend.scheduled for bend in bends],
+            **_feed_forward_parameters(answer.scheduled),
+        }
     if answer.gain is not None:
-        page["gain"] = _gain(answer.gain)
+        page["gain"] = _gain_parameters(answer.gain)
     return page | {"not_stated": list(answer.missing)}
 
 
-def _fed(found: FeedForward) -> dict[str, float]:
-    return {"share": found.share, "probability_of_moving_by_itself": found.risk, "left_N_m": found.left}
-
-
-def _gain(found: Gain) -> dict[str, Any]:
+def _feed_forward_parameters(feed_forward: FeedForward) -> dict[str, float]:
     return {
-        "safe": found.safe,
-        "passive": found.passive,
-        "stable_up_to": _levels(found.stable),
-        "left_N_m": _levels(found.left),
-        "decided_by": found.decided_by,
+        "share": feed_forward.share,
+        "probability_of_moving_by_itself": feed_forward.risk,
+        "left_N_m": feed_forward.left,
     }
 
 
-def _levels(found: Interval) -> dict[str, float]:
-    return {"q05": found.q05, "q50": found.median, "q95": found.q95}
+def _gain_parameters(gain: FeedbackGain) -> dict[str, Any]:
+    return {
+        "safe": gain.safe,
+        "passive": gain.passive,
+        "stable_up_to": _quantile_parameters(gain.stable),
+        "left_N_m": _quantile_parameters(gain.left),
+        "decided_by": gain.decided_by,
+    }
+
+
+def _quantile_parameters(interval: Interval) -> dict[str, float]:
+    return {"q05": interval.q05, "q50": interval.median, "q95": interval.q95}

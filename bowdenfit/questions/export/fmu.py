@@ -16,16 +16,19 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.c import header
-from bowdenfit.questions.export.transmission import LEVELS, Transmission
-from bowdenfit.questions.export.words import comment, filled_template, identifier, plain
+from bowdenfit.questions.export.c import c_header
+from bowdenfit.questions.export.transmission import LEVELS, TransmissionTables
+from bowdenfit.questions.export.words import ascii_text, comment, fill_template, identifier
 from bowdenfit.words import printable
 
 _COMPILERS = ("cc", "gcc", "clang")
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-fvisibility=hidden")
-_BINARY = {("linux", "x86_64"): ("linux64", ".so"), ("darwin", "x86_64"): ("darwin64", ".dylib")}  # by system and machine
-_LONGEST = 120.0  # s that a compiler may take
-_BEGINNING = (1980, 1, 1, 0, 0, 0)  # the same tables give the same file
+_BINARY = {
+    ("linux", "x86_64"): ("linux64", ".so"),
+    ("darwin", "x86_64"): ("darwin64", ".dylib"),
+}  # by system and machine
+_COMPILE_TIMEOUT = 120.0  # s that a compiler may take
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same tables give the same file
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class _Variable:
     words: str
 
 
-def unit(found: Transmission, name: str) -> bytes:
+def build_fmu(tables: TransmissionTables, name: str) -> bytes:
     """The file.
 
     Args:
@@ -48,26 +51,26 @@ def unit(found: Transmission, name: str) -> bytes:
     Raises:
         UsageError: There is no C compiler, it fails, or FMI 2.0 has no name for this kind of machine.
     """
-    called, text = identifier(name), header(found)
+    model_name, text = identifier(name), c_header(tables)
     guid = "{" + hashlib.sha256(text.encode("ascii")).hexdigest()[:32] + "}"
-    source = filled_template(
-        "fmu.c", about=comment(found.sentences, " * "), guid=guid, first_place=float(found.places.at[0]).hex()
+    source = fill_template(
+        "fmu.c", about=comment(tables.sentences, " * "), guid=guid, first_place=float(tables.points.values[0]).hex()
     )
-    folder, ending = _machine()
+    folder, ending = _binary_folder()
     parts = {
-        "modelDescription.xml": "\n".join(_description(found, called, guid)).encode("ascii"),
+        "modelDescription.xml": "\n".join(_model_description(tables, model_name, guid)).encode("ascii"),
         "sources/fmu.c": source.encode("ascii"),
         "sources/bowden.h": text.encode("ascii"),
-        f"binaries/{folder}/{called}{ending}": _compiled(source, text, compiler()),
+        f"binaries/{folder}/{model_name}{ending}": _compile(source, text, find_compiler()),
     }
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside, content in parts.items():
-            archive.writestr(zipfile.ZipInfo(inside, _BEGINNING), content, zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(inside, _ZIP_DATE), content, zipfile.ZIP_DEFLATED)
     return packed.getvalue()
 
 
-def compiler() -> list[str]:
+def find_compiler() -> list[str]:
     """The C compiler, with its options where CC has some.
 
     Raises:
@@ -75,16 +78,20 @@ def compiler() -> list[str]:
     """
     stated = shlex.split(os.environ.get("CC", ""))
     for command in [stated] if stated else [[name] for name in _COMPILERS]:
-        if found := shutil.which(command[0]):
-            return [found, *command[1:]]
-    looked = f"CC names {printable(stated[0])}, which is not there" if stated else f"none of {', '.join(_COMPILERS)} is there"
+        if path := shutil.which(command[0]):
+            return [path, *command[1:]]
+    looked = (
+        f"CC names {printable(stated[0])}, which is not there"
+        if stated
+        else f"none of {', '.join(_COMPILERS)} is there"
+    )
     raise UsageError(
         f"an FMU holds a compiled program, and there is no C compiler here: {looked}. Install one, or name it in CC; or export "
         "the header alone with --to c."
     )
 
 
-def _machine() -> tuple[str, str]:
+def _binary_folder() -> tuple[str, str]:
     """Folder and ending of a compiled program of this machine."""
     kind = (sys.platform, platform.machine().lower())
     if kind not in _BINARY:
@@ -95,35 +102,41 @@ def _machine() -> tuple[str, str]:
     return _BINARY[kind]
 
 
-def _compiled(source: str, text: str, command: list[str]) -> bytes:
+def _compile(source: str, text: str, command: list[str]) -> bytes:
     """The shared library.
 
     Raises:
         UsageError: The compiler fails.
     """
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        (place / "fmu.c").write_text(source, encoding="ascii")
-        (place / "bowden.h").write_text(text, encoding="ascii")
+        directory = Path(folder)
+        (directory / "fmu.c").write_text(source, encoding="ascii")
+        (directory / "bowden.h").write_text(text, encoding="ascii")
         call = [*command, *_FLAGS, "-o", "made", "fmu.c", "-lm"]
         try:
-            done = subprocess.run(call, cwd=place, capture_output=True, text=True, timeout=_LONGEST, check=False)  # noqa: S603
+            completed = subprocess.run(  # noqa: S603
+                call, cwd=directory, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT, check=False
+            )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise UsageError(f"the C compiler {command[0]} cannot be run: {error}; name another in CC.") from None
-        made = place / "made"
-        if done.returncode or not made.is_file():
-            said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[-200:])
-            words = f"the C compiler {command[0]} fails: {printable(said.strip())}. Name another in CC or use --to c."
-            raise UsageError(words)
-        return made.read_bytes()
+        library = directory / "made"
+        if completed.returncode or not library.is_file():
+            message = next((line for line in completed.stderr.splitlines() if "error" in line), completed.stderr[-200:])
+            error_text = (
+                f"the C compiler {command[0]} fails: {printable(message.strip())}. Name another in CC or use --to c."
+            )
+            raise UsageError(error_text)
+        return library.read_bytes()
 
 
-def _variables(found: Transmission) -> list[_Variable]:
+def _variables(tables: TransmissionTables) -> list[_Variable]:
     """In the order of their value references."""
-    place, speed = found.places, found.speed_unit
+    place, speed = tables.points, tables.speed_unit
     return [
         _Variable("input_force", True, "N", "Force at the motor side"),
-        _Variable("place", True, place.unit, place.words if place.unit else "not used: friction is the same everywhere"),
+        _Variable(
+            "place", True, place.unit, place.words if place.unit else "not used: friction is the same everywhere"
+        ),
         _Variable("speed", True, speed, "Speed of the rope" if speed else "not used: friction does not depend on it"),
         _Variable("wanted_force", True, "N", "Force that is wanted at the load side"),
         _Variable("output_force", False, "N", "Force at the load side through any motion (play operator)"),
@@ -134,20 +147,20 @@ def _variables(found: Transmission) -> list[_Variable]:
     ]
 
 
-def _description(found: Transmission, called: str, guid: str) -> Iterator[str]:
+def _model_description(tables: TransmissionTables, model_name: str, guid: str) -> Iterator[str]:
     """Lines of modelDescription.xml."""
-    variables, about = _variables(found), found.about
-    starts = {"place": found.places.at[0], "speed": found.reference_speed}
+    variables, about = _variables(tables), tables.about
+    starts = {"place": tables.points.values[0], "speed": tables.reference_speed}
     units = dict.fromkeys(v.unit for v in variables if v.unit)
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield (
-        f'<fmiModelDescription fmiVersion="2.0" modelName="{called}" guid="{guid}" numberOfEventIndicators="0" '
+        f'<fmiModelDescription fmiVersion="2.0" modelName="{model_name}" guid="{guid}" numberOfEventIndicators="0" '
         f'variableNamingConvention="flat" generationTool={_quoted(f"bowdenfit {about.version}, seed {about.seed}")}'
     )
-    yield f"  description={_quoted(' '.join(found.sentences))}>"
+    yield f"  description={_quoted(' '.join(tables.sentences))}>"
     yield (
-        f'  <CoSimulation modelIdentifier="{called}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true" '
-        'canSerializeFMUstate="true">'
+        f'  <CoSimulation modelIdentifier="{model_name}" canHandleVariableCommunicationStepSize="true" '
+        'canGetAndSetFMUstate="true" canSerializeFMUstate="true">'
     )
     yield '    <SourceFiles><File name="fmu.c"/></SourceFiles>'
     yield "  </CoSimulation>"
@@ -155,31 +168,31 @@ def _description(found: Transmission, called: str, guid: str) -> Iterator[str]:
     yield '  <LogCategories><Category name="logStatusError"/></LogCategories>'
     yield '  <DefaultExperiment startTime="0" stepSize="0.001"/>'
     yield "  <ModelVariables>"
-    for number, one in enumerate(variables):
-        kind = 'causality="input"' if one.is_input else 'causality="output" initial="calculated"'
-        start = f' start="{float(starts.get(one.name, 0.0))!r}"' if one.is_input else ""
-        of_unit = f" unit={_quoted(one.unit)}" if one.unit else ""
+    for number, variable in enumerate(variables):
+        kind = 'causality="input"' if variable.is_input else 'causality="output" initial="calculated"'
+        start = f' start="{float(starts.get(variable.name, 0.0))!r}"' if variable.is_input else ""
+        of_unit = f" unit={_quoted(variable.unit)}" if variable.unit else ""
         yield (
-            f'    <ScalarVariable name="{one.name}" valueReference="{number}" {kind} variability="continuous" '
-            f"description={_quoted(one.words)}><Real{of_unit}{start}/></ScalarVariable>"
+            f'    <ScalarVariable name="{variable.name}" valueReference="{number}" {kind} variability="continuous" '
+            f"description={_quoted(variable.words)}><Real{of_unit}{start}/></ScalarVariable>"
         )
-    levels = ", ".join(f"{i} {level.name}" for i, level in enumerate(found.levels[: len(LEVELS)]))
-    words = f"How much friction: {levels}" + (", then draws" if len(found.levels) > len(LEVELS) else "")
+    levels = ", ".join(f"{i} {level.name}" for i, level in enumerate(tables.levels[: len(LEVELS)]))
+    words = f"How much friction: {levels}" + (", then draws" if len(tables.levels) > len(LEVELS) else "")
     yield (
         f'    <ScalarVariable name="level" valueReference="0" causality="parameter" variability="tunable" description='
-        f'{_quoted(words)}><Integer min="0" max="{len(found.levels) - 1}" start="1"/></ScalarVariable>'
+        f'{_quoted(words)}><Integer min="0" max="{len(tables.levels) - 1}" start="1"/></ScalarVariable>'
     )
     yield (
         '    <ScalarVariable name="flags" valueReference="1" causality="output" variability="discrete" initial="calculated" '
         'description="1 place outside the range, nearest end taken; 2 nothing is left of the force"><Integer/></ScalarVariable>'
     )
     yield "  </ModelVariables>"
-    outputs = [i + 1 for i, one in enumerate(variables) if not one.is_input] + [len(variables) + 2]
-    for_each = "".join(f'<Unknown index="{i}"/>' for i in outputs)
-    yield f"  <ModelStructure><Outputs>{for_each}</Outputs><InitialUnknowns>{for_each}</InitialUnknowns></ModelStructure>"
+    outputs = [i + 1 for i, variable in enumerate(variables) if not variable.is_input] + [len(variables) + 2]
+    unknowns = "".join(f'<Unknown index="{i}"/>' for i in outputs)
+    yield f"  <ModelStructure><Outputs>{unknowns}</Outputs><InitialUnknowns>{unknowns}</InitialUnknowns></ModelStructure>"
     yield "</fmiModelDescription>\n"
 
 
 def _quoted(text: str) -> str:
     """A text as an attribute of XML."""
-    return quoteattr(plain(text))
+    return quoteattr(ascii_text(text))

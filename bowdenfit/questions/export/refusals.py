@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from bowdenfit.errors import DatasetError, UsageError
-from bowdenfit.questions.export.tables import EXPRESSED
-from bowdenfit.questions.export.transmission import Places
+from bowdenfit.questions.export.tables import SUPPORTED_OPTIONS
+from bowdenfit.questions.export.transmission import TablePoints
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
 from bowdenfit.words import listed
@@ -15,7 +15,7 @@ NAMES: Mapping[str, str] = MappingProxyType(
 )
 
 
-def refuse_what_is_not_expressed(fit: Record, to: str, draws: int) -> None:
+def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
     """Refuse a cable that a format cannot express.
 
     Args:
@@ -26,11 +26,11 @@ def refuse_what_is_not_expressed(fit: Record, to: str, draws: int) -> None:
     Raises:
         UsageError: It cannot; another that can is named.
     """
-    unknown = [name for name in fit.model.cable.friction.options if name not in EXPRESSED]
-    if unknown and (to != "csv" or draws):
+    unsupported = [name for name in fit.model.cable.friction.options if name not in SUPPORTED_OPTIONS]
+    if unsupported and (to != "csv" or draws):
         raise UsageError(
-            f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unknown)}; export the "
-            "lookup table instead, with --to csv."
+            f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unsupported)}; export "
+            "the lookup table instead, with --to csv."
         )
 
 
@@ -41,10 +41,12 @@ def refuse_compensation(to: str) -> None:
         UsageError: It does not.
     """
     if to != "yaml":
-        raise UsageError(f"--device is asked of yaml; {NAMES[to]} tells of the cable alone. Leave it out, or write --to yaml.")
+        raise UsageError(
+            f"--device is asked of yaml; {NAMES[to]} tells of the cable alone. Leave it out, or write --to yaml."
+        )
 
 
-def place_of(fit: Record, places: Places, to: str, at: tuple[float, str] | None) -> float | None:
+def convert_point(fit: Record, points: TablePoints, to: str, at: tuple[float, str] | None) -> float | None:
     """Where a format that holds at one place does, in the unit of the tables; None if not said.
 
     Args:
@@ -60,7 +62,7 @@ def place_of(fit: Record, places: Places, to: str, at: tuple[float, str] | None)
         return None
     if to != "mujoco":
         raise UsageError(f"--at is asked of mujoco; {NAMES[to]} has tables over the whole range. Leave it out.")
-    if not places.unit:
+    if not points.unit:
         raise UsageError("friction of this cable is the same everywhere; leave --at out.")
     route = fit.dataset.description.route
     try:

@@ -21,23 +21,33 @@ from bowdenfit.questions.export.transmission import (
     LEVELS,
     MOUNTING,
     QUANTILES,
-    About,
-    Level,
-    Places,
-    Transmission,
+    FitLabel,
+    FrictionLevel,
+    TablePoints,
+    TransmissionTables,
 )
 from bowdenfit.questions.predict.outside import measured
 from bowdenfit.results.record import Record
 
-EXPRESSED = ("drag", "load-dependent", "rate-dependent", "stroke-dependent", "by-group")  # of the options of friction
+SUPPORTED_OPTIONS = (
+    "drag",
+    "load-dependent",
+    "rate-dependent",
+    "stroke-dependent",
+    "by-group",
+)  # of the options of friction
 _LEAST_BEND = 1e-3  # rad that a range of bends has at least
 _LEAST_SHARE = 1e-9  # of the reference force, which is left of it at least
-_RATE = {STRIBECK: 0.0, STRIBECK_SPEED: 1.0, VISCOUS: 0.0}  # what stands for each where friction does not depend on speed
-Middle = tuple[float, float]
+_RATE = {
+    STRIBECK: 0.0,
+    STRIBECK_SPEED: 1.0,
+    VISCOUS: 0.0,
+}  # what stands for each where friction does not depend on speed
+LoadLaw = tuple[float, float]
 Arrays = Mapping[str, np.ndarray]
 
 
-def transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str = "") -> Transmission:
+def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str = "") -> TransmissionTables:
     """The tables of a fit.
 
     Args:
@@ -50,23 +60,33 @@ def transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str =
         UsageError: There is no posterior, or it has not so many draws.
     """
     cable, conditions = fit.model.cable, fit.model.cable.friction.conditions
-    known = len(fit.draws().flat_z)
-    if draws > known:
-        raise UsageError(f"--draws {draws}: this fit has {known} draws; ask for so many at most.")
-    places, bent = _places(fit, points)
-    middle, fine = _middle(fit), _refined(places.at)
-    mean = _of_draws(fit, fine, bent, middle, np.zeros(known))
-    found = _of_draws(fit, places.at, bent, middle, fit.mounting())
-    coarse = {name: of[..., ::2] if of.ndim > 1 else of for name, of in mean.items()}
-    levels = [*_quantiles(coarse, middle), *_quantiles(found, middle, MOUNTING), *_single(found, draws, fit.provenance.seed)]
-    group, made = next(iter(cable.friction.groups), ""), fit.provenance
-    version = made.versions.get("bowdenfit", "of unknown version")
-    return Transmission(
-        About(fit.name, made.seed, version, made.created, _measured(fit, bent), group, distrust),
-        places, tuple(levels), cable.is_loop, cable.friction.options, conditions.reference_force, conditions.reference_speed,
+    available = len(fit.draws().flat_z)
+    if draws > available:
+        raise UsageError(f"--draws {draws}: this fit has {available} draws; ask for so many at most.")
+    table_points, bent = _choose_points(fit, points)
+    middle, refined = _median_load_law(fit), _add_midpoints(table_points.values)
+    mean_tables = _tabulate_draws(fit, refined, bent, middle, np.zeros(available))
+    draw_tables = _tabulate_draws(fit, table_points.values, bent, middle, fit.mounting())
+    coarse = {name: values[..., ::2] if values.ndim > 1 else values for name, values in mean_tables.items()}
+    levels = [
+        *_quantile_levels(coarse, middle),
+        *_quantile_levels(draw_tables, middle, MOUNTING),
+        *_draw_levels(draw_tables, draws, fit.provenance.seed),
+    ]
+    group, provenance = next(iter(cable.friction.groups), ""), fit.provenance
+    version = provenance.versions.get("bowdenfit", "of unknown version")
+    return TransmissionTables(
+        FitLabel(fit.name, provenance.seed, version, provenance.created, _describe_ranges(fit, bent), group, distrust),
+        table_points,
+        tuple(levels),
+        cable.is_loop,
+        cable.friction.options,
+        conditions.reference_force,
+        conditions.reference_speed,
         conditions.velocity_unit or "mm/s" if cable.friction.depends_on_rate else "",
-        _missed(np.median(mean["effective"][:, 0], axis=0)), _radii(fit),
-    )  # fmt: skip
+        _interpolation_error(np.median(mean_tables["effective"][:, 0], axis=0)),
+        _radii(fit),
+    )
 
 
 def _radii(fit: Record) -> tuple[float, float]:
@@ -79,45 +99,47 @@ def _radii(fit: Record) -> tuple[float, float]:
     return at_motor, at_load
 
 
-def _places(fit: Record, points: int) -> tuple[Places, bool]:
+def _choose_points(fit: Record, points: int) -> tuple[TablePoints, bool]:
     """Where friction is tabled, and whether at wrap angles: along the route, over the bends measured, or at one place."""
     route = fit.dataset.description.route
     if route is not None:
-        return Places(route.variable, route.unit, np.linspace(*route.range, points)), False
+        return TablePoints(route.variable, route.unit, np.linspace(*route.range, points)), False
     try:
         bending_contact(fit.model)
     except UsageError:
-        return Places("place", "", np.zeros(1)), False
+        return TablePoints("place", "", np.zeros(1)), False
     bends = elastic_answers(fit).measured_bends
     if not len(bends):
-        return Places("place", "", np.zeros(1)), False
+        return TablePoints("place", "", np.zeros(1)), False
     if bends[-1] - bends[0] < _LEAST_BEND:
-        return Places("wrap_angle", "rad", bends[:1]), True
-    return Places("wrap_angle", "rad", np.linspace(bends[0], bends[-1], points)), True
+        return TablePoints("wrap_angle", "rad", bends[:1]), True
+    return TablePoints("wrap_angle", "rad", np.linspace(bends[0], bends[-1], points)), True
 
 
-def _refined(at: np.ndarray) -> np.ndarray:
+def _add_midpoints(points: np.ndarray) -> np.ndarray:
     """Places with those half way between them."""
-    return np.interp(np.arange(2 * len(at) - 1) / 2, np.arange(len(at)), at)
+    return np.interp(np.arange(2 * len(points) - 1) / 2, np.arange(len(points)), points)
 
 
-def _missed(curve: np.ndarray) -> float:
+def _interpolation_error(curve: np.ndarray) -> float:
     """By how much straight lines between every other point of a curve miss those between."""
     return float(np.max(np.abs(curve[1::2] - (curve[:-2:2] + curve[2::2]) / 2), initial=0.0))
 
 
-def _measured(fit: Record, bent: bool) -> tuple[str, ...]:
+def _describe_ranges(fit: Record, bent: bool) -> tuple[str, ...]:
     """Loads, lengths and wrap angles measured at, in words."""
-    limits, said = measured(fit), []
+    limits, ranges = measured(fit), []
     if bent:
         bends = np.rad2deg(elastic_answers(fit).measured_bends)
-        said.append(f"wrap angles {bends[0]:.4g} to {bends[-1]:.4g} deg")
-    for what, span, unit in (("loads", limits.loads, "N"), ("lengths", limits.lengths, limits.unit)):
-        said += [f"{what} {span[0]:.4g} to {span[1]:.4g} {unit}"] if span is not None and unit else []
-    return tuple(said)
+        ranges.append(f"wrap angles {bends[0]:.4g} to {bends[-1]:.4g} deg")
+    for quantity, span, unit in (("loads", limits.loads, "N"), ("lengths", limits.lengths, limits.unit)):
+        ranges += [f"{quantity} {span[0]:.4g} to {span[1]:.4g} {unit}"] if span is not None and unit else []
+    return tuple(ranges)
 
 
-def _of_draws(fit: Record, at: np.ndarray, bent: bool, middle: Middle, mounting: np.ndarray) -> dict[str, np.ndarray]:
+def _tabulate_draws(
+    fit: Record, points: np.ndarray, bent: bool, middle: LoadLaw, mounting: np.ndarray
+) -> dict[str, np.ndarray]:
     """Friction of every draw (first axis) at places (last axis), in a mounting each.
 
     Args:
@@ -129,91 +151,109 @@ def _of_draws(fit: Record, at: np.ndarray, bent: bool, middle: Middle, mounting:
     """
     model, friction = fit.model, fit.model.cable.friction
 
-    def implied(z_and_mounting: Array, at: Array, middle: Array) -> dict[str, Any]:
+    def tabulate_draw(z_and_mounting: Array, points: Array, middle: Array) -> dict[str, Any]:
         values = model.space.constrain(z_and_mounting[:-1])
-        exponent, preload = _there(model, values, at, bent)
+        exponent, preload = _exponent_and_preload(model, values, points, bent)
         exponent = jnp.maximum(exponent + z_and_mounting[-1], LEAST_EXPONENT)
         own = jnp.stack(friction.shifts(values, exponent))
         load_exponent, drag, _ = friction.scale(values)
         rate = {name: values[name] for name in _RATE if name in values}
         return {
-            "own": own, "effective": _at_reference(friction, values, own, middle) if friction.depends_on_load else own,
-            "taut_loss": 2 * preload * exponent, "load_exponent": load_exponent, "drag": drag, **rate,
-            "stiffness": _stiffness(model, values, at, bent),
-        }  # fmt: skip
+            "own": own,
+            "effective": _effective_exponents(friction, values, own, middle) if friction.depends_on_load else own,
+            "taut_loss": 2 * preload * exponent,
+            "load_exponent": load_exponent,
+            "drag": drag,
+            **rate,
+            "stiffness": _stiffness(model, values, points, bent),
+        }
 
     with jax.enable_x64(True):
-        program = for_each_draw(implied, model.space.size + 1, jnp.asarray(at), jnp.asarray(middle), run_once=True)
-        found: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, mounting]))
-    return found
+        program = for_each_draw(
+            tabulate_draw, model.space.size + 1, jnp.asarray(points), jnp.asarray(middle), run_once=True
+        )
+        tables: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, mounting]))
+    return tables
 
 
-def _there(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> tuple[Array, Array]:
+def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
     """Exponent [1] and preload [N] of one draw at places, which are wrap angles or values of the route variable."""
     if bent:
-        cable = Bent(model, bending_contact(model), at)
+        cable = Bent(model, bending_contact(model), points)
         return cable.exponent(values), cable.preload(values)[0]
-    angles = model.cable.wrap_angles(values, at)
+    angles = model.cable.wrap_angles(values, points)
     preload = model.cable.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
     return model.cable.friction_exponent(values, angles), preload
 
 
-def _stiffness(model: Model, values: Mapping[str, Array], at: Array, bent: bool) -> Array:
+def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:
     """Stiffness at wrap angles, of an unloaded loop or of a rope under the reference force [N/mm]; nothing if not told."""
     if not (bent and knows_stretch(model)):
         return jnp.zeros(0)
     load = 0.0 if model.cable.is_loop else model.cable.friction.conditions.reference_force
-    return Bent(model, bending_contact(model), at).stiffness(values, load)
+    return Bent(model, bending_contact(model), points).stiffness(values, load)
 
 
-def _at_reference(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
+def _effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
     """Exponents that, with one load exponent and drag for all draws, lose what this draw loses of the reference force."""
     reference = friction.conditions.reference_force
     force, (load_exponent, drag) = jnp.asarray(reference), middle
     signs = jnp.array([[1.0], [-1.0]])
-    there = friction.force(values, friction.scaled(values, force) - signs * own)
-    there = jnp.maximum(there, _LEAST_SHARE * reference)
+    output = friction.force(values, friction.scaled(values, force) - signs * own)
+    output = jnp.maximum(output, _LEAST_SHARE * reference)
     common = force_scale(force, load_exponent, drag, reference)
-    return signs * (common - force_scale(there, load_exponent, drag, reference))
+    return signs * (common - force_scale(output, load_exponent, drag, reference))
 
 
-def _middle(fit: Record) -> Middle:
+def _median_load_law(fit: Record) -> LoadLaw:
     """Medians of the load exponent [1] and the drag [N]; 0 where the model has none."""
     names = {p.name: p for p in fit.model.space.parameters}
 
-    def of(name: str) -> float:
+    def median_of(name: str) -> float:
         if name not in names:
             return 0.0
         fixed = names[name].fixed
         return float(np.median(fit.draws().values[name]) / names[name].shown_scale) if fixed is None else fixed
 
-    return of(LOAD_EXPONENT), of(DRAG)
+    return median_of(LOAD_EXPONENT), median_of(DRAG)
 
 
-def _rate(found: Arrays, which: slice) -> tuple[float, float, float]:
+def _median_rates(tables: Arrays, which: slice) -> tuple[float, float, float]:
     """Medians of the rate's coefficients over some of the draws."""
-    a, v, c = (float(np.median(found[name][which])) if name in found else default for name, default in _RATE.items())
+    a, v, c = (float(np.median(tables[name][which])) if name in tables else default for name, default in _RATE.items())
     return a, v, c
 
 
-def _quantiles(found: Arrays, middle: Middle, before: str = "") -> list[Level]:
+def _quantile_levels(tables: Arrays, middle: LoadLaw, before: str = "") -> list[FrictionLevel]:
     """Levels over the draws."""
-    effective, taut_loss, rate = found["effective"], found["taut_loss"], _rate(found, slice(None))
-    stiffness = np.median(found["stiffness"], axis=0)
+    effective, taut_loss, rate = tables["effective"], tables["taut_loss"], _median_rates(tables, slice(None))
+    stiffness = np.median(tables["stiffness"], axis=0)
     return [
-        Level(before + name, np.quantile(effective, q, axis=0), np.quantile(taut_loss, q, axis=0), *middle, rate, stiffness)
+        FrictionLevel(
+            before + name,
+            np.quantile(effective, q, axis=0),
+            np.quantile(taut_loss, q, axis=0),
+            *middle,
+            rate,
+            stiffness,
+        )
         for name, q in QUANTILES.items()
         if before + name in LEVELS
     ]
 
 
-def _single(found: Arrays, n: int, seed: int) -> list[Level]:
+def _draw_levels(tables: Arrays, n: int, seed: int) -> list[FrictionLevel]:
     """Levels of single draws."""
-    picked = np.random.default_rng([seed, 17]).choice(len(found["drag"]), n, replace=False)
+    picked = np.random.default_rng([seed, 17]).choice(len(tables["drag"]), n, replace=False)
     return [
-        Level(
-            f"{DRAW}{i + 1}", found["own"][k], found["taut_loss"][k], float(found["load_exponent"][k]),
-            float(found["drag"][k]), _rate(found, slice(k, k + 1)), found["stiffness"][k],
+        FrictionLevel(
+            f"{DRAW}{i + 1}",
+            tables["own"][k],
+            tables["taut_loss"][k],
+            float(tables["load_exponent"][k]),
+            float(tables["drag"][k]),
+            _median_rates(tables, slice(k, k + 1)),
+            tables["stiffness"][k],
         )
         for i, k in enumerate(picked)
-    ]  # fmt: skip
+    ]

@@ -14,7 +14,7 @@ DRAW = "draw_"
 
 
 @dataclass(frozen=True)
-class About:
+class FitLabel:
     """Which fit a file was written from.
 
     Args:
@@ -37,7 +37,7 @@ class About:
 
 
 @dataclass(frozen=True)
-class Places:
+class TablePoints:
     """Where friction is tabled.
 
     Args:
@@ -48,17 +48,17 @@ class Places:
 
     variable: str
     unit: str
-    at: np.ndarray
+    values: np.ndarray
 
     @property
     def words(self) -> str:
         """'cable_length 430 to 530 mm'"""
-        ends = f"{self.at[0]:.6g} to {self.at[-1]:.6g}" if len(self.at) > 1 else f"{self.at[0]:.6g}"
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}" if len(self.values) > 1 else f"{self.values[0]:.6g}"
         return f"{self.variable} {ends} {self.unit}" if self.unit else "one place: nothing is varied"
 
 
 @dataclass(frozen=True)
-class Level:
+class FrictionLevel:
     """Friction of one level.
 
     Args:
@@ -82,7 +82,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Transmission:
+class TransmissionTables:
     """A fitted cable as tables.
 
     Args:
@@ -98,29 +98,29 @@ class Transmission:
         radii: Of the pulleys at the motor and at the load side [mm]; 0 where none is stated.
     """
 
-    about: About
-    places: Places
-    levels: tuple[Level, ...]
+    about: FitLabel
+    points: TablePoints
+    levels: tuple[FrictionLevel, ...]
     is_loop: bool
     options: tuple[str, ...]
     reference_force: float
     reference_speed: float
     speed_unit: str
-    between: float
+    interpolation_error: float
     radii: tuple[float, float] = (0.0, 0.0)
 
     @property
-    def median(self) -> Level:
+    def median(self) -> FrictionLevel:
         """The median level."""
         return self.levels[LEVELS.index("q50")]
 
     @property
-    def of_load(self) -> bool:
+    def depends_on_load(self) -> bool:
         """Whether the share of the force that arrives depends on the load, other than in a loop."""
         return any(level.load_exponent or level.drag for level in self.levels)
 
     @property
-    def of_rate(self) -> bool:
+    def depends_on_rate(self) -> bool:
         """Whether friction depends on speed."""
         return bool(self.speed_unit)
 
@@ -129,17 +129,21 @@ class Transmission:
         """What every file says at its top."""
         about, n = self.about, len(self.levels) - len(LEVELS)
         kind = "pull-pull loop" if self.is_loop else "single rope"
-        said = [
+        sentences = [
             f"Cable: {about.cable} ({kind})." + (f" Group: {about.group}." if about.group else ""),
             f"Fitted by bowdenfit {about.version}, seed {about.seed}, {about.created or 'date unknown'}.",
-            f"Range: {self.places.words}. Outside it the nearest end counts, and a flag tells.",
+            f"Range: {self.points.words}. Outside it the nearest end counts, and a flag tells.",
             *(f"Measured: {words}." for words in about.measured),
             f"Levels: {', '.join(LEVELS)} of friction" + (f", and {n} draws." if n else "."),
         ]
-        if len(self.places.at) > 1:
-            said.append(f"Straight lines between the places miss the median exponent by at most {self.between:.1e}.")
-        if self.of_load:
-            said.append(f"Quantiles hold at an input force of {self.reference_force:g} N, as friction depends on the load.")
-        if self.of_rate:
-            said.append(f"Quantiles hold at a speed of {self.reference_speed:g} {self.speed_unit}.")
-        return [*said, *([f"Warning: this fit is {about.distrust}."] if about.distrust else [])]
+        if len(self.points.values) > 1:
+            sentences.append(
+                f"Straight lines between the places miss the median exponent by at most {self.interpolation_error:.1e}."
+            )
+        if self.depends_on_load:
+            sentences.append(
+                f"Quantiles hold at an input force of {self.reference_force:g} N, as friction depends on the load."
+            )
+        if self.depends_on_rate:
+            sentences.append(f"Quantiles hold at a speed of {self.reference_speed:g} {self.speed_unit}.")
+        return [*sentences, *([f"Warning: this fit is {about.distrust}."] if about.distrust else [])]

@@ -20,18 +20,25 @@ from bowdenfit.arguments import (
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.export.answer import Exported
+    from bowdenfit.questions.export.answer import ExportedFile
     from bowdenfit.results.record import Record
 
 _FILE = "the name of the cable, in this folder"
 _PLACE = Parameter(metavar="PLACE", show_default="the middle of the range")
 Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
-_ENDINGS: Mapping[str, str] = {"c": ".h", "csv": ".csv", "fmu": ".fmu", "matlab": ".m", "mujoco": ".xml", "yaml": ".yaml"}
+_ENDINGS: Mapping[str, str] = {
+    "c": ".h",
+    "csv": ".csv",
+    "fmu": ".fmu",
+    "matlab": ".m",
+    "mujoco": ".xml",
+    "yaml": ".yaml",
+}
 
 
 @read_first
 def export(
-    found: Annotated["Record", RESULTS, FIT],
+    fit: Annotated["Record", RESULTS, FIT],
     to: Annotated[Target, Parameter(required=True)] = "csv",
     output: Annotated[Output, Parameter(metavar="FILE", show_default=_FILE)] = None,
     *,
@@ -40,7 +47,7 @@ def export(
     at: Annotated[Quantity | None, _PLACE, number_with_unit("90deg")] = None,
     device: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     force: bool = False,
-) -> "Exported":
+) -> "ExportedFile":
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
 
     Args:
@@ -60,40 +67,42 @@ def export(
         StoreError: The file is there already, or cannot be written.
     """
     from bowdenfit.errors import StoreError
-    from bowdenfit.questions.export.answer import Exported
-    from bowdenfit.questions.export.refusals import place_of, refuse_what_is_not_expressed
-    from bowdenfit.questions.export.tables import transmission
+    from bowdenfit.questions.export.answer import ExportedFile
+    from bowdenfit.questions.export.refusals import convert_point, refuse_inexpressible
+    from bowdenfit.questions.export.tables import tabulate_transmission
     from bowdenfit.questions.export.words import identifier
-    from bowdenfit.questions.export.writers import WRITERS, Asked
+    from bowdenfit.questions.export.writers import WRITERS, ExportRequest
     from bowdenfit.questions.summary.verdict import verdict
     from bowdenfit.results.folder import file_to_write
 
-    path = Path(identifier(found.name) + _ENDINGS[to] if output is None else output)
+    path = Path(identifier(fit.name) + _ENDINGS[to] if output is None else output)
     if path.exists() and not (force and path.is_file()):
         raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
-    found.draws()
-    refuse_what_is_not_expressed(found, to, draws)
-    compensation = None if device is None else _compensation(found, to, Path(device))
-    judged = verdict(found)
-    tables = transmission(found, points, draws, " and ".join(judged.troubles))
-    written = WRITERS[to](Asked(found, tables, path, place_of(found, tables.places, to, as_pair(at)), compensation))
+    fit.draws()
+    refuse_inexpressible(fit, to, draws)
+    compensation = None if device is None else _compensation(fit, to, Path(device))
+    trust = verdict(fit)
+    tables = tabulate_transmission(fit, points, draws, " and ".join(trust.troubles))
+    content = WRITERS[to](
+        ExportRequest(fit, tables, path, convert_point(fit, tables.points, to, as_pair(at)), compensation)
+    )
     with file_to_write(path) as temporary:
-        temporary.write_bytes(written.content)
-    return Exported(path, to, tuple(tables.sentences), judged.trusted, written.remarks)
+        temporary.write_bytes(content.content)
+    return ExportedFile(path, to, tuple(tables.sentences), trust.trusted, content.remarks)
 
 
-def _compensation(found: "Record", to: str, device: Path) -> dict[str, Any]:
+def _compensation(fit: "Record", to: str, device: Path) -> dict[str, Any]:
     from bowdenfit.questions.bends.ring_down import device_for
-    from bowdenfit.questions.compensate.ranking import compensation_of
+    from bowdenfit.questions.compensate.ranking import estimate_compensation
     from bowdenfit.questions.compensate.verb import ACCEPTED
     from bowdenfit.questions.export.compensation import compensation_parameters
     from bowdenfit.questions.export.refusals import refuse_compensation
 
     refuse_compensation(to)
-    return compensation_parameters(compensation_of(found, device_for(found, device), None, None, ACCEPTED)[0])
+    return compensation_parameters(estimate_compensation(fit, device_for(fit, device), None, None, ACCEPTED)[0])
 
 
-def _reply(answer: "Exported", _: Mapping[str, Any]) -> Reply:
+def _reply(answer: "ExportedFile", _: Mapping[str, Any]) -> Reply:
     return Reply(f"{answer}\n", lambda: answer, exit_code=0 if answer.trusted else NOT_TRUSTED)
 
 

@@ -15,20 +15,20 @@ def comment(sentences: Iterable[str], before: str) -> str:
         sentences: A line or more each.
         before: What begins a line, such as " * ".
     """
-    lines = [line for text in sentences for line in textwrap.wrap(plain(text), _WIDTH) or [""]]
+    lines = [line for text in sentences for line in textwrap.wrap(ascii_text(text), _WIDTH) or [""]]
     return "\n".join(before + line for line in lines)
 
 
-def plain(text: str) -> str:
+def ascii_text(text: str) -> str:
     """Text as one line of ASCII without anything that begins or ends a comment, or that C reads as something else."""
-    found = "".join(x if " " <= x <= "~" and x != "\\" else ascii(x)[1:-1].replace("\\", "~") for x in text)
+    text_out = "".join(x if " " <= x <= "~" and x != "\\" else ascii(x)[1:-1].replace("\\", "~") for x in text)
     for bad in ("*/", "/*", "??", "--", "%{", "%}"):
-        while bad in found:
-            found = found.replace(bad, f"{bad[0]} {bad[1]}")
-    return found
+        while bad in text_out:
+            text_out = text_out.replace(bad, f"{bad[0]} {bad[1]}")
+    return text_out
 
 
-def filled_template(name: str, **values: object) -> str:
+def fill_template(name: str, **values: object) -> str:
     """A template of this folder with its places filled.
 
     Args:
@@ -41,6 +41,6 @@ def filled_template(name: str, **values: object) -> str:
 
 def identifier(name: str) -> str:
     """A name as file systems and programs take one: letters of ASCII, digits and single underscores."""
-    found = "".join(x.lower() if x.isascii() and x.isalnum() else " " for x in name)
-    word = "_".join(found.split())[:40].strip("_")
+    letters = "".join(x.lower() if x.isascii() and x.isalnum() else " " for x in name)
+    word = "_".join(letters.split())[:40].strip("_")
     return word if word[:1].isalpha() else f"cable_{word}".strip("_")

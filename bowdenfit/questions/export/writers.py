@@ -6,18 +6,18 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from bowdenfit.questions.export.c import header
-from bowdenfit.questions.export.fmu import unit
-from bowdenfit.questions.export.lookup import lookup_table, table_of_draws
-from bowdenfit.questions.export.matlab import function, function_name
-from bowdenfit.questions.export.mujoco import model
-from bowdenfit.questions.export.parameters import parameters
-from bowdenfit.questions.export.transmission import LEVELS, Transmission
+from bowdenfit.questions.export.c import c_header
+from bowdenfit.questions.export.fmu import build_fmu
+from bowdenfit.questions.export.lookup import draws_table, lookup_table
+from bowdenfit.questions.export.matlab import function_name, matlab_function
+from bowdenfit.questions.export.mujoco import mujoco_model
+from bowdenfit.questions.export.parameters import yaml_parameters
+from bowdenfit.questions.export.transmission import LEVELS, TransmissionTables
 from bowdenfit.results.record import Record
 
 
 @dataclass(frozen=True)
-class Asked:
+class ExportRequest:
     """What is to be written.
 
     Args:
@@ -29,47 +29,54 @@ class Asked:
     """
 
     fit: Record
-    found: Transmission
+    tables: TransmissionTables
     path: Path
-    place: float | None
+    point: float | None
     compensation: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
-class Written:
+class FileContent:
     """Content of a file, and what is to be known of it."""
 
     content: bytes
     remarks: tuple[str, ...] = ()
 
 
-def _c(asked: Asked) -> Written:
-    return Written(header(asked.found).encode("ascii"))
+def _write_c(request: ExportRequest) -> FileContent:
+    return FileContent(c_header(request.tables).encode("ascii"))
 
 
-def _csv(asked: Asked) -> Written:
-    some = len(asked.found.levels) > len(LEVELS)
-    text = table_of_draws(asked.found) if some else lookup_table(asked.fit, asked.found)
-    return Written(text.encode())
+def _write_csv(request: ExportRequest) -> FileContent:
+    with_draws = len(request.tables.levels) > len(LEVELS)
+    text = draws_table(request.tables) if with_draws else lookup_table(request.fit, request.tables)
+    return FileContent(text.encode())
 
 
-def _fmu(asked: Asked) -> Written:
-    return Written(unit(asked.found, asked.fit.name))
+def _write_fmu(request: ExportRequest) -> FileContent:
+    return FileContent(build_fmu(request.tables, request.fit.name))
 
 
-def _matlab(asked: Asked) -> Written:
-    return Written(function(asked.found, function_name(asked.path)).encode("ascii"))
+def _write_matlab(request: ExportRequest) -> FileContent:
+    return FileContent(matlab_function(request.tables, function_name(request.path)).encode("ascii"))
 
 
-def _mujoco(asked: Asked) -> Written:
-    text, remarks = model(asked.found, asked.place, asked.path)
-    return Written(text.encode("ascii"), remarks)
+def _write_mujoco(request: ExportRequest) -> FileContent:
+    text, remarks = mujoco_model(request.tables, request.point, request.path)
+    return FileContent(text.encode("ascii"), remarks)
 
 
-def _yaml(asked: Asked) -> Written:
-    return Written(parameters(asked.found, asked.compensation).encode("ascii"))
+def _write_yaml(request: ExportRequest) -> FileContent:
+    return FileContent(yaml_parameters(request.tables, request.compensation).encode("ascii"))
 
 
-WRITERS: Mapping[str, Callable[[Asked], Written]] = MappingProxyType(
-    {"c": _c, "csv": _csv, "fmu": _fmu, "matlab": _matlab, "mujoco": _mujoco, "yaml": _yaml}
+WRITERS: Mapping[str, Callable[[ExportRequest], FileContent]] = MappingProxyType(
+    {
+        "c": _write_c,
+        "csv": _write_csv,
+        "fmu": _write_fmu,
+        "matlab": _write_matlab,
+        "mujoco": _write_mujoco,
+        "yaml": _write_yaml,
+    }
 )

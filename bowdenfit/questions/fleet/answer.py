@@ -10,7 +10,7 @@ from bowdenfit.inference.interval import Interval
 
 
 @dataclass(frozen=True)
-class Broken:
+class FailedInspection:
     """An inspection that could not be fitted.
 
     Args:
@@ -23,7 +23,7 @@ class Broken:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedInspection:
     """An inspection that was fitted by itself.
 
     Args:
@@ -68,8 +68,8 @@ class Fleet(Display):
     """
 
     name: str
-    fitted: tuple[Fitted, ...]
-    broken: tuple[Broken, ...]
+    fitted: tuple[FittedInspection, ...]
+    broken: tuple[FailedInspection, ...]
     units: dict[str, str]
     shapes: tuple[str, ...]
     seed: int
@@ -80,12 +80,12 @@ class Fleet(Display):
     @property
     def cables(self) -> tuple[str, ...]:
         """Names of all cables that were fitted."""
-        return tuple(dict.fromkeys(each.cable for each in self.fitted))
+        return tuple(dict.fromkeys(inspection.cable for inspection in self.fitted))
 
     @property
-    def untrusted(self) -> tuple[Fitted, ...]:
+    def untrusted(self) -> tuple[FittedInspection, ...]:
         """Inspections whose draws should not be trusted."""
-        return tuple(each for each in self.fitted if each.reasons)
+        return tuple(inspection for inspection in self.fitted if inspection.reasons)
 
     @property
     def is_trusted(self) -> bool:
@@ -95,21 +95,29 @@ class Fleet(Display):
     @property
     def engines(self) -> dict[str, int]:
         """How many inspections each engine drew for."""
-        names = [each.engine for each in self.fitted]
+        names = [inspection.engine for inspection in self.fitted]
         return {name: names.count(name) for name in dict.fromkeys(sorted(names))}
 
-    def middle(self, quantity: str) -> tuple[float, float, float, float]:
+    def summarize_quantity(self, quantity: str) -> tuple[float, float, float, float]:
         """Of a quantity over the fleet: 5 %, 50 % and 95 % of the medians, and the median of single standard deviations."""
-        every = [each.quantities[quantity] for each in self.fitted if quantity in each.quantities]
-        low, middle, high = np.quantile([each.median for each in every], (0.05, 0.5, 0.95))
-        return float(low), float(middle), float(high), float(np.median([each.sd for each in every]))
+        intervals = [interval.quantities[quantity] for interval in self.fitted if quantity in interval.quantities]
+        low, middle, high = np.quantile([interval.median for interval in intervals], (0.05, 0.5, 0.95))
+        return float(low), float(middle), float(high), float(np.median([interval.sd for interval in intervals]))
 
     def _table(self) -> Rows:
         """A row for each inspection and quantity."""
         rows = [
-            {"quantity": name, "inspection": each.inspection, "cable": each.cable, "cycles": each.cycles,
-             "temperature_degC": each.temperature, "lubricated": each.lubricated, "trusted": not each.reasons, **vars(interval)}
-            for each in self.fitted
-            for name, interval in each.quantities.items()
-        ]  # fmt: skip
+            {
+                "quantity": name,
+                "inspection": inspection.inspection,
+                "cable": inspection.cable,
+                "cycles": inspection.cycles,
+                "temperature_degC": inspection.temperature,
+                "lubricated": inspection.lubricated,
+                "trusted": not inspection.reasons,
+                **vars(interval),
+            }
+            for inspection in self.fitted
+            for name, interval in inspection.quantities.items()
+        ]
         return rows, dict(self.units)

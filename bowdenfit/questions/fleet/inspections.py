@@ -37,7 +37,7 @@ class Inspection:
     cycles: float
     temperature: float
     lubricated: float
-    place: Path
+    path: Path
 
     @property
     def label(self) -> str:
@@ -61,60 +61,65 @@ def read_inspections(folder: Path) -> list[Inspection]:
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder; name the one with {FLEET_TABLE}, or with a folder for each cable.")
     table = folder / FLEET_TABLE
-    found = _of_table(table) if table.exists() else _of_folders(folder)
-    names = {cable: i for i, cable in enumerate(sorted({each.cable for each in found}))}
-    return sorted(found, key=lambda each: (names[each.cable], -1.0 if math.isnan(each.cycles) else each.cycles))
+    inspections = _read_inspection_table(table) if table.exists() else _list_inspections(folder)
+    order = {cable: i for i, cable in enumerate(sorted({inspection.cable for inspection in inspections}))}
+    return sorted(
+        inspections,
+        key=lambda inspection: (order[inspection.cable], -1.0 if math.isnan(inspection.cycles) else inspection.cycles),
+    )
 
 
-def _of_folders(folder: Path) -> list[Inspection]:
+def _list_inspections(folder: Path) -> list[Inspection]:
     """Inspections by the names of folders."""
-    found = list[Inspection]()
+    inspections = list[Inspection]()
     for cable in sorted(path for path in folder.iterdir() if path.is_dir()):
         if (cable / DESCRIPTION_FILE).is_file():
-            found.append(Inspection(cable.name, UNKNOWN, UNKNOWN, UNKNOWN, cable))
+            inspections.append(Inspection(cable.name, UNKNOWN, UNKNOWN, UNKNOWN, cable))
             continue
-        of_cable = sorted(path for path in cable.iterdir() if (path / DESCRIPTION_FILE).is_file())
-        found += [Inspection(cable.name, _cycles_of(each), UNKNOWN, UNKNOWN, each) for each in of_cable]
-    if not found:
+        paths = sorted(path for path in cable.iterdir() if (path / DESCRIPTION_FILE).is_file())
+        inspections += [Inspection(cable.name, _parse_folder_name(each), UNKNOWN, UNKNOWN, each) for each in paths]
+    if not inspections:
         raise DatasetError(
             f"{folder} holds no fleet: write {FLEET_TABLE} with the columns {', '.join(COLUMNS)}, or a folder with "
             f"{DESCRIPTION_FILE} and tables for each cable."
         )
-    _refuse_twice([(each, str(each.place)) for each in found])
-    return found
+    _refuse_duplicates([(each, str(each.path)) for each in inspections])
+    return inspections
 
 
-def _cycles_of(place: Path) -> float:
+def _parse_folder_name(path: Path) -> float:
     try:
-        cycles = float(place.name)
+        cycles = float(path.name)
     except ValueError:
         cycles = UNKNOWN
     if not (math.isfinite(cycles) and cycles >= 0):
         raise DatasetError(
-            f"{place} is no number of cycles, which the folder of an inspection is called by, such as "
-            f"{place.parent.name}/25000; rename it, or write {FLEET_TABLE}."
+            f"{path} is no number of cycles, which the folder of an inspection is called by, such as "
+            f"{path.parent.name}/25000; rename it, or write {FLEET_TABLE}."
         )
     return cycles
 
 
-def _of_table(path: Path) -> list[Inspection]:
+def _read_inspection_table(path: Path) -> list[Inspection]:
     """Inspections by fleet.csv."""
     table = read_table(path)
     texts = ("cable", "file", "lubricated", *_TEMPERATURES)
-    found = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
-    cables = [cell.text.strip() for cell in require(table, found, "cable", "cable").each(_filled, _blank(table))]
-    files = [cell.text.strip() for cell in require(table, found, "file", "file").each(_filled, _blank(table))]
-    none = [UNKNOWN] * len(table.rows)
-    cycles = found["cycles"].each(_cycles, UNKNOWN) if "cycles" in found else none
-    lubricated = found["lubricated"].each(_flag, UNKNOWN) if "lubricated" in found else none
-    temperature = _temperatures(table, found) or none
+    columns = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
+    cables = [
+        cell.text.strip() for cell in require(table, columns, "cable", "cable").each(_require_text, _blank(table))
+    ]
+    files = [cell.text.strip() for cell in require(table, columns, "file", "file").each(_require_text, _blank(table))]
+    unknown = [UNKNOWN] * len(table.rows)
+    cycles = columns["cycles"].each(_parse_cycles, UNKNOWN) if "cycles" in columns else unknown
+    lubricated = columns["lubricated"].each(_parse_flag, UNKNOWN) if "lubricated" in columns else unknown
+    temperature = _parse_temperatures(table, columns) or unknown
     table.faults.refuse()
     rows = [row[0].row for row in table.rows]
-    places = [path.parent / file for file in files]
-    inspections = list(map(Inspection, cables, cycles, temperature, lubricated, places))
+    paths = [path.parent / file for file in files]
+    inspections = list(map(Inspection, cables, cycles, temperature, lubricated, paths))
     numbered = list(zip(inspections, [f"{path.name}, row {row}" for row in rows], strict=True))
-    _refuse_twice(numbered)
-    _refuse_backwards(numbered)
+    _refuse_duplicates(numbered)
+    _refuse_decreasing_cycles(numbered)
     if not inspections:
         raise DatasetError(f"{path.name} has no row; write one for each inspection.")
     return inspections
@@ -124,72 +129,72 @@ def _blank(table: RawTable) -> Cell:
     return Cell(table.file, table.header_row, "", "")
 
 
-def _filled(cell: Cell) -> Cell:
+def _require_text(cell: Cell) -> Cell:
     if cell.blank or "\0" in cell.text:
         raise cell.refuse("the cell is blank; every inspection has a cable and a file.")
     return cell
 
 
-def _cycles(cell: Cell) -> float:
+def _parse_cycles(cell: Cell) -> float:
     value = UNKNOWN if cell.blank else cell.number()
     if value < 0:
         raise cell.refuse(f"{cell.shown} cycles cannot be; write how many the cable had made, 0 when it was new.")
     return value
 
 
-def _flag(cell: Cell) -> float:
-    said = cell.text.strip().lower()
-    if cell.blank or said in _YES | _NO:
-        return UNKNOWN if cell.blank else float(said in _YES)
+def _parse_flag(cell: Cell) -> float:
+    answer = cell.text.strip().lower()
+    if cell.blank or answer in _YES | _NO:
+        return UNKNOWN if cell.blank else float(answer in _YES)
     raise cell.refuse(f"{cell.shown} does not say whether the cable was lubricated; write yes or no.")
 
 
-def _temperatures(table: RawTable, found: dict[str, Column]) -> list[float]:
+def _parse_temperatures(table: RawTable, columns: dict[str, Column]) -> list[float]:
     """Temperatures [°C]; empty without a column."""
-    there = [name for name in _TEMPERATURES if name in found]
+    headings = [name for name in _TEMPERATURES if name in columns]
     bare = [heading for heading in table.header if heading.strip().lower() in {"temperature", "temp"}]
-    if bare or len(there) > 1:
-        named = ", ".join(map(shown, bare or there))
+    if bare or len(headings) > 1:
+        named = ", ".join(map(shown, bare or headings))
         raise DatasetError(
             f"{table.file}: {named} must be one column that says its unit; call it temperature_degC or temperature_K."
         )
 
     def read(cell: Cell) -> float:
-        value = UNKNOWN if cell.blank else cell.number() + _TEMPERATURES[there[0]]
+        value = UNKNOWN if cell.blank else cell.number() + _TEMPERATURES[headings[0]]
         if value < _COLDEST or value > _HOTTEST:
             raise cell.refuse(f"{cell.shown} is no temperature at which a cable is inspected; correct it, or its unit.")
         return value
 
-    return found[there[0]].each(read, UNKNOWN) if there else []
+    return columns[headings[0]].each(read, UNKNOWN) if headings else []
 
 
-def _refuse_twice(numbered: Sequence[tuple[Inspection, str]]) -> None:
+def _refuse_duplicates(numbered: Sequence[tuple[Inspection, str]]) -> None:
     """A cable cannot be inspected twice after the same cycles: one would count as two."""
-    before: dict[str, str] = {}
-    for each, where in numbered:
-        if each.label in before:
-            missing = "" if math.isfinite(each.cycles) else " without a number of cycles"
+    seen: dict[str, str] = {}
+    for inspection, where in numbered:
+        if inspection.label in seen:
+            missing = "" if math.isfinite(inspection.cycles) else " without a number of cycles"
             raise DatasetError(
-                f"{each.label} stands twice{missing}: {before[each.label]} and {where}. The usual cause is a row that was "
-                "copied; delete one, correct the cycles, or put the readings of both into one table."
+                f"{inspection.label} stands twice{missing}: {seen[inspection.label]} and {where}. The usual cause is a row "
+                "that was copied; delete one, correct the cycles, or put the readings of both into one table."
             )
-        before[each.label] = where
+        seen[inspection.label] = where
 
 
-def _refuse_backwards(numbered: Sequence[tuple[Inspection, str]]) -> None:
+def _refuse_decreasing_cycles(numbered: Sequence[tuple[Inspection, str]]) -> None:
     """Inspections of a cable stand in the order in which they were made, so that cycles that fall are a mistake."""
     last: dict[str, tuple[float, str]] = {}
     wrong = list[str]()
-    for each, where in numbered:
-        before, place = last.get(each.cable, (-1.0, ""))
-        if each.cycles < before:
-            wrong.append(f"{where} ({each.cable}: {each.cycles:.15g} after {before:.15g} in {place.split(', ')[-1]})")
-        if not math.isnan(each.cycles):
-            last[each.cable] = each.cycles, where
+    for inspection, where in numbered:
+        before, previous = last.get(inspection.cable, (-1.0, ""))
+        if inspection.cycles < before:
+            wrong.append(
+                f"{where} ({inspection.cable}: {inspection.cycles:.15g} after {before:.15g} in {previous.split(', ')[-1]})"
+            )
+        if not math.isnan(inspection.cycles):
+            last[inspection.cable] = inspection.cycles, where
     if wrong:
         raise DatasetError(
             f"cycles run backwards: {few(wrong)}. The usual cause is a wrong number, or a counter that was set to 0; write the "
             "cycles that the cable had made in all, and the rows of a cable in the order of its inspections."
         )
-
-

@@ -27,8 +27,8 @@ from bowdenfit.results.folder import (
 from bowdenfit.results.serialization import read_arrays, write_arrays
 from bowdenfit.words import few, shown
 
-KEPT, BEGUN = "kept", "begun.json"  # folder of pieces, and what they were made for
-_FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (KEPT, JOBS_FOLDER)  # all that is written
+PIECES_FOLDER, START_FILE = "kept", "begun.json"  # folder of pieces, and what they were made for
+_FILES, _FOLDERS = (FLEET_PAGE, FLEET_DRAWS, SUMMARY_TEXT), (PIECES_FOLDER, JOBS_FOLDER)  # all that is written
 _FITS = "fits"
 _WHAT = {"seed": "the seed", "versions": "a version of bowdenfit or of a library"}
 SEPARATOR = "\n"  # between reasons in fleet.nc
@@ -44,7 +44,7 @@ class FleetStore:
     """
 
     folder: Path
-    begun: Mapping[str, Any]
+    start: Mapping[str, Any]
 
     def open(self, resume: bool, force: bool) -> dict[str, PieceFit]:
         """What was fitted before, by the hash of its input, in a folder that is ready for more.
@@ -56,11 +56,11 @@ class FleetStore:
         Raises:
             StoreError: The folder holds something else, or what it holds was made otherwise.
         """
-        finished, kept = self.folder / FLEET_PAGE, self.folder / KEPT
+        finished, kept = self.folder / FLEET_PAGE, self.folder / PIECES_FOLDER
         if resume:
             self._refuse_changed()
-            before = self._of_finished() if finished.exists() else {}
-            return before | self._of_pieces()
+            before = self._read_finished() if finished.exists() else {}
+            return before | self._read_pieces()
         if (finished.exists() or kept.exists()) and not force:
             raise StoreError(f"{self.folder} holds a fleet already; go on with --resume, or start over with --force.")
         if not holds_only_run_files(self.folder, {*_FILES, *_FOLDERS}):
@@ -72,58 +72,58 @@ class FleetStore:
             )
         with folder_to_write(self.folder):
             remove_run_files(self.folder, _FILES, _FOLDERS)
-            self._begin()
+            self._write_start()
         return {}
 
-    def _begin(self) -> None:
-        (self.folder / KEPT).mkdir(parents=True, exist_ok=True)
-        write_text(self.folder / KEPT / BEGUN, json.dumps(dict(self.begun), indent=1) + "\n")
+    def _write_start(self) -> None:
+        (self.folder / PIECES_FOLDER).mkdir(parents=True, exist_ok=True)
+        write_text(self.folder / PIECES_FOLDER / START_FILE, json.dumps(dict(self.start), indent=1) + "\n")
 
     def _refuse_changed(self) -> None:
-        before = begun_before(self.folder)
-        changed = [name for name in _WHAT if before.get(name) != json.loads(json.dumps(self.begun[name]))]
+        before = read_start(self.folder)
+        changed = [name for name in _WHAT if before.get(name) != json.loads(json.dumps(self.start[name]))]
         if changed:
-            what = _changes(before.get(changed[0]), self.begun[changed[0]])
+            what = _describe_changes(before.get(changed[0]), self.start[changed[0]])
             raise StoreError(
                 f"{self.folder} cannot be resumed because {_WHAT[changed[0]]} changed since{what}; undo the change, or start "
                 "over with --force."
             )
         with folder_to_write(self.folder):
-            self._begin()
+            self._write_start()
 
-    def _of_finished(self) -> dict[str, PieceFit]:
+    def _read_finished(self) -> dict[str, PieceFit]:
         """What a finished fleet has."""
-        drawn, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
+        draws, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
         with or_damaged(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
-            return self._as_fits(drawn)
+            return self._as_fits(draws)
 
-    def _as_fits(self, drawn: FleetDraws) -> dict[str, PieceFit]:
-        found = dict[str, PieceFit]()
-        quantities: dict[str, list[str]] = drawn.about["quantities"]
-        stats = {name: [_text(each) for each in values] for name, values in drawn.stats.items()}
+    def _as_fits(self, draws: FleetDraws) -> dict[str, PieceFit]:
+        fits = dict[str, PieceFit]()
+        quantities: dict[str, list[str]] = draws.about["quantities"]
+        stats = {name: [_as_text(value) for value in values] for name, values in draws.stats.items()}
         for i, name in enumerate(stats["input"]):
             own = quantities[stats["shape"][i]]
-            values = [drawn.values[each][i] for each in own]
+            values = [draws.values[value][i] for value in own]
             reasons = tuple(stats["reasons"][i].split(SEPARATOR)) if stats["reasons"][i] else ()
-            k, worth = (float(drawn.stats[each][i]) for each in ("pareto_k", "n_effective"))
-            found[name] = PieceFit(name, np.stack(values), stats["engine"][i], k, worth, reasons)
-        return found
+            k, n_effective = (float(draws.stats[value][i]) for value in ("pareto_k", "n_effective"))
+            fits[name] = PieceFit(name, np.stack(values), stats["engine"][i], k, n_effective, reasons)
+        return fits
 
-    def _of_pieces(self) -> dict[str, PieceFit]:
+    def _read_pieces(self) -> dict[str, PieceFit]:
         """What an interrupted fleet kept; a piece that is damaged is fitted again."""
-        found: dict[str, PieceFit] = {}
-        for path in sorted((self.folder / KEPT).glob("*.npz")):
+        kept: dict[str, PieceFit] = {}
+        for path in sorted((self.folder / PIECES_FOLDER).glob("*.npz")):
             damaged = StoreError(f"{path} is damaged")
             try:
                 with or_damaged(damaged):
                     fits: Sequence[PieceFit] = read_arrays(path, {_FITS: tuple[PieceFit, ...]})[_FITS]
-                    if not all(_is_whole(fit) for fit in fits):
+                    if not all(_is_valid(fit) for fit in fits):
                         raise damaged
             except StoreError:
                 path.unlink(missing_ok=True)
                 continue
-            found |= {fit.name: fit for fit in fits}
-        return found
+            kept |= {fit.name: fit for fit in fits}
+        return kept
 
     def keep(self, fits: Sequence[PieceFit]) -> None:
         """Keep what came of a piece; it is there whole, or not at all.
@@ -132,7 +132,7 @@ class FleetStore:
             fits: What came of it.
         """
         name = hashlib.sha256(" ".join(fit.name for fit in fits).encode()).hexdigest()[:16]
-        with folder_to_write(self.folder / KEPT) as kept:
+        with folder_to_write(self.folder / PIECES_FOLDER) as kept:
             write_arrays(kept / f"{name}.npz", {_FITS: tuple(fits)})
 
     def finish(self) -> None:
@@ -140,31 +140,34 @@ class FleetStore:
         self._remove_pieces()
 
     def _remove_pieces(self) -> None:
-        for name in (KEPT, JOBS_FOLDER):
+        for name in (PIECES_FOLDER, JOBS_FOLDER):
             if (self.folder / name).is_dir():
                 shutil.rmtree(self.folder / name, ignore_errors=True)
 
 
-def _changes(before: Any, now: Any) -> str:
+def _describe_changes(before: Any, now: Any) -> str:
     """From what to what, in words; empty where what was begun does not say it."""
     if not (isinstance(before, Mapping) and isinstance(now, Mapping)):
         return f" from {shown(before)} to {shown(now)}" if isinstance(before, int) else ""
     names = [name for name in (*now, *before) if before.get(name) != now.get(name)]
-    each = [f"{name} from {_one(before.get(name))} to {_one(now.get(name))}" for name in dict.fromkeys(names)]
-    return f" ({few(each)})"
+    changes = [
+        f"{name} from {_format_version(before.get(name))} to {_format_version(now.get(name))}"
+        for name in dict.fromkeys(names)
+    ]
+    return f" ({few(changes)})"
 
 
-def _one(version: Any) -> str:
+def _format_version(version: Any) -> str:
     return "none" if version is None else shown(version)
 
 
-def begun_before(folder: Path) -> dict[str, Any]:
+def read_start(folder: Path) -> dict[str, Any]:
     """What the fleet in a folder was begun with.
 
     Raises:
         StoreError: There is none, or it is damaged.
     """
-    for path in (folder / KEPT / BEGUN, folder / FLEET_PAGE):
+    for path in (folder / PIECES_FOLDER / START_FILE, folder / FLEET_PAGE):
         if path.exists():
             page = read_page(path)
             with or_damaged(StoreError(f"{path} is damaged; start over with --force.")):
@@ -173,11 +176,15 @@ def begun_before(folder: Path) -> dict[str, Any]:
     raise StoreError(f"{folder} holds no fleet to resume; leave --resume out.")
 
 
-def _is_whole(fit: PieceFit) -> bool:
+def _is_valid(fit: PieceFit) -> bool:
     """Whether a fit that was read is one that was kept."""
-    texts = isinstance(fit.name, str) and isinstance(fit.engine, str) and all(isinstance(each, str) for each in fit.reasons)
+    texts = (
+        isinstance(fit.name, str)
+        and isinstance(fit.engine, str)
+        and all(isinstance(reason, str) for reason in fit.reasons)
+    )
     return texts and isinstance(fit.values, np.ndarray) and fit.values.ndim == 2 and fit.values.dtype == np.float64
 
 
-def _text(value: Any) -> str:
+def _as_text(value: Any) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)

@@ -19,7 +19,7 @@ from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
 if TYPE_CHECKING:
     from bowdenfit.inference.batch.pieces import PieceFit
     from bowdenfit.inference.engines import Engine
-    from bowdenfit.questions.fleet.answer import Broken, Fleet
+    from bowdenfit.questions.fleet.answer import FailedInspection, Fleet
     from bowdenfit.questions.fleet.cases import Case
     from bowdenfit.questions.fleet.inspections import Inspection
     from bowdenfit.questions.fleet.store import FleetStore
@@ -36,7 +36,9 @@ def fleet(
     *,
     output: Annotated[Output, Parameter(show_default="fits/NAME OF FOLDER")] = None,
     engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)] = None,
+    workers: Annotated[
+        int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)
+    ] = None,
     seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
@@ -72,7 +74,7 @@ def fleet(
         import jax
 
         from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
-        from bowdenfit.questions.fleet.fitting import gathered
+        from bowdenfit.questions.fleet.fitting import gather_results
 
         store, seed = _store(place, seed, resume)
         keep_compiled_programs()
@@ -81,21 +83,23 @@ def fleet(
             with open_engine(engine, workers, place and place / JOBS_FOLDER, workers or 1) as opened:
                 fits = store.open(resume, force) if store else {}
                 _fit(opened, cases, seed, store, fits, show)
-            answer, drawn = gathered(Path(folder).resolve().name, cases, fits, broken, seed)
+            answer, draws = gather_results(Path(folder).resolve().name, cases, fits, broken, seed)
         if store is not None:
-            _write(answer, drawn, store)
+            _write(answer, draws, store)
     return answer
 
 
-def _read(folder: Path, inspections: "list[Inspection]", reading: Reading) -> "tuple[list[Case], list[Broken]]":
+def _read(
+    folder: Path, inspections: "list[Inspection]", reading: Reading
+) -> "tuple[list[Case], list[FailedInspection]]":
     """What can be fitted, and what is broken."""
-    from bowdenfit.questions.fleet.answer import Broken
-    from bowdenfit.questions.fleet.cases import read_cases, refuse_where_none
+    from bowdenfit.questions.fleet.answer import FailedInspection
+    from bowdenfit.questions.fleet.cases import read_cases, refuse_if_none_usable
 
-    found = list(read_cases(folder, inspections, reading))
-    broken = [each for each in found if isinstance(each, Broken)]
-    cases = [each for each in found if not isinstance(each, Broken)]
-    refuse_where_none(cases, broken)
+    cases_and_failures = list(read_cases(folder, inspections, reading))
+    broken = [case for case in cases_and_failures if isinstance(case, FailedInspection)]
+    cases = [case for case in cases_and_failures if not isinstance(case, FailedInspection)]
+    refuse_if_none_usable(cases, broken)
     return cases, broken
 
 
@@ -103,12 +107,12 @@ def _store(place: Path | None, seed: int | None, resume: bool) -> "tuple[FleetSt
     """The results folder, and the seed: as stated, else that of the fleet to go on with, else a new one."""
     from bowdenfit.errors import UsageError
     from bowdenfit.inference.engines import versions
-    from bowdenfit.questions.fleet.store import FleetStore, begun_before
+    from bowdenfit.questions.fleet.store import FleetStore, read_start
 
     if resume and place is None:
         raise UsageError("--resume needs the results folder of a fleet; name it with --output.")
     if seed is None:
-        seed = int(begun_before(place)["seed"]) if resume and place is not None else secrets.randbelow(LARGEST_SEED)
+        seed = int(read_start(place)["seed"]) if resume and place is not None else secrets.randbelow(LARGEST_SEED)
     return (None if place is None else FleetStore(place, {"seed": seed, "versions": versions()})), seed
 
 
@@ -122,12 +126,12 @@ def _fit(
 ) -> None:
     """Fit what is left, and keep each piece as it ends."""
     from bowdenfit.inference.batch.pieces import fit_piece
-    from bowdenfit.questions.fleet.fitting import SETTINGS, pieces_of
+    from bowdenfit.questions.fleet.fitting import SETTINGS, divide_into_pieces
 
     todo = [case for case in cases if case.hash not in fits]
     begin, before, total = time.monotonic(), len(cases) - len(todo), len(cases)
     done = before
-    pieces = pieces_of(todo, seed, SETTINGS, opened.workers, opened.max_datasets)
+    pieces = divide_into_pieces(todo, seed, SETTINGS, opened.workers, opened.max_datasets)
     for piece_fits in opened.results(fit_piece, pieces):
         if store is not None:
             store.keep(piece_fits)
@@ -137,7 +141,7 @@ def _fit(
             report(done, total, (time.monotonic() - begin) / (done - before))
 
 
-def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> None:
+def _write(answer: "Fleet", draws: "FleetDraws | None", store: "FleetStore") -> None:
     """The draws, the summary and, last, fleet.json, all of them or none; what was kept of pieces is not needed then."""
     from bowdenfit.questions.fleet.words import fleet_text
     from bowdenfit.results.answer_cache import file_checksum
@@ -147,19 +151,19 @@ def _write(answer: "Fleet", drawn: "FleetDraws | None", store: "FleetStore") -> 
     from bowdenfit.words import printable
 
     with fill_folder_atomically(store.folder, FLEET_PAGE) as folder:
-        if drawn is not None:
-            write_fleet_draws(folder / FLEET_DRAWS, drawn)
+        if draws is not None:
+            write_fleet_draws(folder / FLEET_DRAWS, draws)
         write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
         page = plain_data(answer) | {CHECKSUM: file_checksum(folder / FLEET_DRAWS)}
         write_text(folder / FLEET_PAGE, json.dumps(page, indent=1) + "\n")
     store.finish()
 
 
-def _reply(found: "Fleet", asked: dict[str, Any]) -> Reply:
+def _reply(answer: "Fleet", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.fleet.words import fleet_text
 
-    exit_code = 0 if found.is_trusted else NOT_TRUSTED
-    return Reply(fleet_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code, found.to_csv)
+    exit_code = 0 if answer.is_trusted else NOT_TRUSTED
+    return Reply(fleet_text(answer), lambda: answer, (f"Wrote {options['output']}.",), exit_code, answer.to_csv)
 
 
 def _show(bar: Any, done: int, total: int, seconds: float) -> None:

@@ -38,11 +38,14 @@ class Contrast(Display):
 
     def sentence(self) -> str:
         """'new less old: -0.140, 90 % interval -0.160 to -0.120, different (lower) with probability 0.99'"""
-        known, way = self.difference, "lower" if self.difference.median < 0 else "higher"
-        value, low, high = (f"{v:z.{decimals(known.sd)}f}" for v in (known.median, known.q05, known.q95))
+        difference, direction = self.difference, "lower" if self.difference.median < 0 else "higher"
+        value, low, high = (
+            f"{v:z.{decimals(difference.sd)}f}" for v in (difference.median, difference.q05, difference.q95)
+        )
         sure = f"above {_SURE}" if self.probability > _SURE else f"{self.probability:.3g}"
         return (
-            f"{self.group} less {self.less}: {value}, 90 % interval {low} to {high}, different ({way}) with probability {sure}"
+            f"{self.group} minus {self.less}: {value}, 90 % interval {low} to {high}, different ({direction}) with "
+            f"probability {sure}"
         )
 
     def __str__(self) -> str:
@@ -77,7 +80,7 @@ class Groups(Display):
         return [f"Friction {c.coefficient}, {c.sentence()}." for c in self.contrasts]
 
     def _table(self) -> Rows:
-        rows = [each.row for each in self.contrasts]
+        rows = [contrast.row for contrast in self.contrasts]
         return rows, dict.fromkeys(rows[0] if rows else (), "1")
 
     def contrast(self, group: str, less: str, coefficient: str = "") -> Contrast:
@@ -91,18 +94,20 @@ class Groups(Display):
         Raises:
             KeyError: There is none of these groups.
         """
-        mine = [c for c in self.contrasts if coefficient in ("", c.coefficient) and {c.group, c.less} == {group, less}]
-        if not mine:
+        matching = [
+            c for c in self.contrasts if coefficient in ("", c.coefficient) and {c.group, c.less} == {group, less}
+        ]
+        if not matching:
             raise KeyError(f"there is no contrast of {group!r} and {less!r}; groups are {', '.join(self.names)}.")
-        found, known = mine[0], mine[0].difference
-        if found.group == group:
-            return found
-        other_way = Interval(-known.mean, known.sd, -known.median, -known.q95, -known.q05)
-        return replace(found, group=group, less=less, difference=other_way)
+        contrast, difference = matching[0], matching[0].difference
+        if contrast.group == group:
+            return contrast
+        other_way = Interval(-difference.mean, difference.sd, -difference.median, -difference.q95, -difference.q05)
+        return replace(contrast, group=group, less=less, difference=other_way)
 
 
 @cached_per_fit
-def groups_of(fit: Record) -> Groups | None:
+def contrast_groups(fit: Record) -> Groups | None:
     """The groups of a fit and their contrasts; None where all readings share their coefficients, or without draws."""
     names = fit.model.cable.friction.groups
     if not names or fit.sampled is None:
@@ -115,7 +120,9 @@ def _contrasts(fit: Record, names: tuple[str, ...]) -> Iterator[Contrast]:
     contacts = fit.dataset.description.contact
     for coefficient in dict.fromkeys(c.friction for c in contacts if c.by_group):
         for group, less in pairs:
-            draws = np.ravel(_draws(fit, coefficient_of(coefficient, group)) - _draws(fit, coefficient_of(coefficient, less)))
+            draws = np.ravel(
+                _draws(fit, coefficient_of(coefficient, group)) - _draws(fit, coefficient_of(coefficient, less))
+            )
             below = float(np.mean(draws < 0))
             yield Contrast(coefficient, group, less, Interval.of(draws), max(below, 1 - below))
 

@@ -10,7 +10,7 @@ from bowdenfit.inference.interval import Interval
 
 
 @dataclass(frozen=True, repr=False)
-class Asked(Part):
+class ServiceLimit(Part):
     """Until which efficiency a cable serves, and where.
 
     Args:
@@ -67,14 +67,19 @@ class PooledCable(Part):
     inspections: int
     last: float
     coefficients: dict[str, Interval]
-    alone: dict[str, Interval | None]
+    unpooled: dict[str, Interval | None]
     wear: Interval | None
     life: Life | None
-    chance: float
-    unlike: str
+    p_value: float
+    departure: str
     pooled: tuple[str, ...]
-    worth: float
-    measured: int
+    n_effective: float
+    n_from_readings: int
+
+    JSON: ClassVar = (
+        "cable", "inspections", "last", "coefficients", ("alone", "unpooled"), "wear", "life", ("chance", "p_value"),
+        ("unlike", "departure"), "pooled", ("worth", "n_effective"), ("measured", "n_from_readings"),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -183,16 +188,20 @@ class Pool(Display):
     effects: tuple[Effect, ...]
     reference_cycles: float
     reference_temperature: float
-    asked: Asked | None
-    new: Life | None
-    mixed: dict[str, float]
+    limit: ServiceLimit | None
+    new_cable: Life | None
+    mixtures: dict[str, float]
     curves: Curves | None
-    next: tuple[NextInspection, ...]
+    next_inspections: tuple[NextInspection, ...]
     notes: tuple[str, ...]
     reasons: tuple[str, ...]
     seed: int
 
-    JSON: ClassVar = ("is_trusted", ...)
+    JSON: ClassVar = (
+        "is_trusted", "name", "cables", "inspections", "left_out", "coefficients", "typical", "spreads", "wear", "effects",
+        "reference_cycles", "reference_temperature", ("asked", "limit"), ("new", "new_cable"), ("mixed", "mixtures"), "curves",
+        ("next", "next_inspections"), "notes", "reasons", "seed",
+    )  # fmt: skip
 
     @property
     def is_trusted(self) -> bool:
@@ -200,9 +209,9 @@ class Pool(Display):
         return not self.reasons
 
     @property
-    def unlike(self) -> tuple[PooledCable, ...]:
+    def outliers(self) -> tuple[PooledCable, ...]:
         """Cables that are unlike the rest, the one furthest off first."""
-        return tuple(sorted((each for each in self.cables if each.unlike), key=lambda each: each.chance))
+        return tuple(sorted((cable for cable in self.cables if cable.departure), key=lambda cable: cable.p_value))
 
     def cable(self, name: str) -> PooledCable:
         """One of the cables.
@@ -210,20 +219,20 @@ class Pool(Display):
         Raises:
             KeyError: There is none of this name.
         """
-        for each in self.cables:
-            if each.cable == name:
-                return each
+        for pooled in self.cables:
+            if pooled.cable == name:
+                return pooled
         raise KeyError(f"there is no cable {name!r}; there are {', '.join(c.cable for c in self.cables)}.")
 
     def _table(self) -> Rows:
         """A row for each cable and quantity."""
         rows: list[dict[str, Any]] = []
-        for each in self.cables:
-            of_cable: dict[str, Interval] = dict(each.coefficients) | ({"wear": each.wear} if each.wear else {})
-            life = each.life
+        for cable in self.cables:
+            intervals: dict[str, Interval] = dict(cable.coefficients) | ({"wear": cable.wear} if cable.wear else {})
+            life = cable.life
             fails = {"life_cycles": life.median if life else None, "fails": life.fails if life else None}
-            for name, interval in of_cable.items():
-                pooled = {"pooled": "yes" if name in each.pooled else "no"}
-                rows.append({"quantity": name, "cable": each.cable, **vars(interval), **fails, **pooled})
+            for name, interval in intervals.items():
+                pooled = {"pooled": "yes" if name in cable.pooled else "no"}
+                rows.append({"quantity": name, "cable": cable.cable, **vars(interval), **fails, **pooled})
         names = (*self.typical, *(("wear",) if self.wear else ()))
         return rows, dict.fromkeys(names, "1")

@@ -45,53 +45,57 @@ HEADINGS = {
 }
 
 
-def figures_of(found: Pool, width: float | None = None) -> dict[str, Figure]:
+def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
     """All figures of a pooled fleet, by name.
 
     Args:
         found: The pooled fleet.
         width: Of the page [in]; what suits each if omitted.
     """
-    figures = {"pooled-coefficients": coefficients(found, width)}
-    if found.curves is not None:
-        figures["pooled-wear"] = wear(found, found.curves, width)
-        if found.curves.fails is not None and found.curves.new_fails is not None:
-            figures["pooled-life"] = life(found, found.curves, found.curves.fails, found.curves.new_fails, width)
+    figures = {"pooled-coefficients": draw_coefficients(pool, width)}
+    if pool.curves is not None:
+        figures["pooled-wear"] = draw_wear(pool, pool.curves, width)
+        if pool.curves.fails is not None and pool.curves.new_fails is not None:
+            figures["pooled-life"] = draw_life(pool, pool.curves, pool.curves.fails, pool.curves.new_fails, width)
     return figures
 
 
-def captions(found: Pool) -> dict[str, str]:
+def captions(pool: Pool) -> dict[str, str]:
     """What each figure shows, in plain words."""
-    asked = found.asked
-    what = f"efficiency falls below {100 * asked.efficiency:g} %" if asked is not None else ""
+    limit = pool.limit
+    what = f"efficiency falls below {100 * limit.efficiency:g} %" if limit is not None else ""
     return {
         "pooled-coefficients": (
             "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
             "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
-            f"{len(found.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
+            f"{len(pool.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
         ),
         "pooled-wear": (
-            f"{'Efficiency' if asked else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
-            f"with 90 % interval), dry and at {found.reference_temperature:g} °C. n = {len(found.cables)} cables, inspected up "
+            f"{'Efficiency' if limit else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
+            f"with 90 % interval), dry and at {pool.reference_temperature:g} °C. n = {len(pool.cables)} cables, inspected up "
             "to the dotted line; beyond it wear is taken to go on as it did."
         ),
         "pooled-life": (
             f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
-            f"{len(found.cables)} cables."
+            f"{len(pool.cables)} cables."
         ),
     }
 
 
 @in_paper_style
-def coefficients(found: Pool, width: float | None = None) -> Figure:
+def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
     """Coefficients and wear of every cable, alone and pooled."""
-    names = [name for name in found.typical if any(name in each.coefficients for each in found.cables)][:MOST_COEFFICIENTS]
-    columns = [*names, *(["wear"] if found.wear is not None else [])]
-    order = sorted(found.cables, key=lambda each: (names[0] in each.coefficients, _median(each.coefficients.get(names[0]))))
+    names = [name for name in pool.typical if any(name in cable.coefficients for cable in pool.cables)][
+        :MOST_COEFFICIENTS
+    ]
+    columns = [*names, *(["wear"] if pool.wear is not None else [])]
+    order = sorted(
+        pool.cables, key=lambda cable: (names[0] in cable.coefficients, _median(cable.coefficients.get(names[0])))
+    )
     step = -(-len(order) // MOST_CABLES)
-    shown = [each for i, each in enumerate(order) if i % step == 0 or each.unlike]
+    shown = [cable for i, cable in enumerate(order) if i % step == 0 or cable.departure]
     page = width or (WIDE if len(columns) > 1 else MEDIUM)
-    labels = [shorten_name(each.cable, LONGEST_NAME) for each in shown]
+    labels = [shorten_name(cable.cable, LONGEST_NAME) for cable in shown]
     left = max(0.3, 0.2 + max(map(text_width, labels)))
     across = page >= MEDIUM
     inner = (page - left - RIGHT - 0.2 * (len(columns) - 1)) / len(columns) if across else page - left - RIGHT
@@ -102,76 +106,82 @@ def coefficients(found: Pool, width: float | None = None) -> Figure:
     for i, name in enumerate(columns):
         bottom = _BELOW + (rows - 1 - (0 if across else i)) * (TITLE + height + _BELOW)
         axes = axes_at(figure, left + (i * (inner + 0.2) if across else 0.0), bottom, inner, height)
-        for y, each in enumerate(shown):
-            pooled = each.wear if name == "wear" else each.coefficients.get(name)
-            _cable(axes, y, pooled, each.alone.get(name), bool(each.unlike), name == "wear")
-        _population(axes, found, name)
+        for y, cable in enumerate(shown):
+            pooled = cable.wear if name == "wear" else cable.coefficients.get(name)
+            _draw_cable(axes, y, pooled, cable.unpooled.get(name), bool(cable.departure), name == "wear")
+        _draw_population(axes, pool, name)
         axes.set_yticks(range(len(shown)), labels if i == 0 or not across else [])
-        axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_label(found, name))
+        axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_label(pool, name))
         axes.grid(axis="y", visible=False)
         axes.locator_params(axis="x", nbins=max(2, int(inner / 0.55)))
         place_labels(figure, axes)
         panels.append(axes)
     legend_above(figure, panels, columns=3)
-    return _titled(figure, "pooled-coefficients", found)
+    return _add_title(figure, "pooled-coefficients", pool)
 
 
-def _cable(axes: Axes, y: int, pooled: Interval | None, alone: Interval | None, unlike: bool, percent: bool) -> None:
+def _draw_cable(
+    axes: Axes, y: int, pooled: Interval | None, unpooled: Interval | None, is_outlier: bool, percent: bool
+) -> None:
     """One cable in one panel."""
     if pooled is None:
         return
-    color, times = VERMILLION if unlike else BLUE, 100.0 if percent else 1.0
-    if alone is not None:
-        axes.plot([times * alone.median], [y], "o", color=GRAY, markerfacecolor="white", markersize=3.2, label="By itself")
+    color, times = VERMILLION if is_outlier else BLUE, 100.0 if percent else 1.0
+    if unpooled is not None:
+        axes.plot(
+            [times * unpooled.median], [y], "o", color=GRAY, markerfacecolor="white", markersize=3.2, label="By itself"
+        )
     axes.plot([times * pooled.q05, times * pooled.q95], [y, y], "-", color=color, linewidth=1.0)
-    label = "Unlike the rest" if unlike else f"Pooled, {WIDE_INTERVAL}"
-    axes.plot([times * pooled.median], [y], "s" if unlike else "o", color=color, markersize=2.6, label=label)
+    label = "Unlike the rest" if is_outlier else f"Pooled, {WIDE_INTERVAL}"
+    axes.plot([times * pooled.median], [y], "s" if is_outlier else "o", color=color, markersize=2.6, label=label)
 
 
-def _population(axes: Axes, found: Pool, name: str) -> None:
+def _draw_population(axes: Axes, pool: Pool, name: str) -> None:
     """Where nine of ten new cables lie."""
-    new = found.coefficients.get(name)
+    new = pool.coefficients.get(name)
     if new is not None:
         axes.axvspan(new.q05, new.q95, color=LIGHT, linewidth=0, zorder=0, label="Nine of ten new cables")
 
 
-def _label(found: Pool, name: str) -> str:
-    return f"Wear (% in {found.reference_cycles:,.0f} cycles)" if name == "wear" else name.replace("_", " ")
+def _label(pool: Pool, name: str) -> str:
+    return f"Wear (% in {pool.reference_cycles:,.0f} cycles)" if name == "wear" else name.replace("_", " ")
 
 
 @in_paper_style
-def wear(found: Pool, curves: Curves, width: float | None = None) -> Figure:
+def draw_wear(pool: Pool, curves: Curves, width: float | None = None) -> Figure:
     """Efficiency or friction over cycles."""
     figure, axes = _panel(width)
     at, scale = curves.cycles / _scale(curves), _scale(curves)
-    times = 100.0 if found.asked is not None else 1.0
+    times = 100.0 if pool.limit is not None else 1.0
     for i, line in enumerate(curves.cables):
         axes.plot(at, times * line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
-    if len(found.cables) > 1:
+    if len(pool.cables) > 1:
         low, middle, high = times * curves.new
         axes.fill_between(at, low, high, color=BLUE, alpha=0.18, linewidth=0, label=f"New cable, {WIDE_INTERVAL}")
         axes.plot(at, middle, "-", color=BLUE, linewidth=1.8, label=f"New cable, {MEDIAN.lower()}")
-    axes.axvline(found.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
-    if found.asked is not None:
-        axes.axhline(100 * found.asked.efficiency, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
-    axes.set_ylabel("Efficiency (%)" if found.asked is not None else "Friction / when new")
-    return _finished(figure, axes, curves, "pooled-wear", found)
+    axes.axvline(pool.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+    if pool.limit is not None:
+        axes.axhline(100 * pool.limit.efficiency, color=VERMILLION, linestyle="--", linewidth=1.0, label="Required")
+    axes.set_ylabel("Efficiency (%)" if pool.limit is not None else "Friction / when new")
+    return _finish(figure, axes, curves, "pooled-wear", pool)
 
 
 @in_paper_style
-def life(found: Pool, curves: Curves, fails: np.ndarray, new_fails: np.ndarray, width: float | None = None) -> Figure:
+def draw_life(
+    pool: Pool, curves: Curves, fails: np.ndarray, new_fails: np.ndarray, width: float | None = None
+) -> Figure:
     """Probability of having failed over cycles."""
     figure, axes = _panel(width)
     at, scale = curves.cycles / _scale(curves), _scale(curves)
     for i, line in enumerate(fails):
         axes.plot(at, line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
-    if len(found.cables) > 1:
+    if len(pool.cables) > 1:
         axes.plot(at, new_fails, "-", color=BLUE, linewidth=1.8, label="New cable")
-    axes.axvline(found.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
-    if found.asked is not None and found.asked.cycles is not None:
-        axes.axvline(found.asked.cycles / scale, color=VERMILLION, linestyle="--", linewidth=1.0, label="Asked for")
+    axes.axvline(pool.reference_cycles / scale, color=BLACK, linestyle=":", linewidth=0.8, label="Longest inspected")
+    if pool.limit is not None and pool.limit.cycles is not None:
+        axes.axvline(pool.limit.cycles / scale, color=VERMILLION, linestyle="--", linewidth=1.0, label="Required")
     axes.set(ylim=(-0.02, 1.02), ylabel="Probability of having failed")
-    return _finished(figure, axes, curves, "pooled-life", found)
+    return _finish(figure, axes, curves, "pooled-life", pool)
 
 
 def _scale(curves: Curves) -> float:
@@ -185,17 +195,17 @@ def _panel(width: float | None) -> tuple[Figure, Axes]:
     return figure, axes_at(figure, LEFT, _BELOW, page - LEFT - 2 * RIGHT, _HEIGHT)
 
 
-def _finished(figure: Figure, axes: Axes, curves: Curves, name: str, found: Pool) -> Figure:
+def _finish(figure: Figure, axes: Axes, curves: Curves, name: str, pool: Pool) -> Figure:
     scale = _scale(curves)
     axes.set(xlim=(0.0, float(curves.cycles[-1]) / scale), xlabel="Cycles (thousands)" if scale > 1 else "Cycles")
     axes.locator_params(axis="x", nbins=6)
     place_labels(figure, axes)
     legend_above(figure, [axes], columns=4)
-    return _titled(figure, name, found)
+    return _add_title(figure, name, pool)
 
 
-def _titled(figure: Figure, name: str, found: Pool) -> Figure:
-    title_above(figure, f"{HEADINGS[name]} \N{EN DASH} {found.name}" if found.name else HEADINGS[name])
+def _add_title(figure: Figure, name: str, pool: Pool) -> Figure:
+    title_above(figure, f"{HEADINGS[name]} \N{EN DASH} {pool.name}" if pool.name else HEADINGS[name])
     return figure
 
 

@@ -20,7 +20,7 @@ _SMALLEST = 1e-12  # that a coefficient may be drawn as
 
 
 @dataclass(frozen=True)
-class Given:
+class PoolingData:
     """What of a fleet is pooled.
 
     Args:
@@ -52,7 +52,7 @@ class Given:
     own_names: tuple[str, ...]
 
 
-def given(drawn: FleetDraws) -> Given:
+def select_inspections(fleet: FleetDraws) -> PoolingData:
     """What of a fleet is pooled.
 
     Args:
@@ -62,73 +62,83 @@ def given(drawn: FleetDraws) -> Given:
         StoreError: Nothing can be pooled.
     """
     notes: list[str] = []
-    values, about = _by_meaning(drawn, notes)
+    values, about = _split_by_meaning(fleet, notes)
     if not values:
         raise StoreError(
             "no friction coefficient of this fleet can be pooled; only coefficients that were fitted under a prior on their "
             "logarithm (LogNormal, or a value with its uncertainty) are."
         )
-    kept, left_out = _kept(drawn, values, notes)
+    kept, left_out = _select_usable(fleet, values, notes)
     if not kept.any():
         raise StoreError(f"none of {len(kept)} inspections can be pooled. {left_out[0].inspection}: {left_out[0].why}.")
-    cycles = drawn.cycles[kept]
-    cables = tuple(dict.fromkeys(name for name, keep in zip(drawn.cable, kept, strict=True) if keep))
-    number = np.array([cables.index(name) for name, keep in zip(drawn.cable, kept, strict=True) if keep])
-    logs = np.log(np.maximum(np.stack([each[kept] for each in values.values()], axis=2), _SMALLEST))
+    cycles = fleet.cycles[kept]
+    cables = tuple(dict.fromkeys(name for name, keep in zip(fleet.cable, kept, strict=True) if keep))
+    number = np.array([cables.index(name) for name, keep in zip(fleet.cable, kept, strict=True) if keep])
+    logs = np.log(np.maximum(np.stack([draws[kept] for draws in values.values()], axis=2), _SMALLEST))
     priors = [_log_prior(about[name]) for name in values]
     mean, sd = (np.array([prior[i] for prior in priors]) for i in (0, 1))
     known = np.isfinite(logs).all(axis=1)
     reference = float(np.nanmax(cycles)) if np.isfinite(cycles).any() else 0.0
-    worn = cycles / reference if _tells_wear(cycles, notes) else None
-    effects = _effects(drawn, kept, notes)
-    inspected = Inspections(number, worn, effects, known, _summaries(logs, known, mean, sd), mean, sd)
+    relative_cycles = cycles / reference if _wear_is_identifiable(cycles, notes) else None
+    effects = _select_covariates(fleet, kept, notes)
+    inspected = Inspections(
+        number, relative_cycles, effects, known, _summarize_by_pattern(logs, known, mean, sd), mean, sd
+    )
     symbols = {name: about[name].get("symbol", name) for name in values}
-    labels = tuple(name for name, keep in zip(drawn.label, kept, strict=True) if keep)
+    labels = tuple(name for name, keep in zip(fleet.label, kept, strict=True) if keep)
     own_names = tuple(about[name][_OWN_NAME] for name in values)
-    inputs = drawn.stats.get("input", np.full(len(kept), ""))[kept]
-    return Given(
+    inputs = fleet.stats.get("input", np.full(len(kept), ""))[kept]
+    return PoolingData(
         cables, tuple(values), symbols, inspected, logs, labels, cycles, reference, left_out, tuple(notes),
         tuple(map(_text, inputs)), own_names,
     )  # fmt: skip
 
 
-def _summaries(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> Summaries:
+def _summarize_by_pattern(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> Summaries:
     """Of all inspections, those that have the same coefficients together."""
     count, coefficients = known.shape
-    center, scale, freedom = np.zeros((count, coefficients)), np.zeros((count, coefficients, coefficients)), np.ones(count)
+    center, scale, freedom = (
+        np.zeros((count, coefficients)),
+        np.zeros((count, coefficients, coefficients)),
+        np.ones(count),
+    )
     for pattern in np.unique(known, axis=0):
         rows, columns = np.flatnonzero((known == pattern).all(axis=1)), np.flatnonzero(pattern)
-        found = summarize_likelihoods(logs[rows][:, :, columns], mean[columns], sd[columns])
-        center[np.ix_(rows, columns)], freedom[rows] = found.center, found.freedom
-        scale[np.ix_(rows, columns, columns)] = found.scale
+        summary = summarize_likelihoods(logs[rows][:, :, columns], mean[columns], sd[columns])
+        center[np.ix_(rows, columns)], freedom[rows] = summary.center, summary.freedom
+        scale[np.ix_(rows, columns, columns)] = summary.scale
     return Summaries(center, scale, freedom)
 
 
-def _by_meaning(drawn: FleetDraws, notes: list[str]) -> tuple[dict[str, np.ndarray], dict[str, Mapping[str, str]]]:
+def _split_by_meaning(
+    fleet: FleetDraws, notes: list[str]
+) -> tuple[dict[str, np.ndarray], dict[str, Mapping[str, str]]]:
     """Draws and attributes of coefficients, those of one name that mean different things under names of their own."""
-    shapes = [_text(key) for key in drawn.stats["shape"]]
-    meanings: Mapping[str, Mapping[str, str]] = drawn.about.get("meanings", {})
+    shapes = [_text(key) for key in fleet.stats["shape"]]
+    meanings: Mapping[str, Mapping[str, str]] = fleet.about.get("meanings", {})
     values: dict[str, np.ndarray] = {}
     about: dict[str, Mapping[str, str]] = {}
-    without: list[str] = []
-    for name, draws in drawn.values.items():
-        if drawn.attributes[name].get("role") != FRICTION:
+    no_prior: list[str] = []
+    for name, draws in fleet.values.items():
+        if fleet.attributes[name].get("role") != FRICTION:
             continue
-        if _log_prior(drawn.attributes[name]) is None:
-            without.append(name)
+        if _log_prior(fleet.attributes[name]) is None:
+            no_prior.append(name)
             continue
-        said = [meanings.get(key, {}).get(name, "") for key in shapes]
-        every = list(dict.fromkeys(text for text, row in zip(said, draws, strict=True) if np.isfinite(row).all()))
-        for i, text in enumerate(every):
-            mine = np.array([each == text for each in said])
-            called = name if len(every) == 1 else f"{name} ({i + 1})"
-            values[called] = np.where(mine[:, None], draws, np.nan)
-            about[called] = {**drawn.attributes[name], _OWN_NAME: name}
-        if len(every) > 1:
-            meant = listed([f"{name} ({i + 1}) is {text}" for i, text in enumerate(every)])
+        row_meanings = [meanings.get(key, {}).get(name, "") for key in shapes]
+        distinct = list(
+            dict.fromkeys(text for text, row in zip(row_meanings, draws, strict=True) if np.isfinite(row).all())
+        )
+        for i, text in enumerate(distinct):
+            row_mask = np.array([meaning == text for meaning in row_meanings])
+            label = name if len(distinct) == 1 else f"{name} ({i + 1})"
+            values[label] = np.where(row_mask[:, None], draws, np.nan)
+            about[label] = {**fleet.attributes[name], _OWN_NAME: name}
+        if len(distinct) > 1:
+            meant = listed([f"{name} ({i + 1}) is {text}" for i, text in enumerate(distinct)])
             notes.append(f"{name} does not mean the same for all cables, so it is pooled by what it means: {meant}.")
-    if without:
-        notes.append(f"{listed(without)} cannot be pooled, because no prior on the logarithm says where to begin.")
+    if no_prior:
+        notes.append(f"{listed(no_prior)} cannot be pooled, because no prior on the logarithm says where to begin.")
     return values, about
 
 
@@ -145,13 +155,15 @@ def _log_prior(about: Mapping[str, str]) -> Any:
     return None
 
 
-def _kept(drawn: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str]) -> tuple[np.ndarray, tuple[LeftOut, ...]]:
+def _select_usable(
+    fleet: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str]
+) -> tuple[np.ndarray, tuple[LeftOut, ...]]:
     """Which inspections are pooled, and why others are not."""
-    trusted = drawn.stats["trusted"].astype(bool)
+    trusted = fleet.stats["trusted"].astype(bool)
     has = np.any([np.isfinite(draws).all(axis=1) for draws in values.values()], axis=0)
-    some, dated = np.isfinite(drawn.cycles).any(), np.isfinite(drawn.cycles)
+    some, dated = np.isfinite(fleet.cycles).any(), np.isfinite(fleet.cycles)
     left = []
-    for i, label in enumerate(drawn.label):
+    for i, label in enumerate(fleet.label):
         if not trusted[i]:
             left.append(LeftOut(label, "its fit must not be trusted"))
         elif not has[i]:
@@ -160,12 +172,12 @@ def _kept(drawn: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str])
             left.append(LeftOut(label, "nobody says after how many cycles it was made"))
     kept = trusted & has & (dated if some else np.ones(len(has), dtype=bool))
     if left:
-        named = few([each.inspection for each in left])
+        named = few([inspection.inspection for inspection in left])
         notes.append(f"{counted(len(left), 'inspection')} could not be pooled ({named}); why stands in the JSON.")
     return kept, tuple(left)
 
 
-def _tells_wear(cycles: np.ndarray, notes: list[str]) -> bool:
+def _wear_is_identifiable(cycles: np.ndarray, notes: list[str]) -> bool:
     """Whether wear can be told."""
     if not np.isfinite(cycles).any():
         notes.append("Nobody says after how many cycles cables were inspected, so nothing is told of wear and life.")
@@ -177,22 +189,22 @@ def _tells_wear(cycles: np.ndarray, notes: list[str]) -> bool:
     return True
 
 
-def _effects(drawn: FleetDraws, kept: np.ndarray, notes: list[str]) -> dict[str, np.ndarray]:
+def _select_covariates(fleet: FleetDraws, kept: np.ndarray, notes: list[str]) -> dict[str, np.ndarray]:
     """Columns of what else friction may depend on, where every inspection says it and it was not always the same."""
-    columns = {"lubrication": drawn.lubricated[kept], "per_degree": drawn.temperature[kept] - REFERENCE_TEMPERATURE}
+    columns = {"lubrication": fleet.lubricated[kept], "per_degree": fleet.temperature[kept] - REFERENCE_TEMPERATURE}
     words = {"lubrication": "whether the cable was lubricated", "per_degree": "the temperature"}
-    found = {}
+    covariates = {}
     for name, column in columns.items():
         missing = int(np.isnan(column).sum())
         if missing and missing < len(column):
             some = counted(missing, "inspection does", "inspections do")
             notes.append(f"{some} not say {words[name]}, so it is not allowed for; what it does counts as scatter.")
         elif not missing and np.ptp(column) > 0:
-            found[name] = column
+            covariates[name] = column
         elif not missing and column[0] != 0:
-            at = "lubricated" if name == "lubrication" else f"at {drawn.temperature[kept][0]:g} °C"
+            at = "lubricated" if name == "lubrication" else f"at {fleet.temperature[kept][0]:g} °C"
             notes.append(f"Every inspection was made {at}, so all that is said holds {at}.")
-    return found
+    return covariates
 
 
 def _text(value: Any) -> str:

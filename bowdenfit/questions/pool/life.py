@@ -8,10 +8,10 @@ infinite where friction does not grow (b at most 0), and 0 where a new cable is 
 
 import numpy as np
 
-from bowdenfit.questions.pool.answer import Asked, Life
+from bowdenfit.questions.pool.answer import Life, ServiceLimit
 
 
-def cycles_until(asked: Asked, logs: np.ndarray, wear: np.ndarray, reference: float) -> np.ndarray:
+def cycles_to_failure(limit: ServiceLimit, logs: np.ndarray, wear: np.ndarray, reference: float) -> np.ndarray:
     """Cycles at which each draw falls below the efficiency that is asked for.
 
     Args:
@@ -20,18 +20,18 @@ def cycles_until(asked: Asked, logs: np.ndarray, wear: np.ndarray, reference: fl
         wear: Growth of log coefficients in the reference cycles, (...,).
         reference: The reference cycles.
     """
-    room = margin(asked, logs)
+    log_margin = friction_log_margin(limit, logs)
     growing = np.where(wear > 0, wear, 1.0)
-    return np.where(room <= 0, 0.0, np.where(wear > 0, reference * room / growing, np.inf))
+    return np.where(log_margin <= 0, 0.0, np.where(wear > 0, reference * log_margin / growing, np.inf))
 
 
-def margin(asked: Asked, logs: np.ndarray) -> np.ndarray:
+def friction_log_margin(limit: ServiceLimit, logs: np.ndarray) -> np.ndarray:
     """By how much log coefficients may grow until then, (...,)."""
-    angles = np.array(list(asked.wrap_angles.values()))
-    return np.log(-np.log(asked.efficiency)) - np.log(np.exp(logs) @ angles)
+    angles = np.array(list(limit.wrap_angles.values()))
+    return np.log(-np.log(limit.efficiency)) - np.log(np.exp(logs) @ angles)
 
 
-def life_of(asked: Asked, cycles: np.ndarray, longest: float) -> Life:
+def summarize_life(limit: ServiceLimit, cycles: np.ndarray, longest: float) -> Life:
     """A life of draws of its cycles.
 
     Args:
@@ -40,6 +40,6 @@ def life_of(asked: Asked, cycles: np.ndarray, longest: float) -> Life:
         longest: Cycles that were inspected.
     """
     early, median = (float(np.quantile(cycles, q, method="inverted_cdf")) for q in (0.05, 0.5))
-    fails = None if asked.cycles is None else float(np.mean(cycles < asked.cycles))
-    beyond = median > longest or (asked.cycles is not None and asked.cycles > longest)
+    fails = None if limit.cycles is None else float(np.mean(cycles < limit.cycles))
+    beyond = median > longest or (limit.cycles is not None and limit.cycles > longest)
     return Life(median, early, fails, float(np.mean(np.isinf(cycles))), bool(beyond))

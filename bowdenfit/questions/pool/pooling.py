@@ -9,13 +9,13 @@ import numpy as np
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population, draw_unpooled
-from bowdenfit.questions.pool.answer import Asked, Effect, Life, Pool, PooledCable
-from bowdenfit.questions.pool.curves import curves_of
-from bowdenfit.questions.pool.inspected import Given, given
-from bowdenfit.questions.pool.life import cycles_until, life_of
-from bowdenfit.questions.pool.next import next_inspections
-from bowdenfit.questions.pool.unlike import FALSE_ALARM, departure, judged, mixed
-from bowdenfit.questions.pool.worth import LEAST, readings_of, worth
+from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable, ServiceLimit
+from bowdenfit.questions.pool.curves import compute_curves
+from bowdenfit.questions.pool.inspected import PoolingData, select_inspections
+from bowdenfit.questions.pool.life import cycles_to_failure, summarize_life
+from bowdenfit.questions.pool.next import rank_next_inspections
+from bowdenfit.questions.pool.unlike import FALSE_ALARM, find_departure, find_mixtures, separate_outliers
+from bowdenfit.questions.pool.worth import LEAST_EFFECTIVE_DRAWS, count_effective_draws, load_readings
 from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import few
 
@@ -24,7 +24,7 @@ _WEAR = "wear"
 
 
 @dataclass(frozen=True)
-class _Looked:
+class _PooledDraws:
     """What a look at all cables gave.
 
     Args:
@@ -37,16 +37,16 @@ class _Looked:
         rows: Inspections of which the readings were looked at.
     """
 
-    every: PopulationDraws
-    shown: PopulationDraws
-    chance: np.ndarray
-    unlike: dict[int, str]
-    told: tuple[int, ...]
-    worth: np.ndarray
-    rows: tuple[int, ...]
+    full_population: PopulationDraws
+    population: PopulationDraws
+    p_values: np.ndarray
+    departures: dict[int, str]
+    wear_identified: tuple[int, ...]
+    n_effective: np.ndarray
+    reread: tuple[int, ...]
 
 
-def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path | None = None) -> Pool:
+def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measurements: Path | None = None) -> Pool:
     """The answer.
 
     Args:
@@ -59,164 +59,183 @@ def pooled(drawn: FleetDraws, asked: Asked | None, seed: int, measurements: Path
         StoreError: Nothing can be pooled, or the measurements are others.
         DatasetError, DescriptionError, UsageError: There are no such measurements.
     """
-    known = given(drawn)
-    looked = _looked(known, seed, measurements)
-    population = looked.shown
-    count, alone = len(known.coefficients), len(known.cables) == 1
+    data = select_inspections(fleet)
+    result = _draw_with_readings(data, seed, measurements)
+    population = result.population
+    count, single = len(data.coefficients), len(data.cables) == 1
     generator = np.random.default_rng([seed, 13])
-    mean, spread = (np.repeat(each, _NEW, axis=0) for each in (population.mean, population.spread))
+    mean, spread = (np.repeat(draws, _NEW, axis=0) for draws in (population.mean, population.spread))
     new = mean + spread * generator.standard_normal(mean.shape)
-    wears = known.inspected.cycles is not None
-    asked = asked if wears else None
-    names = (*known.coefficients, *((_WEAR,) if wears else ()))
+    wears = data.inspected.cycles is not None
+    limit = limit if wears else None
+    names = (*data.coefficients, *((_WEAR,) if wears else ()))
     return Pool(
-        str(drawn.about.get("name", "")),
-        _cables(known, looked, asked),
-        len(known.labels),
-        known.left_out,
-        {} if alone else _named(known.coefficients, np.exp(new)),
-        _named(known.coefficients, np.exp(population.mean)),
-        {} if alone else _named(names, population.spread),
-        _effect(_WEAR, population.mean[:, count]) if wears else None,
-        tuple(_effect(name, population.effects[:, i]) for i, name in enumerate(known.inspected.effects)),
-        known.reference_cycles,
+        str(fleet.about.get("name", "")),
+        _summarize_cables(data, result, limit),
+        len(data.labels),
+        data.left_out,
+        {} if single else _intervals_by_name(data.coefficients, np.exp(new)),
+        _intervals_by_name(data.coefficients, np.exp(population.mean)),
+        {} if single else _intervals_by_name(names, population.spread),
+        _summarize_effect(_WEAR, population.mean[:, count]) if wears else None,
+        tuple(_summarize_effect(name, population.effects[:, i]) for i, name in enumerate(data.inspected.effects)),
+        data.reference_cycles,
         REFERENCE_TEMPERATURE,
-        asked,
-        None if asked is None or alone else _life(known, asked, new),
-        {} if alone else mixed(known.inspected, looked.shown, names, looked.unlike),
-        curves_of(known, population, asked, new) if wears else None,
-        next_inspections(known, population, asked, seed),
-        (*known.notes, *_more_notes(known, drawn)),
-        (*dict.fromkeys((*population.reasons, *looked.every.reasons)), *_poorly_known(known, looked)),
+        limit,
+        None if limit is None or single else _estimate_life(data, limit, new),
+        {} if single else find_mixtures(data.inspected, result.population, names, result.departures),
+        compute_curves(data, population, limit, new) if wears else None,
+        rank_next_inspections(data, population, limit, seed),
+        (*data.notes, *_general_notes(data, fleet)),
+        (*dict.fromkeys((*population.reasons, *result.full_population.reasons)), *_find_too_few_draws(data, result)),
         seed,
     )
 
 
-def _looked(known: Given, seed: int, measurements: Path | None) -> _Looked:
+def _draw_with_readings(data: PoolingData, seed: int, measurements: Path | None) -> _PooledDraws:
     """At all cables, and again with readings of those of which single fits tell too little."""
-    inspected, rows = known.inspected, tuple[int, ...]()
+    inspected, reread = data.inspected, tuple[int, ...]()
     while True:
-        readings = readings_of(known, rows, measurements) if measurements is not None and rows else ()
-        draw = partial(draw_population, inspected, seed, coefficient_names=known.coefficients, readings=readings)
-        every = draw()
-        core, chance = (every, np.ones(1)) if inspected.cables == 1 else judged(inspected, every, draw, seed)
-        named = [int(i) for i in np.flatnonzero(chance < FALSE_ALARM)]
-        shown, told = _with_unpooled(inspected, core, named, seed)
-        found = worth(known, shown)
-        more = tuple(int(j) for j in np.flatnonzero(found < LEAST) if j not in rows and inspected.cable[j] not in named)
+        readings = load_readings(data, reread, measurements) if measurements is not None and reread else ()
+        draw = partial(draw_population, inspected, seed, coefficient_names=data.coefficients, readings=readings)
+        full_population = draw()
+        core, p_values = (
+            (full_population, np.ones(1))
+            if inspected.cables == 1
+            else separate_outliers(inspected, full_population, draw, seed)
+        )
+        outliers = [int(i) for i in np.flatnonzero(p_values < FALSE_ALARM)]
+        population, wear_identified = _replace_outliers(inspected, core, outliers, seed)
+        n_effective = count_effective_draws(data, population)
+        more = tuple(
+            int(j)
+            for j in np.flatnonzero(n_effective < LEAST_EFFECTIVE_DRAWS)
+            if j not in reread and inspected.cable[j] not in outliers
+        )
         if measurements is None or not more:
-            unlike = {i: _departure(known, departure(inspected, core, i, seed)) for i in named}
-            return _Looked(every, shown, chance, unlike, told, found, rows)
-        rows = (*rows, *more)
+            departures = {i: _describe_departure(data, find_departure(inspected, core, i, seed)) for i in outliers}
+            return _PooledDraws(full_population, population, p_values, departures, wear_identified, n_effective, reread)
+        reread = (*reread, *more)
 
 
-def _with_unpooled(
-    inspected: Inspections, core: PopulationDraws, named: list[int], seed: int
+def _replace_outliers(
+    inspected: Inspections, core: PopulationDraws, outliers: list[int], seed: int
 ) -> tuple[PopulationDraws, tuple[int, ...]]:
     """Draws with some cables by their own inspections alone, and which of these tell their wear."""
-    cables, told = core.cables.copy(), []
-    for i in named:
-        cables[:, i], tells = draw_unpooled(inspected, core, i, seed)
-        told += [i] * tells
-    return replace(core, cables=cables), tuple(told)
+    cables, wear_identified = core.cables.copy(), []
+    for i in outliers:
+        cables[:, i], has_wear = draw_unpooled(inspected, core, i, seed)
+        wear_identified += [i] * has_wear
+    return replace(core, cables=cables), tuple(wear_identified)
 
 
-def _poorly_known(known: Given, looked: _Looked) -> list[str]:
+def _find_too_few_draws(data: PoolingData, result: _PooledDraws) -> list[str]:
     """Why the answer must not be trusted where single fits know too little; empty where they know enough."""
-    of, reasons = known.inspected.cable, []
-    low = [j for j in np.flatnonzero(looked.worth < LEAST) if j not in looked.rows or of[j] in looked.unlike]
-    pulled = [known.cables[of[j]] for j in low if of[j] not in looked.unlike]
-    torn = [known.cables[of[j]] for j in low if of[j] in looked.unlike]
+    cable_numbers, reasons = data.inspected.cable, []
+    low = [
+        j
+        for j in np.flatnonzero(result.n_effective < LEAST_EFFECTIVE_DRAWS)
+        if j not in result.reread or cable_numbers[j] in result.departures
+    ]
+    pulled = [data.cables[cable_numbers[j]] for j in low if cable_numbers[j] not in result.departures]
+    contradictory = [data.cables[cable_numbers[j]] for j in low if cable_numbers[j] in result.departures]
     if pulled:
         reasons.append(
             f"what was drawn from the inspections of {few(list(dict.fromkeys(pulled)))} by themselves hardly reaches where the "
             "other cables put them, so that what is said of them may be off by half its uncertainty; name the folder of the "
             "fleet's measurements with --measurements, and their readings are looked at again"
         )
-    if torn:
+    if contradictory:
         reasons.append(
-            f"inspections of {few(list(dict.fromkeys(torn)))} contradict each other, so that what is said of it lies where "
-            "hardly one of them puts it; look for a wrong reading, a wrong row of fleet.csv or a cable that was changed, and "
-            "leave that inspection out"
+            f"inspections of {few(list(dict.fromkeys(contradictory)))} contradict each other, so that the estimate lies "
+            "where hardly any of them puts it; look for a wrong reading, a wrong row of fleet.csv or a cable that was "
+            "changed, and leave that inspection out"
         )
     return reasons
 
 
-def _named(names: tuple[str, ...], draws: np.ndarray) -> dict[str, Interval]:
+def _intervals_by_name(names: tuple[str, ...], draws: np.ndarray) -> dict[str, Interval]:
     return {name: Interval.of(draws[:, i]) for i, name in enumerate(names)}
 
 
-def _effect(name: str, logs: np.ndarray) -> Effect:
+def _summarize_effect(name: str, logs: np.ndarray) -> Effect:
     above = float(np.mean(logs > 0))
     return Effect(name, Interval.of(np.expm1(logs)), max(above, 1 - above))
 
 
-def _life(known: Given, asked: Asked, values: np.ndarray) -> Life:
+def _estimate_life(data: PoolingData, limit: ServiceLimit, values: np.ndarray) -> Life:
     """Of draws of log coefficients and wear."""
-    cycles = cycles_until(asked, values[:, :-1], values[:, -1], known.reference_cycles)
-    return life_of(asked, cycles, known.reference_cycles)
+    cycles = cycles_to_failure(limit, values[:, :-1], values[:, -1], data.reference_cycles)
+    return summarize_life(limit, cycles, data.reference_cycles)
 
 
-def _cables(known: Given, looked: _Looked, asked: Asked | None) -> tuple[PooledCable, ...]:
+def _summarize_cables(data: PoolingData, result: _PooledDraws, limit: ServiceLimit | None) -> tuple[PooledCable, ...]:
     """What is known of each cable."""
-    inspected, population, count = known.inspected, looked.shown, len(known.coefficients)
-    again = np.isin(np.arange(len(inspected.cable)), looked.rows)
-    found = []
-    for i, name in enumerate(known.cables):
-        mine, values = inspected.cable == i, population.cables[:, i]
-        has = inspected.known[mine].any(axis=0)
-        named = [known.coefficients[k] for k in np.flatnonzero(has)]
+    inspected, population, count = data.inspected, result.population, len(data.coefficients)
+    is_reread = np.isin(np.arange(len(inspected.cable)), result.reread)
+    cables = []
+    for i, name in enumerate(data.cables):
+        row_mask, values = inspected.cable == i, population.cables[:, i]
+        has = inspected.known[row_mask].any(axis=0)
+        named = [data.coefficients[k] for k in np.flatnonzero(has)]
         wear = [_WEAR] if inspected.cycles is not None else []
-        found.append(
+        cables.append(
             PooledCable(
                 name,
-                int(mine.sum()),
-                float(known.cycles[mine].max()),
-                {c: Interval.of(np.exp(values[:, k])) for k, c in enumerate(known.coefficients) if has[k]},
-                _by_itself(known, population, mine, has),
+                int(row_mask.sum()),
+                float(data.cycles[row_mask].max()),
+                {c: Interval.of(np.exp(values[:, k])) for k, c in enumerate(data.coefficients) if has[k]},
+                _estimate_unpooled(data, population, row_mask, has),
                 Interval.of(np.expm1(values[:, count])) if wear else None,
-                _life(known, asked, values) if asked is not None else None,
-                float(looked.chance[i]),
-                looked.unlike.get(i, ""),
-                tuple(wear if i not in looked.told else []) if i in looked.unlike else (*named, *wear),
-                float(looked.worth[mine].min()),
-                0 if i in looked.unlike else int(again[mine].sum()),
+                _estimate_life(data, limit, values) if limit is not None else None,
+                float(result.p_values[i]),
+                result.departures.get(i, ""),
+                tuple(wear if i not in result.wear_identified else []) if i in result.departures else (*named, *wear),
+                float(result.n_effective[row_mask].min()),
+                0 if i in result.departures else int(is_reread[row_mask].sum()),
             )
         )
-    return tuple(found)
+    return tuple(cables)
 
 
-def _by_itself(known: Given, population: PopulationDraws, mine: np.ndarray, has: np.ndarray) -> dict[str, Interval | None]:
+def _estimate_unpooled(
+    data: PoolingData, population: PopulationDraws, row_mask: np.ndarray, has: np.ndarray
+) -> dict[str, Interval | None]:
     """Coefficients of a cable when new from its own first inspection, if that was then; effects are those of the fleet."""
-    row = int(np.flatnonzero(mine)[np.argmin(np.nan_to_num(known.cycles[mine]))])
-    new = known.inspected.cycles is None or known.inspected.cycles[row] == 0
+    row = int(np.flatnonzero(row_mask)[np.argmin(np.nan_to_num(data.cycles[row_mask]))])
+    new = data.inspected.cycles is None or data.inspected.cycles[row] == 0
     shift = sum(
-        (float(np.median(population.effects[:, i])) * column[row] for i, column in enumerate(known.inspected.effects.values())),
+        (
+            float(np.median(population.effects[:, i])) * column[row]
+            for i, column in enumerate(data.inspected.effects.values())
+        ),
         0.0,
     )
-    logs = known.logs[row] - shift
+    logs = data.logs[row] - shift
     return {
         name: Interval.of(np.exp(logs[:, k])) if new and np.isfinite(logs[:, k]).all() else None
-        for k, name in enumerate(known.coefficients)
+        for k, name in enumerate(data.coefficients)
         if has[k]
     }
 
 
-def _departure(known: Given, found: tuple[int, float] | None) -> str:
+def _describe_departure(data: PoolingData, departure: tuple[int, float] | None) -> str:
     """What is off with a cable that is unlike the rest, by its own inspections."""
-    if found is None:
+    if departure is None:
         return "its inspections do not lie on one line of wear, or one of them disagrees with the others"
-    number, off = found
-    name, way = (*known.coefficients, _WEAR)[number], "above" if off > 0 else "below"
-    return f"{name} lies {abs(off):.1f} times the usual spread {way} that of the others"
+    number, distance = departure
+    name, way = (*data.coefficients, _WEAR)[number], "above" if distance > 0 else "below"
+    return f"{name} lies {abs(distance):.1f} times the usual spread {way} that of the others"
 
 
-def _more_notes(known: Given, drawn: FleetDraws) -> list[str]:
+def _general_notes(data: PoolingData, fleet: FleetDraws) -> list[str]:
     """What is said of every fleet."""
     notes = []
-    if len(known.cables) == 1:
+    if len(data.cables) == 1:
         notes.append("It is one cable only: there is no population that it could be compared with or drawn toward.")
-    unpooled = [name for name, about in drawn.attributes.items() if about.get("role") not in ("friction", "noise", None)]
+    unpooled = [
+        name for name, about in fleet.attributes.items() if about.get("role") not in ("friction", "noise", None)
+    ]
     if unpooled:
         notes.append(f"Only friction coefficients are pooled; {', '.join(unpooled[:4])} stay as single fits give them.")
     return notes

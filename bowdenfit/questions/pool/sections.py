@@ -10,31 +10,31 @@ from bowdenfit.questions.pool.words import (
     how_to_read,
     life_sentences,
     next_sentences,
+    outlier_sentences,
     population_rows,
     trust_sentences,
-    unlike_sentences,
 )
 
 
-def pool_page(found: Pool) -> Page:
+def pool_page(pool: Pool) -> Page:
     """The page of a pooled fleet.
 
     Args:
         found: The pooled fleet.
     """
-    said = captions(found)
-    pictures = {name: Picture(name, heading, said[name]) for name, heading in HEADINGS.items()}
-    heads, rows = population_rows(found)
-    cable_heads, cables = cable_rows(found)
-    left_out = [f"{each.inspection}: {each.why}." for each in found.left_out]
+    texts = captions(pool)
+    pictures = {name: Picture(name, heading, texts[name]) for name, heading in HEADINGS.items()}
+    heads, rows = population_rows(pool)
+    cable_heads, cables = cable_rows(pool)
+    left_out = [f"{inspection.inspection}: {inspection.why}." for inspection in pool.left_out]
     sections = (
         prose(
             "The answer",
-            [*trust_sentences(found), *life_sentences(found), *unlike_sentences(found), *next_sentences(found)],
-            headline=headline(found),
+            [*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool), *next_sentences(pool)],
+            headline=headline(pool),
             pictures=(pictures["pooled-life"], pictures["pooled-wear"]),
         ),
-        prose("What cables have in common", [*effect_sentences(found), how_to_read(found)], [Table(heads, tuple(rows))]),
+        prose("What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [Table(heads, tuple(rows))]),
         prose(
             "Every cable",
             [
@@ -44,6 +44,6 @@ def pool_page(found: Pool) -> Page:
             [Table(cable_heads, tuple(cables))],
             pictures=(pictures["pooled-coefficients"],),
         ),
-        prose("What is not told", found.notes or ["Everything that was measured is pooled."], items=left_out),
+        prose("What is not told", pool.notes or ["Everything that was measured is pooled."], items=left_out),
     )
-    return Page(found.name or "Fleet", f"Pooled by bowdenfit; seed {found.seed}", sections)
+    return Page(pool.name or "Fleet", f"Pooled by bowdenfit; seed {pool.seed}", sections)

@@ -25,11 +25,11 @@ from bowdenfit.questions.writing import refuse_to_replace
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.pool.answer import Asked, Pool
+    from bowdenfit.questions.pool.answer import Pool, ServiceLimit
 
 NAME = "pool"
 FLEET = Parameter("FLEET", help="Such as fits/my-fleet, which `bowdenfit fleet my-fleet` writes.")
-_NAMED = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
+_ANGLE_OPTION = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
 _MOST_TURNS = 100
 
 
@@ -67,29 +67,29 @@ def pool(
     import jax
 
     from bowdenfit.questions.fleet.inspections import read_inspections
-    from bowdenfit.questions.pool.pooling import pooled
+    from bowdenfit.questions.pool.pooling import pool_cables
     from bowdenfit.questions.pool.words import pool_text  # noqa: F401  (how the answer shows itself)
     from bowdenfit.results.fleet_folder import read_fleet_draws
 
     if output is not None:
         refuse_to_replace(Path(output), NAME, "pooled fleet", force)
-    drawn = read_fleet_draws(Path(results))
+    draws = read_fleet_draws(Path(results))
     if measurements is not None:
         read_inspections(Path(measurements))  # so that a wrong name is said before anything is drawn
-    coefficients = [name for name, about in drawn.attributes.items() if about.get("role") == "friction"]
-    asked = asked_of(as_pair(until), wrap_angles, cycles, coefficients)
-    seed = int(drawn.about.get("seed", 0)) if seed is None else seed
+    coefficients = [name for name, about in draws.attributes.items() if about.get("role") == "friction"]
+    limit = parse_service_limit(as_pair(until), wrap_angles, cycles, coefficients)
+    seed = int(draws.about.get("seed", 0)) if seed is None else seed
     with jax.enable_x64(True):
-        found = pooled(drawn, asked, seed, None if measurements is None else Path(measurements))
+        answer = pool_cables(draws, limit, seed, None if measurements is None else Path(measurements))
     if output is not None:
-        _write(found, Path(output))
-    return found
+        _write(answer, Path(output))
+    return answer
 
 
-def _write(found: "Pool", folder: Path) -> None:
+def _write(answer: "Pool", folder: Path) -> None:
     """Figures, the page, the words and, last, the JSON, all of them or none: a folder that has it has everything."""
     from bowdenfit.plots.write import write_all
-    from bowdenfit.questions.pool.figures import figures_of
+    from bowdenfit.questions.pool.figures import draw_figures
     from bowdenfit.questions.pool.sections import pool_page
     from bowdenfit.questions.pool.words import pool_text
     from bowdenfit.questions.writing import write_page
@@ -99,44 +99,46 @@ def _write(found: "Pool", folder: Path) -> None:
 
     page = f"{NAME}.json"
     with fill_folder_atomically(folder, page) as place:
-        for name, figure in figures_of(found).items():
+        for name, figure in draw_figures(answer).items():
             write_all(figure, place, name)
-        write_page(pool_page(found), place, place / f"{NAME}.html")
-        write_text(place / f"{NAME}.txt", printable(pool_text(found)))
-        write_text(place / page, json.dumps(plain_data(found), indent=1, allow_nan=False) + "\n")
+        write_page(pool_page(answer), place, place / f"{NAME}.html")
+        write_text(place / f"{NAME}.txt", printable(pool_text(answer)))
+        write_text(place / page, json.dumps(plain_data(answer), indent=1, allow_nan=False) + "\n")
 
 
-def asked_of(
+def parse_service_limit(
     until: NumberWithUnit | None, wrap_angles: Sequence[str], cycles: int | None, coefficients: Sequence[str]
-) -> "Asked | None":
+) -> "ServiceLimit | None":
     """What life is until; None where it is not asked for.
 
     Raises:
         UsageError: Something is missing, or cannot be.
     """
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.pool.answer import Asked
+    from bowdenfit.questions.pool.answer import ServiceLimit
     from bowdenfit.units import conversion_factor
 
     if until is None:
         if wrap_angles or cycles is not None:
-            raise UsageError("--wrap-angle and --cycles ask how long cables last; say until which efficiency, as --until 60%.")
+            raise UsageError(
+                "--wrap-angle and --cycles ask how long cables last; say until which efficiency, as --until 60%."
+            )
         return None
     value, unit = until
     efficiency = value * conversion_factor(unit, "ratio")
     if not 0 < efficiency < 1:
         raise UsageError(f"--until {value:g}{unit} is no efficiency that a cable falls to; write it as 60% or 0.6 1.")
-    angles = dict(_angle(text) for text in wrap_angles)
+    angles = dict(_parse_wrap_angle(text) for text in wrap_angles)
     wrong = [name for name in angles if name not in coefficients]
     missing = [name for name in coefficients if name not in angles]
     if wrong or missing:
         what = f"there is no coefficient {wrong[0]!r}" if wrong else f"none is said for {missing[0]}"
         example = " ".join(f"--wrap-angle {name}=90deg" for name in coefficients)
         raise UsageError(f"how long a cable lasts depends on its wrap angles, and {what}; write {example}, with yours.")
-    return Asked(efficiency, {name: angles[name] for name in coefficients}, None if cycles is None else float(cycles))
+    return ServiceLimit(efficiency, {name: angles[name] for name in coefficients}, None if cycles is None else float(cycles))
 
 
-def _angle(text: str) -> tuple[str, float]:
+def _parse_wrap_angle(text: str) -> tuple[str, float]:
     """Coefficient and wrap angle [rad] of an option such as mu_sheath=180deg.
 
     Raises:
@@ -146,21 +148,23 @@ def _angle(text: str) -> tuple[str, float]:
     from bowdenfit.units import conversion_factor
     from bowdenfit.words import shown
 
-    match = _NAMED.fullmatch(text.strip())
+    match = _ANGLE_OPTION.fullmatch(text.strip())
     try:
         angle = float(match["value"]) * conversion_factor(match["unit"], "angle") if match else math.nan
     except DatasetError:
         angle = math.nan
     if match is None or not 0 <= angle < _MOST_TURNS * 2 * math.pi:
-        raise UsageError(f"--wrap-angle {shown(text)} is no coefficient with its wrap angle; write it as mu_sheath=180deg.")
+        raise UsageError(
+            f"--wrap-angle {shown(text)} is no coefficient with its wrap angle; write it as mu_sheath=180deg."
+        )
     return match["name"].strip(), angle
 
 
-def _reply(found: "Pool", asked: dict[str, Any]) -> Reply:
+def _reply(answer: "Pool", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.pool.words import pool_text
 
-    notes = (f"Wrote {asked['output']}.",) if asked["output"] else ()
-    return Reply(pool_text(found), lambda: found, notes, 0 if found.is_trusted else NOT_TRUSTED, found.to_csv)
+    notes = (f"Wrote {options['output']}.",) if options["output"] else ()
+    return Reply(pool_text(answer), lambda: answer, notes, 0 if answer.is_trusted else NOT_TRUSTED, answer.to_csv)
 
 
 VERB = Verb(

@@ -10,7 +10,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.questions.groups.answer import groups_of
+from bowdenfit.questions.groups.answer import contrast_groups
 from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
@@ -137,6 +137,6 @@ def _loss(fit: Record) -> list[str]:
 
 def _of_options(fit: Record) -> list[str]:
     """What was found of drag, of speed and of groups, where the fit asked for them."""
-    groups = groups_of(fit)
+    groups = contrast_groups(fit)
     contrasts = [f"Friction {c.coefficient}, {c.sentence()}." for c in (groups.contrasts if groups else ())[:_FEW]]
     return [found.sentence() for found in (lost_force(fit), rate_effect(fit)) if found is not None] + contrasts

@@ -14,7 +14,7 @@ from bowdenfit.kinds.recordings.words import preparation_pages
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.groups.answer import groups_of
+from bowdenfit.questions.groups.answer import contrast_groups
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.contradiction import agreement_page
 from bowdenfit.questions.loss.answer import loss_by_contact
@@ -83,7 +83,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["recordings"] = preparation_pages(recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
-    if groups := groups_of(fit):
+    if groups := contrast_groups(fit):
         page["groups"] = groups
     if checks := checks_of(fit):
         page["checks"] = checks

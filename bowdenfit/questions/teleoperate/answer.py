@@ -1,6 +1,7 @@
 """What a hand feels through a cable, and which walls it may touch."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from bowdenfit.inference.interval import Interval
 
 
 @dataclass(frozen=True, repr=False)
-class Scheme(Part):
+class CouplingScheme(Part):
     """One way to couple master and slave.
 
     Args:
@@ -24,16 +25,26 @@ class Scheme(Part):
     """
 
     name: str
-    free: Interval
+    free_torque: Interval
     stiffness: Interval | None
-    in_the_open: float
+    free_motion_stable: float
     stable: np.ndarray
     hardest: float | None
     radius: float
 
+    JSON: ClassVar = (
+        "name",
+        ("free", "free_torque"),
+        "stiffness",
+        ("in_the_open", "free_motion_stable"),
+        "stable",
+        "hardest",
+        "radius",
+    )
+
 
 @dataclass(frozen=True, repr=False)
-class Contact(Part):
+class SimulatedContact(Part):
     """One device through time: in the open for 2 s, then against the wall; as figures 12 to 14 of the haptic paper.
 
     Args:
@@ -77,11 +88,11 @@ class Teleoperation(Display):
     walls: np.ndarray
     wall: float
     at_wall: float
-    schemes: tuple[Scheme, ...]
-    contact: Contact
+    schemes: tuple[CouplingScheme, ...]
+    contact: SimulatedContact
 
     @property
-    def stated(self) -> Scheme:
+    def stated(self) -> CouplingScheme:
         """The coupling as stated."""
         return self.schemes[0]
 

@@ -5,36 +5,65 @@ from collections.abc import Mapping
 import numpy as np
 
 from bowdenfit.description.device import ENCODER, Device, asked_for
-from bowdenfit.device.coupling import Gains, Pair, contact_radius, felt_stiffness, free_torque, is_stable
-from bowdenfit.device.known import drawn
+from bowdenfit.device.coupling import (
+    CouplingGains,
+    MasterSlave,
+    free_motion_torque,
+    is_stable,
+    spectral_radius_in_contact,
+    transmitted_stiffness,
+)
+from bowdenfit.device.known import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
-from bowdenfit.questions.teleoperate.answer import Scheme, Teleoperation
-from bowdenfit.questions.teleoperate.contact import through_time
+from bowdenfit.questions.teleoperate.answer import CouplingScheme, Teleoperation
+from bowdenfit.questions.teleoperate.contact import simulate_contact
 from bowdenfit.results.record import Record
 
 DRAWS = 150
 WALLS = np.geomspace(1.0, 3000.0, 13)  # N m/rad
-LOCAL = (0.5, 1.0)  # gains on the master's own torque that are looked at beside the stated one
+LOCAL_GAINS = (0.5, 1.0)  # gains on the master's own torque that are looked at beside the stated one
 _PAIR = (
-    "rope.damping", "motor.inertia", "motor.damping", "joint.inertia", "joint.damping", "hand.inertia", "hand.damping",
-    "hand.stiffness", "slave.inertia", "slave.damping",
-)  # fmt: skip
+    "rope.damping",
+    "motor.inertia",
+    "motor.damping",
+    "joint.inertia",
+    "joint.damping",
+    "hand.inertia",
+    "hand.damping",
+    "hand.stiffness",
+    "slave.inertia",
+    "slave.damping",
+)
 _COUPLING = (
-    "coupling.master_stiffness", "coupling.master_damping", "coupling.slave_stiffness", "coupling.slave_damping",
-    "coupling.torque_to_master", "coupling.torque_to_slave", "coupling.local_gain",
-)  # fmt: skip
+    "coupling.master_stiffness",
+    "coupling.master_damping",
+    "coupling.slave_stiffness",
+    "coupling.slave_damping",
+    "coupling.torque_to_master",
+    "coupling.torque_to_slave",
+    "coupling.local_gain",
+)
 _SCALES, _ROUNDING = ("coupling.position_to_slave", "coupling.position_to_master"), 1e-3
 NEEDED = (
-    *_PAIR, "wall.damping", "controller.sample_time", "controller.filter_time", "motor.friction", "slave.friction",
-    "wall.stiffness", "motor.largest_torque", "slave.largest_torque", *_COUPLING, "coupling.delay",
-)  # fmt: skip
+    *_PAIR,
+    "wall.damping",
+    "controller.sample_time",
+    "controller.filter_time",
+    "motor.friction",
+    "slave.friction",
+    "wall.stiffness",
+    "motor.largest_torque",
+    "slave.largest_torque",
+    *_COUPLING,
+    "coupling.delay",
+)
 Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
-Drawn = Mapping[str, np.ndarray]
+Draws = Mapping[str, np.ndarray]
 
 
-def teleoperation_of(fit: Record, device: Device, bends: Bends, probability: float) -> Teleoperation:
+def assess_teleoperation(fit: Record, device: Device, bends: Bends, probability: float) -> Teleoperation:
     """The answer.
 
     Args:
@@ -52,33 +81,50 @@ def teleoperation_of(fit: Record, device: Device, bends: Bends, probability: flo
     assert loop.stiffness is not None
     stated = device.needed("teleoperation", *NEEDED)
     n = len(loop.friction)
-    at = np.unique(np.linspace(0, n - 1, min(n, DRAWS)).round().astype(int))
-    known = {name: values[at] for name, values in drawn(stated, n, fit.provenance.seed).items()}
-    bend = np.random.default_rng([fit.provenance.seed, 43]).integers(len(angles), size=len(at))
-    stiffness = loop.stiffness[at, bend]
-    gains = _gains({key: stated[key].value for key in _COUPLING}, _scales(device))
+    picked = np.unique(np.linspace(0, n - 1, min(n, DRAWS)).round().astype(int))
+    draws = {name: values[picked] for name, values in draw_device(stated, n, fit.provenance.seed).items()}
+    bend = np.random.default_rng([fit.provenance.seed, 43]).integers(len(angles), size=len(picked))
+    stiffness = loop.stiffness[picked, bend]
+    gains = _coupling_gains({key: stated[key].value for key in _COUPLING}, _position_scales(device))
     delay = round(stated["coupling.delay"].value / stated["controller.sample_time"].value)
     most = int(np.argmax(np.median(loop.friction, axis=0)))
-    felt = {"rope": loop.friction[at, most], "motor": known["motor.friction"], "slave": known["slave.friction"]}
-    schemes = {"as stated": gains, "two channels": gains.two_channels()}
-    schemes |= {f"local feedback {gain:g}": gains.with_local(gain) for gain in LOCAL if gain > gains.local_gain}
+    frictions = {
+        "rope": loop.friction[picked, most],
+        "motor": draws["motor.friction"],
+        "slave": draws["slave.friction"],
+    }
+    gains_by_name = {"as stated": gains, "two channels": gains.two_channels()}
+    gains_by_name |= {
+        f"local feedback {gain:g}": gains.with_local_gain(gain) for gain in LOCAL_GAINS if gain > gains.local_gain
+    }
     wall = stated["wall.stiffness"].value
-    found = tuple(
-        _scheme(name, each, known, stiffness, delay, felt, wall, probability) for name, each in schemes.items()
+    schemes = tuple(
+        _assess_scheme(name, each, draws, stiffness, delay, frictions, wall, probability)
+        for name, each in gains_by_name.items()
     )
-    at_wall = float(np.mean(is_stable(contact_radius(_pair(known, stiffness, wall), gains, delay))))
+    stable_at_wall = float(
+        np.mean(is_stable(spectral_radius_in_contact(_master_and_slave(draws, stiffness, wall), gains, delay)))
+    )
     return Teleoperation(
-        fit.name, device.name, (float(np.rad2deg(angles[0])), float(np.rad2deg(angles[-1]))), probability, len(at), WALLS, wall,
-        at_wall, found, through_time(device, loop, stated, gains, delay, most),
-    )  # fmt: skip
+        fit.name,
+        device.name,
+        (float(np.rad2deg(angles[0])), float(np.rad2deg(angles[-1]))),
+        probability,
+        len(picked),
+        WALLS,
+        wall,
+        stable_at_wall,
+        schemes,
+        simulate_contact(device, loop, stated, gains, delay, most),
+    )
 
 
-def _gains(stated: Mapping[str, float], scales: tuple[float, float]) -> Gains:
+def _coupling_gains(stated: Mapping[str, float], scales: tuple[float, float]) -> CouplingGains:
     k_m, d_m, k_s, d_s, c_2, c_3, k_f = (stated[key] for key in _COUPLING)
-    return Gains(k_m, d_m, k_s, d_s, c_2, c_3, k_f, False, *scales)
+    return CouplingGains(k_m, d_m, k_s, d_s, c_2, c_3, k_f, False, *scales)
 
 
-def _scales(device: Device) -> tuple[float, float]:
+def _position_scales(device: Device) -> tuple[float, float]:
     """C_1 and C_4; 1 where nothing is said, and one from the other."""
     known = device.known(*_SCALES)
     to_slave, to_master = (known[key].value if key in known else None for key in _SCALES)
@@ -100,36 +146,45 @@ def _refuse_missing(device: Device, loop: LoopDraws) -> None:
         raise asked_for("teleoperation", missing)
 
 
-def _pair(known: Drawn, stiffness: np.ndarray, wall: float) -> Pair:
+def _master_and_slave(draws: Draws, stiffness: np.ndarray, wall: float) -> MasterSlave:
     """Every device with a wall of one stiffness, or in free motion."""
-    damping = known["wall.damping"] if wall > 0 else np.zeros_like(stiffness)
-    rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s = (known[key] for key in _PAIR)
-    sample, filter_time = known["controller.sample_time"], known["controller.filter_time"]
+    damping = draws["wall.damping"] if wall > 0 else np.zeros_like(stiffness)
+    rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s = (draws[key] for key in _PAIR)
+    sample, filter_time = draws["controller.sample_time"], draws["controller.filter_time"]
     walls = np.full_like(stiffness, wall)
-    return Pair(stiffness, rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, walls, damping, sample, filter_time)
+    return MasterSlave(
+        stiffness, rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, walls, damping, sample, filter_time
+    )
 
 
-def _scheme(
+def _assess_scheme(
     name: str,
-    gains: Gains,
-    known: Drawn,
+    gains: CouplingGains,
+    draws: Draws,
     stiffness: np.ndarray,
     delay: int,
-    felt: Drawn,
+    frictions: Draws,
     wall: float,
     probability: float,
-) -> Scheme:
+) -> CouplingScheme:
     """What is felt with one coupling, and which walls are stable."""
-    radius = contact_radius(_pair(known, stiffness, 0.0), gains, delay)
-    stable = np.array([np.mean(is_stable(contact_radius(_pair(known, stiffness, k), gains, delay))) for k in WALLS])
-    own = None if gains.damps_alone else Interval.of(np.asarray(felt_stiffness(gains, stiffness, wall)))
-    free = Interval.of(np.asarray(free_torque(gains, felt["rope"], felt["motor"], felt["slave"])))
-    in_the_open = float(np.mean(is_stable(radius)))
-    hardest = 0.0 if in_the_open < probability else hardest_wall(WALLS, stable, probability)
-    return Scheme(name, free, own, in_the_open, stable, hardest, float(np.median(radius)))
+    radius = spectral_radius_in_contact(_master_and_slave(draws, stiffness, 0.0), gains, delay)
+    stable = np.array(
+        [
+            np.mean(is_stable(spectral_radius_in_contact(_master_and_slave(draws, stiffness, k), gains, delay)))
+            for k in WALLS
+        ]
+    )
+    transmitted = (
+        None if gains.local_damping else Interval.of(np.asarray(transmitted_stiffness(gains, stiffness, wall)))
+    )
+    free = Interval.of(np.asarray(free_motion_torque(gains, frictions["rope"], frictions["motor"], frictions["slave"])))
+    free_motion_stable = float(np.mean(is_stable(radius)))
+    hardest = 0.0 if free_motion_stable < probability else find_hardest_wall(WALLS, stable, probability)
+    return CouplingScheme(name, free, transmitted, free_motion_stable, stable, hardest, float(np.median(radius)))
 
 
-def hardest_wall(walls: np.ndarray, stable: np.ndarray, probability: float) -> float | None:
+def find_hardest_wall(walls: np.ndarray, stable: np.ndarray, probability: float) -> float | None:
     """Hardest wall up to which every softer one is stable with a probability; None where none looked at is too hard.
 
     Args:

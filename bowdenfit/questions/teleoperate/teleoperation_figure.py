@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, VERMILLION, in_paper_style
-from bowdenfit.questions.teleoperate.contact import OPEN
+from bowdenfit.questions.teleoperate.contact import FREE_SECONDS
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -18,45 +18,50 @@ HEADING = "What a hand feels of a remote wall"
 _HEIGHT, _DOWN = 1.7, 0.62  # in
 
 
-def caption(found: Teleoperation) -> str:
+def caption(answer: Teleoperation) -> str:
     """What is drawn, in plain words."""
     return (
         "Top left: probability that the slave touches a wall without oscillating, by the stiffness of the wall, for each "
-        f"coupling; the gray line is {100 * found.probability:.0f} %. The others are one simulation with median numbers, in "
+        f"coupling; the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median numbers, in "
         "the open for 2 s and then against the wall: angles of the master's joint and of the slave, torques of hand and wall, "
         "and each torque against its angle in contact, with the stiffness felt by the formula. "
-        f"n = {found.draws} devices and {len(found.walls)} walls."
+        f"n = {answer.draws} devices and {len(answer.walls)} walls."
     )
 
 
 @in_paper_style
-def draw(found: Teleoperation) -> Figure:
+def draw(answer: Teleoperation) -> Figure:
     """Probability of stable contact by wall, then positions, torques, and torque against position."""
     figure, (walls, position, torque, stiffness) = panels([_HEIGHT, _HEIGHT], 2, TITLE, (0.75, _DOWN))
-    _walls(walls, found)
-    _through_time(position, torque, found)
-    _contact(stiffness, found)
+    _draw_walls(walls, answer)
+    _draw_traces(position, torque, answer)
+    _draw_contact(stiffness, answer)
     legend_above(figure, [walls, position, stiffness], columns=4)
     return figure
 
 
-def _walls(axes: Axes, found: Teleoperation) -> None:
-    for i, scheme in enumerate(found.schemes):
+def _draw_walls(axes: Axes, answer: Teleoperation) -> None:
+    for i, scheme in enumerate(answer.schemes):
         axes.plot(
-            found.walls, 100 * scheme.stable, color=SERIES_COLORS[i + 2], linestyle=SERIES_LINES[i % 4],
+            answer.walls, 100 * scheme.stable, color=SERIES_COLORS[i + 2], linestyle=SERIES_LINES[i % 4],
             marker=SERIES_MARKERS[i], markersize=3, label=f"{scheme.name[0].upper()}{scheme.name[1:]}",
         )  # fmt: skip
-    axes.axhline(100 * found.probability, color=GRAY, linewidth=0.8)
+    axes.axhline(100 * answer.probability, color=GRAY, linewidth=0.8)
     axes.set_xscale("log")
     axes.set(xlabel="Stiffness of the wall (N m/rad)", ylabel="Stable contact (%)", ylim=(-3, 103))
     axes.set_title("Which walls are stable", loc="left")
 
 
-def _through_time(position: Axes, torque: Axes, found: Teleoperation) -> None:
-    seen = found.contact
-    for axes, master, slave in ((position, seen.master, seen.slave), (torque, seen.hand_torque, seen.wall_torque)):
-        axes.plot(seen.time, master, color=BLUE, linewidth=1.0, label="Master and hand")
-        axes.plot(seen.time, slave, color=VERMILLION, linestyle=SERIES_LINES[1], linewidth=1.0, label="Slave and wall")
+def _draw_traces(position: Axes, torque: Axes, answer: Teleoperation) -> None:
+    contact = answer.contact
+    for axes, master, slave in (
+        (position, contact.master, contact.slave),
+        (torque, contact.hand_torque, contact.wall_torque),
+    ):
+        axes.plot(contact.time, master, color=BLUE, linewidth=1.0, label="Master and hand")
+        axes.plot(
+            contact.time, slave, color=VERMILLION, linestyle=SERIES_LINES[1], linewidth=1.0, label="Slave and wall"
+        )
         axes.set_xlabel("Time (s)")
     position.set_ylabel("Angle (rad)")
     position.set_title("Positions", loc="left")
@@ -64,19 +69,23 @@ def _through_time(position: Axes, torque: Axes, found: Teleoperation) -> None:
     torque.set_title("Torques of hand and wall", loc="left")
 
 
-def _contact(axes: Axes, found: Teleoperation) -> None:
-    seen, stated = found.contact, found.stated.stiffness
-    touching = seen.time > OPEN
-    axes.plot(seen.master[touching], seen.hand_torque[touching], color=BLUE, linewidth=1.0)
+def _draw_contact(axes: Axes, answer: Teleoperation) -> None:
+    contact, stated = answer.contact, answer.stated.stiffness
+    touching = contact.time > FREE_SECONDS
+    axes.plot(contact.master[touching], contact.hand_torque[touching], color=BLUE, linewidth=1.0)
     axes.plot(
-        seen.slave[touching], seen.wall_torque[touching], color=VERMILLION, linestyle=SERIES_LINES[1], linewidth=1.0
+        contact.slave[touching],
+        contact.wall_torque[touching],
+        color=VERMILLION,
+        linestyle=SERIES_LINES[1],
+        linewidth=1.0,
     )
-    hard = seen.wall_torque > 0
+    hard = contact.wall_torque > 0
     if stated is not None and np.any(touching & hard):
         first = int(np.argmax(touching & hard))
-        at = seen.master[first] + np.array([0.0, 0.6 / stated.median])
+        at = contact.master[first] + np.array([0.0, 0.6 / stated.median])
         axes.plot(
-            at, seen.hand_torque[first] + stated.median * (at - at[0]), color=GRAY, linestyle=SERIES_LINES[2],
+            at, contact.hand_torque[first] + stated.median * (at - at[0]), color=GRAY, linestyle=SERIES_LINES[2],
             label="Stiffness by the formula",
         )  # fmt: skip
     axes.locator_params(axis="x", nbins=5)

@@ -20,7 +20,7 @@ DEVICE = Parameter("DEVICE", help="Such as device.toml, which describes master, 
 
 @read_first
 def teleoperate(
-    found: Annotated["Record", RESULTS, FIT],
+    fit: Annotated["Record", RESULTS, FIT],
     device: Annotated[str | Path, DEVICE, PATH],
     *,
     wrap_angle: Bends = None,
@@ -41,20 +41,20 @@ def teleoperate(
     """
     from bowdenfit.questions.bends.ring_down import device_for
     from bowdenfit.questions.teleoperate import teleoperation_figure
-    from bowdenfit.questions.teleoperate.stability import teleoperation_of
+    from bowdenfit.questions.teleoperate.stability import assess_teleoperation
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
-    answer = teleoperation_of(found, device_for(found, Path(device)), wrap_angle, PROBABILITY)
+    answer = assess_teleoperation(fit, device_for(fit, Path(device)), wrap_angle, PROBABILITY)
     if output is not None:
-        write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, found.name)
+        write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, fit.name)
     return answer
 
 
-def _reply(found: "Teleoperation", asked: dict[str, Any]) -> Reply:
+def _reply(answer: "Teleoperation", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
-    notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(teleoperation_text(found), lambda: found, notes, csv=found.to_csv)
+    notes = tuple(f"Wrote {path}." for path in files_of(options["output"], NAME)) if options["output"] else ()
+    return Reply(teleoperation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 
 
 VERB = Verb(

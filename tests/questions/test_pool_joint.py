@@ -151,7 +151,7 @@ def test_without_a_population_cables_are_as_single_fits_say():
     with jax.enable_x64(True):
         prior = {"mean": inspected.prior_mean, "spread": inspected.prior_sd, "effects": np.zeros(2)}
 
-        def cables_at(z):
+        def cables_of(z):
             return density.cables_at(z, inspected.data, prior)
 
         z = 1.5 * generator.standard_t(3, (100_000, density.size))  # tails as heavy as those of single fits

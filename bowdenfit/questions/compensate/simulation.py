@@ -1,10 +1,11 @@
 """From an answer to devices that are simulated: some draws of cable and device, moved by a hand and pushed without one."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.description.device import ENCODER, Device, asked_for
+from bowdenfit.description.device import ENCODER, Device, Known, asked_for
 from bowdenfit.device.control import Controller
 from bowdenfit.device.coulomb import safe_shares
 from bowdenfit.device.known import draw_device
@@ -57,18 +58,8 @@ def simulate_devices(
     picked = np.unique(np.linspace(0, n - 1, min(n, draws)).round().astype(int))
     draws_by_key = {name: values[picked] for name, values in draw_device(stated, n, fit.provenance.seed).items()}
     sample = stated["controller.sample_time"].value
-    optional = {key: draws_by_key.value for key, draws_by_key in device.known(INTEGRAL, ACTIVE_ZONE).items()}
-    control = Controller(
-        0.0,
-        stated["controller.dead_zone"].value,
-        float(device.controller.linear_dead_zone),
-        0.0,
-        optional.get(INTEGRAL, 0.0),
-        0.0,
-        device.count,
-        stated["controller.filter_time"].value,
-        stated["motor.largest_torque"].value,
-    )
+    optional = {key: quantity.value for key, quantity in device.known(INTEGRAL, ACTIVE_ZONE).items()}
+    control = _build_controller(device, stated, optional)
     most = int(np.argmax([bend.friction.median for bend in answer.by_bend]))
     feed_forward = answer.scheduled if schedule else answer.fixed
     middle = int(np.argsort(loop.friction[picked, most])[len(picked) // 2])
@@ -98,6 +89,21 @@ def simulate_devices(
         )
         runaway_share = float(np.mean(runaways))
     return DeviceSimulation(len(picked), answer.by_bend[most].wrap_angle, laws, runaway_share, speed)
+
+
+def _build_controller(device: Device, stated: Mapping[str, Known], optional: Mapping[str, float]) -> Controller:
+    """Build the controller without any compensation; `simulate_hand_motion` adds that of each law."""
+    return Controller(
+        coulomb=0.0,
+        dead_zone=stated["controller.dead_zone"].value,
+        linear=float(device.controller.linear_dead_zone),
+        gain=0.0,
+        integral_gain=optional.get(INTEGRAL, 0.0),
+        active_zone=0.0,
+        count=device.count,
+        filter_time=stated["controller.filter_time"].value,
+        largest_torque=stated["motor.largest_torque"].value,
+    )
 
 
 def draw_friction_margin(fit: Record, device: Device, n: int) -> np.ndarray:

@@ -13,7 +13,7 @@ from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.model import build_model
 
 
-def follows(dataset: Dataset, number: int, family: str) -> bool:
+def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
     """Whether it does.
 
     Args:
@@ -29,6 +29,6 @@ def follows(dataset: Dataset, number: int, family: str) -> bool:
     table = dataset.measurements.table(AngleTable)
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
-        found = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
-    mine = [each for each in found.departures if each.group == angle.column]
-    return bool(mine) and all(each.p_value >= FALSE_ALARM for each in mine)
+        fit = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
+    departures = [each for each in fit.departures if each.group == angle.column]
+    return bool(departures) and all(each.p_value >= FALSE_ALARM for each in departures)

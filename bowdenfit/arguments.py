@@ -1,4 +1,4 @@
-"""What functions take from their callers: texts with units, lists, folders and fits, read where they come in.
+"""Arguments of verbs: texts with units, lists, folders and fits, read and checked before the function sees them.
 
 A notebook writes `input_force="50N"`, `wrap_angles=(90, "deg")` or an array of lengths, a shell `--input-force 50N`, and each
 is clear. A force without its unit, or the folder of a fit in place of the fit, is not, and would end deep inside, in words of
@@ -43,11 +43,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class Reader:
-    """How an argument is read whose type alone does not say it.
+    """Reads an argument whose type alone does not say how.
 
     Args:
         read: Returns the argument as the function takes it, from what was written and the name to call it by in a refusal.
-        written: Type of what stands on the command line, which `read` takes too.
+        written: Type of the text on the command line, which `read` accepts too.
     """
 
     read: Callable[[Any, str], Any]
@@ -56,7 +56,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class Declared:
-    """What a function declares of a parameter.
+    """What a function declares about one of its parameters.
 
     Args:
         plain: Its name, kind, default and type, as help and notebooks show it; a type that takes long to load is a text.
@@ -70,7 +70,7 @@ class Declared:
 
     @property
     def type(self) -> Any:
-        """The type; nothing is known of one that takes long to load."""
+        """The type; `Any` for one that takes long to load and is given as text."""
         return Any if isinstance(self.plain.annotation, str) else self.plain.annotation
 
     @property
@@ -142,7 +142,7 @@ def read_arguments(function: Callable[..., Any], arguments: Mapping[str, Any], t
 
 
 def _validate(type_: Any, value: Any, name: str) -> Any:
-    """A value of a type, as pydantic has it."""
+    """Return the value as pydantic converts it to a type."""
     from pydantic import ConfigDict, TypeAdapter, ValidationError
 
     try:
@@ -210,7 +210,7 @@ def whole_number(least: int, most: float = math.inf) -> Reader:
 
 
 def _as_list(value: Any) -> list[Any]:
-    """What was written, one by one; a text and a number with its unit are one."""
+    """Return the value as a list; a text, or a number with its unit, is one item."""
     is_one = isinstance(value, str) or _is_number_with_unit(value) or not isinstance(value, Iterable)
     return [value] if is_one else list(value)
 

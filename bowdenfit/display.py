@@ -23,9 +23,9 @@ _FORMULA = re.compile(r"(?![+-]?[\d.]*\Z)[=+@\t\r-]")  # how one begins, and no 
 
 
 class Display:
-    """A result that shows itself; a class says its `sentences`, the answer first, and the rows of its table with their units.
+    """A result that displays itself; a class gives its `sentences`, the answer first, and the rows of its table with units.
 
-    Words that are laid out elsewhere are registered with `text_of`. What a dataclass holds of several shows itself, too.
+    Texts that are laid out elsewhere are registered with `text_of`. Tuples and dictionaries in a dataclass display themselves.
     """
 
     def __post_init__(self) -> None:
@@ -34,15 +34,15 @@ class Display:
                 vars(self)[name] = make_displayable(value)
 
     def sentences(self) -> Sequence[str]:
-        """What it says, the answer first."""
+        """Sentences of the result, the answer first."""
         return ()
 
     def _table(self) -> Rows:
-        """Rows (or columns) of its table, and units by column; where rows have units of their own, by their first cell."""
+        """Return the rows (or columns) of the table, and units by column; where rows have their own, by first cell."""
         return (), {}
 
     def to_frame(self) -> "DataFrame":
-        """Its table for pandas; `attrs["units"]` has the units by column or, of parameters, by name ("1": none)."""
+        """Return the table for pandas; `attrs["units"]` has the units by column or, of parameters, by name ("1": none)."""
         from pandas import DataFrame
 
         rows, units = self._table()
@@ -51,7 +51,7 @@ class Display:
         return frame
 
     def to_csv(self) -> str:
-        """Its table as CSV; units stand behind the names of the columns, of rows with units of their own in a column."""
+        """Return the table as CSV; units stand behind the names of the columns, or in a column where rows have their own."""
         rows, units = self._table()
         assert not isinstance(rows, Mapping)  # a verb's answer has rows
         listed = [{_with_unit(name, units): value for name, value in row.items()} for row in rows]
@@ -71,7 +71,7 @@ class Display:
 
 
 class Part(Display):
-    """Something inside a result: what its docstring says of it, and a row a field."""
+    """A part of a result, displayed by the first line of its docstring and a row for each field."""
 
     def sentences(self) -> Sequence[str]:
         """What it is."""
@@ -82,7 +82,7 @@ class Part(Display):
 
 
 class Several(Display, tuple[Item, ...]):
-    """Several of a kind, a row each."""
+    """A tuple of results of one kind, displayed with a row for each."""
 
     def sentences(self) -> Sequence[str]:
         """How many there are."""
@@ -93,7 +93,7 @@ class Several(Display, tuple[Item, ...]):
 
 
 class Named(Display, dict[str, Item]):
-    """Several of a kind, by name."""
+    """A dictionary of results of one kind, displayed with a row for each."""
 
     def sentences(self) -> Sequence[str]:
         """Their names."""
@@ -105,7 +105,7 @@ class Named(Display, dict[str, Item]):
 
 
 def make_displayable(value: Any) -> Any:
-    """Tuples of more than a few and dictionaries as what shows itself; anything else as it is."""
+    """Return dictionaries and longer tuples as types that display themselves; anything else unchanged."""
     if type(value) is dict:
         return Named({name: make_displayable(item) for name, item in value.items()})
     if type(value) is tuple and (len(value) > _FEW or any(hasattr(item, "__dict__") for item in value)):
@@ -114,7 +114,7 @@ def make_displayable(value: Any) -> Any:
 
 
 def abbreviate(value: Any) -> str:
-    """A value in a few words."""
+    """Return a value as a short text for a table cell."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if hasattr(value, "shape") and not isinstance(value, str):  # a string of NumPy's has one
@@ -126,7 +126,7 @@ def abbreviate(value: Any) -> str:
 
 
 def _public_fields(value: Any) -> dict[str, Any]:
-    """Fields of a value, or itself."""
+    """Return the public fields of a value by name, or the value itself under "value"."""
     if isinstance(value, Mapping):
         return {str(name): item for name, item in value.items()}
     if isinstance(value, Sequence) or not hasattr(value, "__dict__"):
@@ -135,29 +135,29 @@ def _public_fields(value: Any) -> dict[str, Any]:
 
 
 def _align_columns(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows as they are where all have the same columns, else in short."""
+    """Return rows that share their columns unchanged; others as one abbreviated column."""
     return rows if len({tuple(row) for row in rows}) <= 1 else [{"value": abbreviate(row)} for row in rows]
 
 
 def _with_unit(name: str, units: Mapping[str, str]) -> str:
-    """Name of a column with its unit."""
+    """Return the name of a column with its unit."""
     unit = units.get(name, "1")
     return name if unit == "1" else f"{name}_{unit}"
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as CSV, with a heading; empty without rows."""
+    """Return rows as CSV with a heading."""
     lines = [",".join(_csv_cell(value) for value in row.values()) for row in rows]
     return "\n".join([",".join(map(csv_heading, next(iter(rows), {}))), *lines]) + "\n"
 
 
 def csv_heading(name: str) -> str:
-    """A heading of a column: in quotes where it is more than a word."""
+    """Return a column heading, quoted if it is more than one word."""
     return name if _WORD.fullmatch(name) else csv_quoted(name)
 
 
 def csv_quoted(text: str) -> str:
-    """A text in quotes; a spreadsheet takes it for a text even where it begins as a formula does."""
+    """Return a text in quotes, guarded so that no spreadsheet takes it for a formula."""
     guard = "'" if _FORMULA.match(text) else ""
     return '"{}{}"'.format(guard, text.replace('"', '""'))
 
@@ -172,7 +172,7 @@ def _csv_cell(value: object) -> str:
 
 @singledispatch
 def text_of(result: Any) -> str:
-    """All that a result says in words; its sentences and its table where nothing else is registered."""
+    """Return the full text of a result: its sentences and its table, unless its type has registered another text."""
     rows, units = result._table()
     sentences = "\n".join(filled(sentence) for sentence in result.sentences())
     if isinstance(rows, Mapping) or not (listed := list(rows)):
@@ -184,7 +184,7 @@ def text_of(result: Any) -> str:
 
 
 def shorten_lines(text: str) -> str:
-    """The first lines of a text; the last one says how to see the rest."""
+    """Return the first lines of a text; the last one says how to see the others."""
     lines = [line if len(line) <= _WIDTH else f"{line[: _WIDTH - 4]} ..." for line in text.splitlines()]
     if len(lines) <= _LINES:
         return "\n".join(lines)
@@ -196,7 +196,7 @@ _COLUMNS = re.compile(r" {2,}")
 
 
 def as_html(text: str) -> str:
-    """A text that a verb prints as a notebook shows it: its first sentence in bold, ruled columns as tables."""
+    """Return a verb's text as HTML: its first sentence in bold, ruled columns as tables."""
     title, _, body = text.strip().partition("\n")
     ruler, _, below = body.partition("\n")
     is_titled = bool(_TITLE.fullmatch(ruler))
@@ -206,7 +206,7 @@ def as_html(text: str) -> str:
 
 
 def _first_sentence(text: str) -> tuple[str, str]:
-    """The lines up to the first that ends a sentence, and what follows."""
+    """Return the lines up to the first that ends a sentence, and the lines after it."""
     lines = text.splitlines() or [""]
     for n, line in enumerate(lines, start=1):
         if not line or line.endswith("."):
@@ -215,7 +215,7 @@ def _first_sentence(text: str) -> tuple[str, str]:
 
 
 def _block(lines: list[str]) -> str:
-    """Lines without a blank one between them: prose, a list, or columns below what stands above them."""
+    """Return a block of lines as HTML: a paragraph, a list, or a table with the text above and below it."""
     ruled = next((i for i, line in enumerate(lines) if _RULER.fullmatch(line)), None)
     if ruled:
         end = next((i for i in range(ruled + 1, len(lines)) if not _continues(lines[ruled - 1 : i], lines[i])), len(lines))
@@ -228,13 +228,13 @@ def _block(lines: list[str]) -> str:
 
 
 def _continues(above: list[str], line: str) -> bool:
-    """Whether a line is a row of the table above it, and not what is said below."""
+    """Whether a line is a row of the table above it."""
     columns = len(_cells(above[:1] + above[2:])[0])
     return not _MORE.match(line) and (len(above) == 2 or len(_cells([above[0], *above[2:], line])[0]) >= columns)
 
 
 def _cells(lines: list[str]) -> list[list[str]]:
-    """Cells of columns that two blanks or more divide in every line."""
+    """Split lines into cells at columns where all lines have two blanks or more."""
     width = max(map(len, lines))
     covered = "".join(" " if all(line[i : i + 1].isspace() or i >= len(line) for line in lines) else "x" for i in range(width))
     starts = [0, *(gap.end() for gap in _COLUMNS.finditer(covered) if gap.start() and gap.end() < width)]
@@ -242,7 +242,7 @@ def _cells(lines: list[str]) -> list[list[str]]:
 
 
 def _html_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table without styling of its own."""
+    """Return an HTML table without styling of its own."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
     cells = ["".join(f'<td style="white-space:nowrap">{escape(cell)}</td>' for cell in row) for row in rows]
     body = "".join(f"<tr>{row}</tr>" for row in cells)

@@ -22,8 +22,8 @@ _FULL = {errno.ENOSPC, errno.EFBIG, errno.EIO, *({errno.EDQUOT} if hasattr(errno
 class BowdenfitError(Exception):
     """Base of all errors a user can cause or meet; its text is complete sentences with a remedy.
 
-    Several that are said together are in `faults`; those of a table that say the same have the same `alike`, and their rows;
-    those of a description have the keys that lead to their `place`.
+    `faults` are the errors that one error combines. Faults of a table with the same `fault_key` are reported once, with their
+    rows. `key_path` holds the keys that lead to the faulty entry of a description.
     """
 
     exit_code = 1
@@ -33,7 +33,7 @@ class BowdenfitError(Exception):
     key_path: tuple[str | int, ...] = ()
 
     def __str__(self) -> str:
-        """What a library's user reads too: names of files in it steer no terminal, and break no line."""
+        """The text with control characters written out: names of files in it may hold any."""
         return printable(super().__str__())
 
 
@@ -82,17 +82,17 @@ _MOST_FAULTS, _MOST_ROWS = 20, 12  # that are named
 
 @dataclass
 class Faults:
-    """What is wrong so far: noted while reading goes on, and refused together, so that nobody corrects one at a time.
+    """Collects errors while reading goes on, and raises them together, so that users see all of them at once.
 
     Args:
-        found: The faults.
+        found: The errors collected so far.
     """
 
     faults: list[BowdenfitError] = field(default_factory=list)
 
     @contextmanager
     def collect(self, key_path: tuple[str | int, ...] = ()) -> Iterator[None]:
-        """Whatever is refused inside is noted, of a place in a description, and what comes behind it is done."""
+        """Collect the error that is raised inside, for an entry of a description, and go on after it."""
         try:
             yield
         except (DatasetError, DescriptionError) as error:
@@ -101,7 +101,7 @@ class Faults:
                 self.faults.append(fault)
 
     def read_all(self, read: Callable[[Item], Value], items: Iterable[Item], otherwise: Value) -> list[Value]:
-        """All that is given, read one by one, with `otherwise` in place of what is refused."""
+        """Return all items as read one by one, with `otherwise` in place of those refused."""
         values = []
         for item in items:
             try:
@@ -112,7 +112,7 @@ class Faults:
         return values
 
     def refuse(self) -> None:
-        """Raise all that was noted, if anything was.
+        """Raise everything collected, if there is anything.
 
         Raises:
             BowdenfitError: Of the type of the first fault.
@@ -122,7 +122,7 @@ class Faults:
 
 
 def combine_errors(errors: Sequence[BowdenfitError]) -> BowdenfitError:
-    """One error that says all faults, a sentence each; the same in several rows is said once, with the rows."""
+    """Return one error with all faults, a sentence each; a fault of several rows is reported once, with the rows."""
     faults = tuple(fault for error in errors for fault in error.faults or (error,))
     kinds: dict[Hashable, list[BowdenfitError]] = {}
     for fault in faults:
@@ -138,7 +138,7 @@ def combine_errors(errors: Sequence[BowdenfitError]) -> BowdenfitError:
 
 
 def _with_rows(faults: Sequence[BowdenfitError]) -> str:
-    """What the first of several that are alike says, and the rows of the others."""
+    """Return the text of the first of several equal faults, with the rows of the others."""
     others = sorted({fault.row for fault in faults} - {faults[0].row})
     if not others:
         return str(faults[0])
@@ -150,7 +150,7 @@ def _with_rows(faults: Sequence[BowdenfitError]) -> str:
 
 
 def disk_error(path: Path, error: OSError) -> StoreError:
-    """Why a file or folder cannot be written, with a remedy: there is no room, or it may not be written at all.
+    """Return the error for a file or folder that cannot be written, with a remedy.
 
     Args:
         path: The file or folder.
@@ -163,7 +163,7 @@ def disk_error(path: Path, error: OSError) -> StoreError:
 
 
 def system_error(error: BaseException) -> BowdenfitError | None:
-    """What the system refuses, memory or a file, as an error of ours; None for what is no refusal of the system.
+    """Return a system error (memory or a file) as a `BowdenfitError`; None for any other error.
 
     Args:
         error: Whatever came up.
@@ -182,6 +182,6 @@ def system_error(error: BaseException) -> BowdenfitError | None:
 
 
 def suggest_name(name: str, known: Sequence[str]) -> str:
-    """End of a sentence about an unknown name: the nearest known one as a question, or what there is."""
+    """Return the end of a sentence about an unknown name: the nearest known one as a question, or all known ones."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}."

@@ -33,12 +33,12 @@ class Fit(Record):
 
     @classmethod
     def of(cls, record: Record) -> "Fit":
-        """The fit of a record."""
+        """Return the fit that a record holds."""
         return cls(**{f.name: getattr(record, f.name) for f in fields(record) if f.init})
 
     @classmethod
     def load(cls, path: str | Path) -> "Fit":
-        """A fit from its results folder, bit for bit as it was saved.
+        """Load a fit from its results folder, bit for bit as it was saved.
 
         Raises:
             StoreError: The folder is missing, unfinished or damaged.
@@ -55,7 +55,7 @@ class Fit(Record):
 
     @cached_property
     def plot(self) -> FigureMethods:
-        """Its figures, a method each, such as `fit.plot.efficiency()`."""
+        """The figures, a method for each, such as `fit.plot.efficiency()`."""
         return FigureMethods(self)
 
     @property
@@ -74,11 +74,11 @@ class Fit(Record):
         return contrast_groups(self)
 
     def summary(self) -> Summary:
-        """Everything on one page, for programs (the contents of summary.json)."""
+        """Return everything on one page, for programs (the contents of summary.json)."""
         return Summary(summarize(self), self.__str__)
 
     def verdict(self) -> Verdict:
-        """Whether the answers may be trusted, and if not, why."""
+        """Return whether the answers may be trusted, and if not, why."""
         return verdict(self)
 
     @property
@@ -87,7 +87,7 @@ class Fit(Record):
         return identifiability(self)
 
     def _table(self) -> Rows:
-        """A row a parameter: draws beside least squares; priors and meanings are the model's."""
+        """Return a row for each parameter: posterior beside least squares."""
         posterior, squares = drawn_intervals(self), self.least_squares.estimates
         rows = [
             {"parameter": p.name}
@@ -99,7 +99,7 @@ class Fit(Record):
 
 
 def load(path: str | Path) -> Fit:
-    """A fit from its results folder, bit for bit as it was saved.
+    """Load a fit from its results folder, bit for bit as it was saved.
 
     Raises:
         StoreError: The folder is missing, unfinished or damaged.
@@ -113,7 +113,7 @@ _WORDS: dict[type, Callable[..., str]] = {
     Checks: checks_page,
     ElasticAnswers: bends_text,
     Identifiability: identifiability_text,
-    Efficiencies: lambda found: predictions_text(found.rows),
+    Efficiencies: lambda efficiencies: predictions_text(efficiencies.rows),
 }
 for _result, _words in _WORDS.items():
     text_of.register(_result)(_words)

@@ -31,7 +31,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Watch:
-    """How a verb that takes long is watched and interrupted.
+    """Progress bar and interrupts of a verb that takes long.
 
     Args:
         kept: File in the results folder that lets it go on later; empty where nothing does.
@@ -80,9 +80,9 @@ class Verb:
 
 @contextmanager
 def show_progress_bar(watch: Watch, report: Callable[..., None] | None) -> Iterator[Callable[..., None] | None]:
-    """Gives what to call while a verb runs: what its caller wants called, else in a notebook what moves a bar there.
+    """Yield what to call while a verb runs: the caller's function, else in a notebook one that moves a bar.
 
-    The line is a display of its own and no stream, so that a notebook keeps one line of it; tqdm's own bar for notebooks asks
+    The line is a display object rather than a stream, so that a notebook keeps one line; tqdm's own bar for notebooks asks
     for ipywidgets.
 
     Args:

@@ -14,7 +14,7 @@ _PLAIN = str.maketrans({"±": "+-", "µ": "u", "μ": "mu", "Λ": "Lambda", "²":
 
 
 def shown(value: object) -> str:
-    """Text in quotes, anything else as it is written in Python; the middle of what is long is left out."""
+    """Return a text in quotes, anything else as Python writes it; the middle of a long value is left out."""
     try:
         text = repr(" ".join(value.split()) if isinstance(value, str) else value)
     except ValueError:  # Python refuses to write out integers of more than 4300 digits
@@ -23,18 +23,18 @@ def shown(value: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Text in which nothing steers a terminal: whatever is neither visible nor the end of a line is written out."""
+    """Return text with control characters written out, so that nothing in it steers a terminal."""
     return "".join(x if x in "\n\t" or x == " " or x.isprintable() or x == "\u00a0" else ascii(x)[1:-1] for x in text)
 
 
 def quoted(names: tuple[str, ...], most: int = 12) -> str:
-    """Names in quotes with commas between them."""
+    """Return names in quotes with commas between them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(shown(name) for name in names[:most]) + more
 
 
 def few(names: Iterable[str], most: int = 3) -> str:
-    """Names with commas between them and a last "and"; of many the first, and how many more there are.
+    """Return names with commas and a last "and"; of many the first few, and how many more there are.
 
     Between names that have commas themselves there are semicolons.
     """
@@ -47,12 +47,12 @@ def few(names: Iterable[str], most: int = 3) -> str:
 
 
 def listed(parts: Sequence[str]) -> str:
-    """Parts with commas and a last "and"."""
+    """Return parts with commas and a last "and"."""
     return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else "".join(parts)
 
 
 def decimals(scale: float, value: float = math.nan) -> int:
-    """Decimals that show a quantity of this uncertainty to two significant digits of it.
+    """Return the decimals that show a quantity to two significant digits of its uncertainty.
 
     Where there is no uncertainty, four, or those that the value has if it has fewer.
     """
@@ -62,39 +62,39 @@ def decimals(scale: float, value: float = math.nan) -> int:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number to so many significant digits, without powers of ten where people would write zeros: '0.0123', '1040'."""
+    """Return a number to some significant digits, without powers of ten where people would write zeros: '0.0123', '1040'."""
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < _LARGE else text
 
 
 def counted(n: int, noun: str, several: str = "") -> str:
-    """'1 run', '3 runs'."""
+    """Return a number with its noun: '1 run', '3 runs'."""
     return f"{n} {noun}" if n == 1 else f"{n} {several or noun + 's'}"
 
 
 def percent(share: float, digits: int = 1, sign: str = "") -> str:
-    """A share in percent, such as '67.5 %'."""
+    """Return a share in percent, such as '67.5 %'."""
     return f"{100 * share:{sign}.{digits}f} %"
 
 
 def give_or_take(value: float, sd: float) -> str:
-    """A value with its standard deviation, such as '0.112 ± 0.013'."""
+    """Return a value with its standard deviation, such as '0.112 ± 0.013'."""
     digits = decimals(sd)
     return f"{value:z.{digits}f} ± {sd:z.{digits}f}"
 
 
 def in_ascii(text: str) -> str:
-    """The same for a terminal that has no more than ASCII."""
+    """Return a text in ASCII."""
     return text.translate(_PLAIN).encode("ascii", "replace").decode("ascii")
 
 
 def unbroken(text: str) -> str:
-    """The same with blanks at which no line ends between numbers and their units."""
+    """Return a text with no-break spaces between numbers and their units."""
     return _KEPT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def filled(text: str, indent: str = "", hangs: bool = False) -> str:
-    """A paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line.
+    """Return a paragraph in lines of at most `WIDTH` characters; no number loses its unit to the next line.
 
     Args:
         text: The paragraph.
@@ -107,12 +107,12 @@ def filled(text: str, indent: str = "", hangs: bool = False) -> str:
 
 
 def kept_narrow(line: str, indent: str = "") -> str:
-    """A line as it is where it fits into a terminal, else filled; so that a row of a narrow table stays one."""
+    """Return a line unchanged if it fits into a terminal, else filled; so that a row of a table stays one line."""
     return (indent + line).rstrip() if len(line) <= WIDTH else filled(line, indent, hangs=True)
 
 
 def legend(meanings: Mapping[str, str]) -> str:
-    """What names stand for, a line each; empty where nothing is said of any.
+    """Return a line for each name and its meaning; empty if there are no meanings.
 
     Args:
         meanings: In words, by name.
@@ -121,7 +121,7 @@ def legend(meanings: Mapping[str, str]) -> str:
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:
-    """Columns under a ruled heading, the first and those named in `left` aligned left, the others right."""
+    """Return columns under a ruled heading, the first and those named in `left` aligned left, the others right."""
     widths = [max(len(str(row[i])) for row in [heads, *rows]) for i in range(len(heads))]
     at_left = {i for i, head in enumerate(heads) if i == 0 or head in left}
     lines = [
@@ -135,7 +135,7 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[
 
 
 def _break_cells(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """The same with those cells in several rows for which there is no room beside the first column, or in it."""
+    """Return headings and rows with cells broken into several rows where they are too wide."""
     first, *others = (max(len(row[i]) for row in [heads, *rows]) for i in range(len(heads)))
     if first + 2 + max(others, default=0) <= WIDTH:
         return heads, list(rows)
@@ -149,7 +149,7 @@ def _break_cells(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[S
 
 
 def narrow_table(heads: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[str] = ("prior", "unit")) -> str:
-    """A table of at most `WIDTH` characters: columns that find no place stand below, beside the first again.
+    """Return a table of at most `WIDTH` characters: columns without room stand below, beside the first again.
 
     Cells that are too wide even so are broken into lines.
     """

@@ -5,7 +5,7 @@
 Run it with the Python of the environment that bowdenfit and its tests use, on a machine that does nothing else: it takes
 several minutes, measures everything in one go, and prints one table. Every number is the median of N fresh processes
 (default 3). `--only` measures some of it: rows by their names, "plain" (other samplers), "many" (many cables), "counts".
-`--record` puts the table at the head of docs/benchmarks.md, with the machine, the date and the commit.
+`--record` replaces the tables of docs/benchmarks.md, with the machine, the date and the commit.
 
 Whole processes: wall time from start to exit, imports, compilation, figures and files included; the time that processors
 spent on the process and those it starts, which says something on a busy machine too; and the peak of their resident memory
@@ -91,7 +91,11 @@ SECONDS = {
     CABLES: 60.0,
 }  # targets
 RECORD = ROOT / "docs" / "benchmarks.md"
-HEAD = "# Benchmarks\n\nWritten by `scripts/benchmark_fit.py --record`; its head says what each number is. The newest first.\n"
+HEAD = """# Benchmarks
+
+The last run of each table, newest first. `scripts/benchmark_fit.py --record` writes the first ones; its head explains them.
+"""
+BY_HAND = "## On a GPU"  # begins what is kept, because this script does not measure it
 AGREEMENT = 0.2  # standard deviations between means
 LIBRARIES = ("jax", "emcee", "blackjax", "numpyro", "numpy")
 
@@ -310,10 +314,11 @@ def markdown(rows: Table) -> str:
 
 
 def record(sections: Sequence[str]) -> None:
-    """Put what was measured at the head of the record."""
-    before = RECORD.read_text(encoding="utf-8").removeprefix(HEAD) if RECORD.exists() else ""
+    """Replace the tables of the last record by those just measured."""
+    before = RECORD.read_text(encoding="utf-8") if RECORD.exists() else ""
+    kept = before[before.index(BY_HAND) :] if BY_HAND in before else ""
     RECORD.parent.mkdir(exist_ok=True)
-    RECORD.write_text(HEAD + "\n" + "\n\n".join(sections) + "\n" + before, encoding="utf-8")
+    RECORD.write_text(HEAD + "\n" + "\n\n".join(sections) + "\n\n" + kept, encoding="utf-8")
 
 
 def main() -> None:

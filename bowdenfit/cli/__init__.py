@@ -37,7 +37,7 @@ def start() -> None:
 
 
 def _open_what_is_closed() -> None:
-    """Let no file that is opened later be taken for standard output, where libraries print."""
+    """Open standard streams that are closed, so that no later file takes their number, to which libraries print."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -75,7 +75,7 @@ def main() -> None:
 
 
 def _suggest_remedy() -> str:
-    """What to do about an error that nothing foresaw; what tells libraries what to do, such as a device, may be behind it."""
+    """Return what to do about an unforeseen error; environment variables that configure libraries may be the cause."""
     report = "please report it with what BOWDENFIT_DEBUG=1 prints when you run the command again."
     settings = [name for name, value in os.environ.items() if name.startswith(_OF_LIBRARIES) and (name, value) not in _HARMLESS]
     if not settings:
@@ -88,7 +88,7 @@ def _suggest_remedy() -> str:
 
 
 def _print_error(text: str) -> None:
-    """Say what went wrong, where that can be said; the exit code says it in any case."""
+    """Print what went wrong, if standard error is open; the exit code tells it in any case."""
     with suppress(OSError):
         say(text, err=True)
 

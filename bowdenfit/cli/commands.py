@@ -61,7 +61,7 @@ def command(verb: Verb) -> App:
 
 
 def _command_signature(verb: Verb) -> Signature:
-    """The parameters of a verb's function as they are written, and --csv and --json."""
+    """Return the signature that cyclopts reads: the function's parameters, and --csv and --json."""
     described = [*parse(Reading.__doc__ or "").params, *parse(verb.function.__doc__ or "").params]
     words = {parameter.arg_name: " ".join((parameter.description or "").split()) for parameter in described}
     declared = parameters_of(verb.function).items()
@@ -76,7 +76,7 @@ def _command_signature(verb: Verb) -> Signature:
 
 
 def _command_parameter(declared: Declared, words: str | None) -> Stated:
-    """A parameter as it is written: by its place if its name is in capitals, else by name; as text if a reader reads it."""
+    """Return a parameter for cyclopts: positional if its name is in capitals, as text if a reader reads it."""
     type_, default = declared.type, declared.plain.default
     about, by_place = [Parameter(help=words)], declared.written_name.isupper()
     kind = Stated.POSITIONAL_ONLY if by_place else Stated.KEYWORD_ONLY
@@ -108,7 +108,7 @@ def describe_error(error: CycloptsError) -> str:
 
 
 def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
-    """Ask, and print the reply for people, or as "json" or "csv"."""
+    """Run a verb, and print its reply for people, or as "json" or "csv"; return the exit code."""
     parameters = parameters_of(verb.function).items()
     declared = {name: parameter for name, parameter in parameters if parameter.option.parse is not False}
     request = {name: parameter.plain.default for name, parameter in declared.items()} | options
@@ -131,14 +131,14 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
 
 
 def _load_kept_answers(source: Path) -> dict[str, Any]:
-    """What the fit of a results folder has answered before."""
+    """Return the answers that are kept in a results folder, by question."""
     from bowdenfit.results.answer_cache import read_answers
 
     return read_answers(source)
 
 
 def _reply_from_kept(verb: Verb, answers: dict[str, Any], request: dict[str, Any]) -> Reply | None:
-    """The reply where a fit has answered just this before."""
+    """Return the reply from kept answers; None if this question is not among them."""
     try:
         return verb.kept(answers, request) if verb.kept and answers else None
     except (LookupError, TypeError, ValueError, AttributeError):  # kept when the answer had another shape
@@ -146,7 +146,7 @@ def _reply_from_kept(verb: Verb, answers: dict[str, Any], request: dict[str, Any
 
 
 def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
-    """The reply, worked out."""
+    """Call the verb's function, and return its reply."""
     if verb.results and request["output"] is None:
         request["output"] = Path(verb.results) / _results_name(source)
     if request.get("output") is not None:
@@ -165,7 +165,7 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
 
 
 def _list_troubles(fit: Any, source: Path) -> Collection[str]:
-    """Why a fit is not to be trusted, worked out; nothing where the source is no fit.
+    """Return why a fit is not to be trusted; empty if the source is not a fit.
 
     Args:
         found: The fit, where it has been loaded.
@@ -179,20 +179,20 @@ def _list_troubles(fit: Any, source: Path) -> Collection[str]:
 
 
 def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:
-    """A reply that says beside the answer, and by its exit code, where a fit is not to be trusted."""
+    """Return the reply with a warning and an exit code if the fit is not to be trusted."""
     warning = f"Warning: this fit is {' and '.join(troubles)}; see bowdenfit summary {results}."
     return replace(reply, notes=(*reply.notes, warning), exit_code=reply.exit_code or NOT_TRUSTED) if troubles else reply
 
 
 def _to_json(reply: Reply) -> str:
-    """An answer as JSON."""
+    """Return an answer as JSON."""
     from bowdenfit.results.serialization import plain_data
 
     return json.dumps(plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
 
 
 def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
-    """The fit of a results folder; of several, by their own names, or from where their paths part where two have the same."""
+    """Load one fit, or several by folder name (by path from the common folder where two names are equal)."""
     from bowdenfit.finished_fit import load
 
     if isinstance(results, Path):
@@ -207,7 +207,7 @@ def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
 
 
 def _results_name(dataset: Path) -> str:
-    """What the results of a data set are called if nothing else is said."""
+    """Return the default name of a data set's results folder."""
     return dataset.stem if dataset.suffix else dataset.resolve().name
 
 

@@ -23,7 +23,7 @@ class Terminal:
     """A person at a terminal."""
 
     def ask(self, question: "Question[Answer]") -> Answer:
-        """The answer to a question, asked until there is one."""
+        """Ask until there is a valid answer, and return it."""
         say("")
         say(filled(question.words))
         for i, option in enumerate(question.options, start=1):
@@ -43,15 +43,15 @@ class Terminal:
                 say(filled(f"{str(error)[:1].upper()}{str(error)[1:]}"))
 
     def say(self, sentence: str) -> None:
-        """What was understood without asking."""
+        """Print what was understood without asking."""
         say(filled(sentence))
 
     def settle(self) -> None:
-        """Nothing: everything was answered."""
+        """Do nothing: everything was answered."""
 
 
 def _read_line(prompt: str) -> str:
-    """What is typed behind a prompt."""
+    """Return the line typed after a prompt."""
     say(prompt, nl=False)
     sys.stdout.flush()
     line = sys.stdin.readline()
@@ -62,7 +62,7 @@ def _read_line(prompt: str) -> str:
 
 
 def is_interactive() -> bool:
-    """Whether somebody can be asked."""
+    """Whether a person is at the terminal."""
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
@@ -124,7 +124,7 @@ def init(
 
 
 def split_folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[Path | None, list[Path]]:
-    """Which of what was named is the folder to write, and which are files: it may stand behind those of --from."""
+    """Return the folder to write and the measured files; the folder may follow the files of --from."""
     named = [*([folder] if folder else []), *files]
     folders = [path for path in named if not (files and path.is_file())]
     if len(folders) > 1:
@@ -165,7 +165,7 @@ def _ask_folder(ask: "Asker") -> Path:
 
 
 def _ask_files(ask: "Asker") -> list[Path]:
-    """The files that were measured; none where there is only a template to write."""
+    """Ask for the measured files; none where only a template is to be written."""
     from bowdenfit.files import FORMATS
     from bowdenfit.questions.start.folder import measured_files, refuse_files
     from bowdenfit.questions.start.question import Question
@@ -189,7 +189,7 @@ def _ask_files(ask: "Asker") -> list[Path]:
 
 
 def _start_from_files(folder_: Path, files: Sequence[Path], ask: "Asker") -> None:
-    """Describe files, write the folder, and see whether `check` accepts it."""
+    """Describe the files, write the folder, and check that `check` accepts it."""
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.start.describe import write_description
     from bowdenfit.questions.start.folder import describe_written_files, refuse_files, write_data_set

@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM: one flag, which loops look at.
+"""Run a command so that Ctrl-C and SIGTERM end it cleanly, with a progress bar while it is long.
 
 Signals are handled between two steps of Python in the main thread, and compiled code may take seconds for one step. So a
-command runs in a thread of its own while the main thread waits. A signal sets the flag; loops that keep what they have done
-(see `bowdenfit.cli.running`) look at it and end. Whatever has not ended soon after is ended with the process: files are
-written whole under their names or not at all, and a checkpoint only grows.
+command runs in a thread of its own while the main thread waits. A signal sets a flag; loops that keep what they have done (see
+`watch_verb`) look at it and end. Whatever has not ended soon after is ended with the process: files are written whole under
+their names or not at all, and a checkpoint only grows.
 """
 
 import os
@@ -33,7 +33,7 @@ _how_to_go_on: list[Callable[[], str]] = []
 
 @contextmanager
 def announce_continuation(how_to_go_on: Callable[[], str]) -> Iterator[None]:
-    """Announce that an interrupted command may leave something to go on from.
+    """Announce how an interrupted command can be continued.
 
     Args:
         how_to_go_on: Returns what is kept and how to go on, in words; empty where nothing is kept.
@@ -90,7 +90,7 @@ def run_interruptibly(command: Callable[[], Any]) -> Any:
 
 @contextmanager
 def _signals_set_the_flag() -> Iterator[None]:
-    """Have SIGINT and SIGTERM set the flag, where this is the main thread; a signal that is ignored stays so."""
+    """Let SIGINT and SIGTERM set the flag, if this is the main thread; an ignored signal stays ignored."""
     before: dict[signal.Signals, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -104,7 +104,7 @@ def _signals_set_the_flag() -> Iterator[None]:
 
 
 def _end_process() -> None:
-    """Say that the program was interrupted, and end it whatever still runs."""
+    """Print that the program was interrupted, and end it whatever still runs."""
     try:
         say_interrupted(next(filter(None, (how_to_go_on() for how_to_go_on in _how_to_go_on)), ""))
     finally:  # whether or not anybody reads it
@@ -154,7 +154,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
 
 @contextmanager
 def _bar(watch: Watch) -> Iterator[Report]:
-    """Show a bar, on a terminal only."""
+    """Show a progress bar, on a terminal only."""
     if not sys.stderr.isatty():
         yield lambda *_: None
         return

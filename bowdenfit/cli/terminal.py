@@ -7,7 +7,7 @@ from bowdenfit.words import in_ascii, printable
 
 
 class NoReaderError(OSError):
-    """Whoever read what is said has ended, as `head` does after some lines."""
+    """The program that reads the output has ended, as `head` does after some lines."""
 
 
 def say(text: str, err: bool = False, nl: bool = True) -> None:
@@ -31,7 +31,7 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
 
 
 def say_interrupted(how_to_go_on: str = "") -> None:
-    """Say in one line that this was interrupted; a terminal shows ^C before it.
+    """Print in one line that this was interrupted; a terminal shows ^C before it.
 
     Args:
         how_to_go_on: Behind a semicolon, where something is kept.

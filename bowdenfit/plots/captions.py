@@ -7,11 +7,11 @@ from bowdenfit.words import counted
 
 
 def describe_curve(has_draws: bool, quantity: str = "") -> str:
-    """What a line with a band of 90 % is, in a sentence.
+    """Return the sentence that explains a line with a 90 % band.
 
     Args:
         drawn: Whether there are draws; else the line is the least-squares estimate.
-        what: That it is of, such as "the output force".
+        what: The quantity shown, such as "the output force".
     """
     of = f" of {quantity}" if quantity else ""
     if not has_draws:
@@ -20,21 +20,21 @@ def describe_curve(has_draws: bool, quantity: str = "") -> str:
 
 
 def describe_strip(unit_words: str) -> str:
-    """What a strip of residuals is, in a sentence."""
+    """Return the sentence that explains a strip of residuals."""
     return f"Below: each reading less the line, {unit_words}; without misfit they scatter evenly about zero."
 
 
 def count_shown(shown: int, total: int, noun: str, several: str = "") -> str:
-    """'3 recordings', or '8 of 12 recordings', evenly chosen."""
+    """Return '3 recordings', or '8 of 12 recordings, evenly chosen'."""
     counting = counted(total, noun, several)
     return counting if shown >= total else f"{shown} of {counting}, evenly chosen"
 
 
 def explain_symbols(symbols: Iterable[tuple[str, str]]) -> str:
-    """What symbols stand for, in a sentence with a space behind it; empty where nothing is said of any.
+    """Return a sentence on what symbols stand for, with a space after it; empty if no symbol has a meaning.
 
     Args:
-        symbols: Each in matplotlib's math notation, and what it stands for; those that nothing is said of are left out.
+        symbols: Pairs of a symbol in matplotlib's math notation and its meaning; those with an empty meaning are left out.
     """
     meanings = "; ".join(f"{to_plain_text(symbol)}: {meaning}" for symbol, meaning in symbols if meaning)
     return f"Symbols: {meanings}. " if meanings else ""

@@ -20,7 +20,7 @@ NEW_RUN = "90 % of runs, each on a new mounting"
 
 @dataclass(frozen=True)
 class Band:
-    """Quantiles (`BAND_QUANTILES`, first axis) against the route; one row, the least-squares line, without draws."""
+    """Quantiles of a curve against the route: `BAND_QUANTILES` along the first axis, or one least-squares row."""
 
     route: np.ndarray
     quantiles: np.ndarray
@@ -32,7 +32,7 @@ class Band:
 
 
 def draw_band(axes: Axes, band: Band, scale: float = 1.0) -> None:
-    """Median with 50 % and 90 % intervals, or the least-squares line where there are no draws."""
+    """Draw the median with 50 % and 90 % intervals, or the least-squares line if there are no draws."""
     quantiles = scale * band.quantiles
     if band.is_line:
         axes.plot(band.route, quantiles[0], color=BLUE, label=LEAST_SQUARES)
@@ -44,7 +44,7 @@ def draw_band(axes: Axes, band: Band, scale: float = 1.0) -> None:
 
 
 def route_limits(route_range: tuple[float, float], *readings: np.ndarray) -> tuple[float, float]:
-    """Axis that shows the range and every reading."""
+    """Return axis limits that show the range and every reading."""
     everything = np.concatenate([np.asarray(route_range), *readings])
     everything = everything[np.isfinite(everything)]
     room = 0.025 * (everything.max() - everything.min())
@@ -62,7 +62,7 @@ def shade_outside(axes: Axes, route_range: tuple[float, float], shown: tuple[flo
 
 
 def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any, **line: Any) -> None:
-    """The median with a band from the lowest to the highest quantile, or the one line where there are no draws.
+    """Draw the median with a band from the lowest to the highest quantile, or one line if there are no draws.
 
     Args:
         axes: Panel to draw on.
@@ -77,25 +77,25 @@ def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any,
 
 
 def middle(quantiles: np.ndarray) -> np.ndarray:
-    """The median, or the one row without draws."""
+    """Return the median row, or the only row."""
     row: np.ndarray = quantiles[len(quantiles) // 2]
     return row
 
 
 def name_band(axes: Axes, quantiles: np.ndarray, color: Any = GRAY) -> None:
-    """The entry of the legend for bands of several colors; none without draws."""
+    """Add a legend entry for bands of several colors; none without draws."""
     if len(quantiles) > 1:
         axes.fill_between([], [], [], color=color, alpha=0.3, linewidth=0, label=WIDE_INTERVAL)
 
 
 def choose_evenly(items: Sequence[Any], most: int) -> list[Any]:
-    """So many of a sequence at most, from its first to its last."""
+    """Return at most `most` evenly spaced items of a sequence, the first and the last included."""
     indices = np.linspace(0, len(items) - 1, min(len(items), most)).round().astype(int)
     return [items[i] for i in indices.tolist()]
 
 
 def note_shown_count(axes: Axes, count: int, total: int, noun: str = "") -> None:
-    """An entry of the legend that says so where not all are drawn."""
+    """Add a legend entry such as '8 of 12 runs shown' if not all are drawn."""
     if count < total:
         axes.plot([], [], " ", label=" ".join(filter(None, (f"{count} of {total}", noun, "shown"))))
 
@@ -105,12 +105,12 @@ ENOUGH = 40_000  # draws, beyond which more do not change a picture
 
 
 def thin_draws(draws: np.ndarray) -> np.ndarray:
-    """All draws in one row, or every so many where there are more than enough."""
+    """Return all draws in one row, or evenly thinned to about `ENOUGH`."""
     return np.ravel(draws)[:: -(-np.size(draws) // ENOUGH)]
 
 
 def limits(draws: np.ndarray, share: float = 0.996) -> tuple[float, float]:
-    """An axis that shows the given share of the draws with a little room; never below zero where no draw is.
+    """Return axis limits that show a share of the draws with a little room; never below zero if no draw is.
 
     Draws that are all the same get some width all the same.
     """
@@ -120,12 +120,12 @@ def limits(draws: np.ndarray, share: float = 0.996) -> tuple[float, float]:
 
 
 def support(*samples: np.ndarray) -> float:
-    """Zero where no draw is below it, the usual bound of a positive quantity; otherwise minus infinity."""
+    """Return the lower bound of the support: zero if no draw is below it, else minus infinity."""
     return 0.0 if all(np.min(sample) >= 0 for sample in samples) else -np.inf
 
 
 def density(draws: np.ndarray, grid: np.ndarray, lower: float = -np.inf, upper: float = np.inf) -> np.ndarray:
-    """Kernel density of the draws at the points of an even grid.
+    """Return the kernel density of draws on an even grid.
 
     A Gaussian is folded over a histogram whose bins are the grid's; draws near a bound are
     mirrored at it, so that a density that does not vanish there is not smoothed away.
@@ -150,7 +150,7 @@ def density(draws: np.ndarray, grid: np.ndarray, lower: float = -np.inf, upper: 
 
 
 def bandwidth(draws: np.ndarray, least: float) -> float:
-    """Silverman's rule of thumb, a third wider as draws of a chain repeat each other, but no less than a given width."""
+    """Return Silverman's bandwidth, a third wider because draws of a chain are correlated, and at least `least`."""
     low, high = np.quantile(draws, (0.25, 0.75))
     spread = min((s for s in (float(np.std(draws)), float(high - low) / 1.34) if s > 0), default=0.0)
     return max(1.2 * spread * len(draws) ** -0.2, least)

@@ -29,7 +29,7 @@ _TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13
 
 
 def empty_page(width: float, height: float) -> Figure:
-    """A figure of this size without anything on it; sizes in inches."""
+    """Return an empty figure; sizes in inches."""
     from bowdenfit.plots.page import Page
 
     return Page(figsize=(width, height))
@@ -38,7 +38,7 @@ def empty_page(width: float, height: float) -> Figure:
 def panels(
     heights: Sequence[float], columns: int, top: float, gaps: tuple[float, float], page: float = WIDE, **sharing: object
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with a grid of panels, row by row.
+    """Return a figure with a grid of panels, and the panels row by row.
 
     Args:
         heights: Of each row of panels.
@@ -63,7 +63,7 @@ def panels(
 
 
 def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float, **sharing: Any) -> Axes:
-    """A panel at a place in inches."""
+    """Add a panel at a position in inches."""
     page, total = figure.get_size_inches()
     return figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing)
 
@@ -76,7 +76,7 @@ def place_labels(figure: Figure, axes: Axes, left: float = LABEL_LEFT, below: fl
 
 
 def number_width(axes: Axes) -> float:
-    """Width of the widest number left of a panel [in]; 0 where none is shown."""
+    """Return the width of the widest tick number left of a panel [in]; 0 if none is shown."""
     low, high = sorted(axes.get_ylim())
     axis = axes.yaxis
     if not axis.get_tick_params()["labelleft"]:
@@ -101,14 +101,14 @@ def squeeze(figure: Figure, left: float, to: float) -> None:
 
 
 def drop_unused(flat: list[Axes], used: int) -> list[Axes]:
-    """The panels in use, the rest taken off the figure."""
+    """Remove unused panels from the figure, and return those in use."""
     for axes in flat[used:]:
         axes.remove()
     return flat[:used]
 
 
 def count_columns(page: float, most: int, least: float, gap: float) -> int:
-    """How many panels fit side by side.
+    """Return how many panels fit side by side.
 
     Args:
         page: Width of the figure.
@@ -120,7 +120,7 @@ def count_columns(page: float, most: int, least: float, gap: float) -> int:
 
 
 def text_width(words: str, size: float = SMALL, weight: str = "normal") -> float:
-    """Width of words on the page, of the longest line [in]."""
+    """Return the width of a text on the page, of its longest line [in]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
@@ -136,7 +136,7 @@ def text_width(words: str, size: float = SMALL, weight: str = "normal") -> float
 
 
 def wrap_words(words: str, room: float, size: float = SMALL, weight: str = "normal", most: int | None = None) -> str:
-    """Words in lines that are no wider than the room, in so many lines at most; the end of what is longer is left out."""
+    """Break a text into lines no wider than the room, at most `most` of them; the end of a longer text is cut."""
     if text_width(words, size, weight) <= room:
         return words
     letters = max(1, int(len(words) * room / text_width(words, size, weight)))
@@ -162,7 +162,7 @@ def area_entry(words: str, color: str) -> Artist:
 
 
 def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
-    """One legend for several panels, on room added at the top of the page, where it hides no data.
+    """Add one legend for several panels, on room added at the top of the page, where it hides no data.
 
     Args:
         figure: The page.
@@ -187,12 +187,12 @@ def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
 
 
 def _legend_width(widths: Sequence[float], columns: int) -> float:
-    """Width of a legend whose entries stand in columns, one after the other."""
+    """Return the width of a legend with entries in columns."""
     return sum(max(part) for part in np.array_split(np.array(widths), columns)) + _APART * SMALL / 72 * columns
 
 
 def title_above(figure: Figure, words: str, mark: str = "") -> None:
-    """What the figure is of, on room added above everything else.
+    """Add a title on room added above everything else.
 
     Args:
         figure: The page.
@@ -220,7 +220,7 @@ def title_above(figure: Figure, words: str, mark: str = "") -> None:
 
 
 def label_across(axes: Axes, words: str) -> None:
-    """The name of the lower axis, in several lines where it is wider than the panel and its margins."""
+    """Name the lower axis, in several lines if the name is wider than the panel and its margins."""
     figure = axes.figure
     assert figure is not None  # a panel is on a page
     page, box = figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
@@ -251,7 +251,7 @@ LEAST_SPACE = 1.1 * LETTER / NUMBER_SPACE  # of that from one number to the next
 
 
 def number_below(axes: Axes, whole: bool = False) -> None:
-    """Number the lower axis of a panel.
+    """Put tick numbers on the lower axis of a panel.
 
     Args:
         axes: The panel, with its limits and in its place.
@@ -272,7 +272,7 @@ def number_below(axes: Axes, whole: bool = False) -> None:
 
 
 def number_left(axes: Axes) -> None:
-    """Number the left axis of a panel that has its limits and is in its place."""
+    """Put tick numbers on the left axis of a panel that has its limits and position."""
     height = _size(axes)[1]
     axes.set_yticks(*ticks(axes.get_ylim(), lambda _: height / NUMBER_ROW))
     axes.tick_params(axis="y", length=72 * TICK, pad=72 * 0.6 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
@@ -289,7 +289,7 @@ def _size(axes: Axes) -> tuple[float, float]:
 def ticks(
     limits: tuple[float, float], room: Callable[[list[str]], float], whole: bool = False, over: float = 0.0
 ) -> tuple[np.ndarray, list[str]]:
-    """As many round values as there is room for, and the same as text.
+    """Return as many round tick values as there is room for, and their texts.
 
     Args:
         limits: Of the axis.
@@ -331,7 +331,7 @@ def ticks(
 
 
 def _texts(values: np.ndarray, step: float) -> list[str]:
-    """Numbers with just the decimals of their step."""
+    """Return numbers as text with the decimals of their step."""
     decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
     shown = [f"{v + 0.0:.3g}" if decimals is None or step >= 1e5 else f"{v + 0.0:.{decimals}f}" for v in values]
     return [text.replace("-", "\N{MINUS SIGN}") for text in shown]

@@ -10,10 +10,10 @@ _PIXELS = 100  # of the screen, an inch
 
 
 class Page(Figure):
-    """matplotlib's figure, unknown to pyplot."""
+    """A matplotlib figure that pyplot does not know."""
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        """What a notebook shows, and how wide, so that the points are fine on any screen."""
+        """Return the PNG for notebooks and its width in pixels, at a resolution that is fine on any screen."""
         buffer = io.BytesIO()
         save(self, buffer, "png")
         return buffer.getvalue(), {"width": int(_PIXELS * self.get_size_inches()[0])}

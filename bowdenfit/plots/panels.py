@@ -33,13 +33,13 @@ MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
 
 
 def finite(values: Iterable[np.ndarray]) -> np.ndarray:
-    """All finite values in one row."""
+    """Return all finite values in one row."""
     row = np.concatenate([np.ravel(v) for v in values])
     return row[np.isfinite(row)]
 
 
 def span(values: Iterable[np.ndarray], room: float = 0.05) -> tuple[float, float]:
-    """Limits that show all values with some room; 0 to 1 without any."""
+    """Return axis limits that show all values with some room; (0, 1) without values."""
     row = finite(values)
     if not len(row):
         return 0.0, 1.0
@@ -55,7 +55,7 @@ def share_limits(spans: Sequence[tuple[float, float]]) -> bool:
 
 
 def set_limits(flat: list[Axes], spans: Sequence[tuple[float, float]], which: str, shared: bool) -> None:
-    """Limits of the "x" or "y" axes: each its own, or all the same."""
+    """Set the limits of the "x" or "y" axes: of each panel, or the same for all."""
     everywhere = (min(s[0] for s in spans), max(s[1] for s in spans))
     for axes, own in zip(flat, spans, strict=True):
         axes.set(**{f"{which}lim": everywhere if shared else own})
@@ -65,7 +65,7 @@ def recording_panels(
     names: Sequence[str], most_columns: int, height: float | None, share_x: bool, share_y: bool, page: float = MEDIUM,
     width: float | None = None,
 ) -> tuple[Figure, list[Axes], int]:  # fmt: skip
-    """A panel a recording under its name, in a grid without more columns than it needs.
+    """Return a figure with a titled panel for each recording, the panels, and the number of columns.
 
     Args:
         names: Of the recordings.
@@ -97,7 +97,7 @@ def panels_with_limits(
     page: float = MEDIUM,
     width: float | None = None,
 ) -> tuple[Figure, list[Axes], int]:
-    """The same, each axis with the limits of its own panel, or with those of all where they are alike.
+    """Return `recording_panels` with limits: those of each panel, or common ones where ranges are similar.
 
     Args:
         names: Of the panels.
@@ -116,12 +116,12 @@ def panels_with_limits(
 
 
 def shorten_name(name: str, longest: int) -> str:
-    """The end of a name, which tells recordings of one folder apart."""
+    """Return the end of a name, which distinguishes recordings of one folder."""
     return name if len(name) <= longest else "\N{HORIZONTAL ELLIPSIS}" + name[1 - longest :]
 
 
 def shorten_title(name: str, room: float) -> str:
-    """The end of a name that is no wider than the room [in], from the beginning of a word on where there is one."""
+    """Return the end of a name that fits the room [in], cut at the beginning of a word if there is one."""
     if text_width(name) <= room:
         return name
     longest = next((n for n in range(len(name) - 1, 1, -1) if text_width(shorten_name(name, n)) <= room), 1)
@@ -130,7 +130,7 @@ def shorten_title(name: str, room: float) -> str:
 
 
 def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> None:
-    """Names and units on the outer panels; a panel with nothing below it is an outer one."""
+    """Label the outer panels; a panel with nothing below it is an outer one."""
     for i, axes in enumerate(flat):
         if i % columns == 0:
             axes.set_ylabel(y_label)
@@ -150,7 +150,7 @@ def enlarge_marks(figure: Figure) -> None:
 
 
 def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
-    """A logarithmic axis with plain numbers, at 1, 2 and 5 or of a long one at powers of ten.
+    """Make an axis logarithmic with plain numbers at 1, 2 and 5, or at powers of ten only if it is long.
 
     Args:
         axes: Panel; its limits may come later.
@@ -167,7 +167,7 @@ def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
 
 
 def show_plain_numbers(axes: Axes, which: str) -> None:
-    """Numbers as they are, without a power of ten beside the axis.
+    """Show tick numbers without a power of ten beside the axis.
 
     Args:
         axes: Panel.
@@ -182,7 +182,7 @@ def show_plain_numbers(axes: Axes, which: str) -> None:
 def draw_marks(
     axes: Axes, x: np.ndarray, y: np.ndarray, mark: tuple[str, str], label: str, fill: str | None = None
 ) -> None:
-    """As many marks as can be told apart, those beyond the axes or without a place on their edge.
+    """Draw as many markers as can be distinguished; those beyond the limits or not finite are drawn at the edge.
 
     Args:
         axes: Panel to draw on.
@@ -204,7 +204,7 @@ def draw_marks(
 
 
 def extremes(values: np.ndarray, most: int) -> np.ndarray:
-    """Places of the lowest and the highest value in each of so many stretches, in order; all if there are few."""
+    """Return indices of the lowest and highest value in each of `most` stretches, in order; all if there are few."""
     size = -(-len(values) // most)
     if size <= 2:
         return np.arange(len(values))

@@ -37,7 +37,7 @@ _ROOM = 1.2
 
 @dataclass(frozen=True)
 class Stripped:
-    """A figure of panels, row by row, each with its strip.
+    """A figure of panels, row by row, each with its strip of residuals.
 
     Args:
         figure: The page.
@@ -52,7 +52,7 @@ class Stripped:
     columns: int
 
     def label(self, x_label: str, y_label: str, unit: str) -> None:
-        """Names and units on the outer panels.
+        """Label the outer panels with names and units.
 
         Args:
             x_label: Of all panels and strips.
@@ -73,12 +73,12 @@ class Stripped:
             place_names(main, strip, far)
 
     def finish_strips(self) -> None:
-        """See `finish_strips`."""
+        """Finish all strips; see the function `finish_strips`."""
         finish_strips(self.strips)
 
 
 def finish_strips(strips: Sequence[Axes]) -> None:
-    """A zero line on every strip, and the same limits around it on all."""
+    """Draw a zero line on every strip, and give all the same limits around it."""
     off = finite([np.zeros(0), *(np.asarray(line.get_ydata(), dtype=float) for strip in strips for line in strip.get_lines())])
     limit = _ROOM * float(np.max(np.abs(off), initial=0.0))
     limit = limit if limit > NONE else 1.0
@@ -89,7 +89,7 @@ def finish_strips(strips: Sequence[Axes]) -> None:
 
 
 def name_strip(strip: Axes, unit: str) -> None:
-    """Name and unit of the residuals, in two lines."""
+    """Label a strip with the unit of its residuals, in two lines."""
     strip.set_ylabel(f"Residual\n({unit})", fontsize=SMALL, linespacing=1.0)
 
 
@@ -122,7 +122,7 @@ def panels_with_strips(
     least: float = LEAST_WIDTH,
     usual: float = MEDIUM,
 ) -> Stripped:
-    """A panel under its name with a strip below, in a grid without more columns than it needs.
+    """Return a figure with titled panels, each with a strip of residuals below it.
 
     Args:
         names: Of the panels; empty ones have no title.

@@ -90,7 +90,7 @@ def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments,
 
 @contextmanager
 def _boxes_without_words() -> Iterator[None]:
-    """Letters that the font lacks are boxes in a figure; matplotlib says so of each, in each format, in words of its own."""
+    """Silence matplotlib's warnings about letters that the font lacks, which are boxes in a figure."""
     log = logging.getLogger("matplotlib.mathtext")  # where letters behind a symbol are placed
     log.addFilter(_is_not_about_glyphs)
     try:
@@ -106,23 +106,23 @@ def _is_not_about_glyphs(message: logging.LogRecord) -> bool:
 
 
 def mapped_color(colors: str, position: float) -> Any:
-    """The color at a place from 0 to 1 of one of matplotlib's color maps."""
+    """Return the color at a position from 0 to 1 of one of matplotlib's color maps."""
     import matplotlib as mpl
 
     return mpl.colormaps[colors](position)
 
 
 def percent(fraction: float) -> str:
-    """'1 %'"""
+    """Return a fraction in percent, such as '1 %'."""
     return f"{100 * fraction:.3g} %"
 
 
 def axis_label(symbol: str, unit: str) -> str:
-    """Symbol and unit for an axis; no unit is written where there is none."""
+    """Return the label of an axis: symbol and unit, without a unit where there is none."""
     return symbol if unit in {"", "1"} else f"{symbol} ({IN_WORDS.get(unit, unit)})"
 
 
 def rounded_texts(values: Iterable[float], spread: float) -> list[str]:
-    """Numbers as text, to two significant digits of their spread."""
+    """Return numbers as text, to two significant digits of their spread."""
     decimals = 3 if not 0 < spread < math.inf else max(0, 1 - math.floor(math.log10(spread)))
     return [f"{value:z.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in values]

@@ -22,7 +22,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 
 def write_all(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Write a figure into a folder in every format; the files."""
+    """Write a figure into a folder in every format, and return the files."""
     return [write(figure, folder / f"{name}.{ending}") for ending in formats]
 
 
@@ -70,7 +70,7 @@ def _save_in_few_colors(png: BytesIO, target: Path | BinaryIO) -> None:
 
 
 def _show_as_written(figure: Figure) -> None:
-    """Texts that are no formulas in spite of their dollar signs are shown as they are."""
+    """Show texts literally that have dollar signs but are not formulas."""
     from matplotlib.mathtext import MathTextParser
     from matplotlib.text import Text
 

@@ -26,14 +26,14 @@ _REFINEMENTS = 32  # golden sections of a bracket of two grid steps: to 1e-7 of 
 
 
 def route_grid(model: Model, points: int = GRID_POINTS) -> np.ndarray:
-    """Equally spaced route values over the range of the curves."""
+    """Return equally spaced route values over the range of the curves."""
     route = model.description.route
     assert route is not None  # callers ask only where there is a route
     return np.linspace(*route.range, points)
 
 
 def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, Array]]:
-    """Function of z: the optimal route value and the efficiency there.
+    """Return a function of z that gives the optimal route value and the efficiency there.
 
     Grid search, then golden section between the neighbors of the best grid point; at a jump of a published geometry the
     grid point itself is kept where it is better.
@@ -70,7 +70,7 @@ def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Arra
 
 
 class Efficiencies(Display, list[Interval]):
-    """Efficiencies [1] at values of the route variable.
+    """Efficiencies [1] with intervals at values of the route variable: a list that displays itself as `predict` does.
 
     Args:
         found: One a length.
@@ -86,7 +86,7 @@ class Efficiencies(Display, list[Interval]):
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """As `predict` gives them."""
+        """Rows as `predict` gives them."""
         return [
             at
             | {"efficiency": interval.median}
@@ -104,7 +104,7 @@ class Efficiencies(Display, list[Interval]):
 
 @dataclass(frozen=True, repr=False)
 class RouteDraws(Display):
-    """Of every draw (rows).
+    """What every draw implies along the route; rows are draws.
 
     Args:
         grid: Route values of the curves.
@@ -120,11 +120,11 @@ class RouteDraws(Display):
     mounted: np.ndarray
 
     def sentences(self) -> list[str]:
-        """What there is."""
+        """Number of draws and grid points."""
         return [f"{', '.join(self.curves)} of {len(self.choices)} draws at {len(self.grid)} values of the route."]
 
     def _table(self) -> Rows:
-        """Medians and intervals on the grid."""
+        """Return medians and 90 % intervals on the grid."""
         quantiles = {name: np.quantile(draws, (0.5, 0.05, 0.95), axis=0) for name, draws in self.curves.items()}
         endings = ("", "_q05", "_q95")
         columns = {name + ending: q for name, levels in quantiles.items() for ending, q in zip(endings, levels, strict=True)}
@@ -132,7 +132,7 @@ class RouteDraws(Display):
 
 
 def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFunction:
-    """Curves and efficiencies of a cable with a route, of draws of z with the effect of a new mounting on the exponent.
+    """Compile the function from draws (z, and the effect of a new mounting on the exponent) to curves and forces.
 
     Args:
         model: The model.
@@ -157,7 +157,7 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFun
 
 
 def compute_along_route(model: Model, program: DrawFunction, z: np.ndarray, mounting: np.ndarray) -> RouteDraws:
-    """What draws imply along the route.
+    """Return what draws imply along the route.
 
     Args:
         model: The model.
@@ -178,7 +178,7 @@ def compute_along_route(model: Model, program: DrawFunction, z: np.ndarray, moun
 
 
 def draw_new_mounting(description: Description, values: dict[str, np.ndarray], n: int, seed: int) -> np.ndarray:
-    """Effect of one new mounting on the friction exponent [1], for every draw.
+    """Draw the effect of one new mounting on the friction exponent [1], for every draw.
 
     Args:
         description: How readings scatter.
@@ -193,7 +193,7 @@ def draw_new_mounting(description: Description, values: dict[str, np.ndarray], n
 def summarize_optimum(
     route: Route, lengths: np.ndarray, efficiencies: np.ndarray, along: RouteDraws, force: float | None
 ) -> OptimalLength:
-    """The design answer.
+    """Return the best length with its uncertainty.
 
     Args:
         route: What can be chosen.

@@ -33,7 +33,7 @@ def write_answers(folder: Path, answers: Mapping[str, Any], fit_page: str) -> No
 
 
 def add_answer(folder: Path, question: str, answer: Any) -> None:
-    """Add one answer to those that are kept, which are as they were written."""
+    """Add one answer to the kept ones, which stay as they are."""
     page = read_page(folder / ANSWERS)
     del page[CHECKSUM]
     _write(folder, page | {"answers": page["answers"] | {question: answer}})
@@ -44,7 +44,7 @@ def _write(folder: Path, page: Mapping[str, Any]) -> None:
 
 
 def read_answers(folder: Path, *beside: str) -> dict[str, Any]:
-    """What the fit in a folder has answered, by question; empty where nothing is kept of just this fit.
+    """Return the kept answers of the fit in a folder, by question; empty if none belong to this very fit.
 
     Args:
         folder: The results folder.
@@ -61,12 +61,12 @@ def read_answers(folder: Path, *beside: str) -> dict[str, Any]:
 
 
 def page_checksum(page: Mapping[str, Any]) -> int:
-    """Of what a page of JSON says, however it is spaced; the page carries it as its `CHECKSUM`, which is no part of it."""
+    """Return the CRC-32 of a page of JSON regardless of spacing; the page carries it as `CHECKSUM`, which is left out."""
     return crc32(json.dumps(page).encode())
 
 
 def file_checksum(path: Path) -> int | None:
-    """Of a file; None where there is none."""
+    """Return the CRC-32 of a file; None if there is no file."""
     if not path.exists():
         return None
     refuse_special(path, StoreError)
@@ -78,7 +78,7 @@ def file_checksum(path: Path) -> int | None:
 
 
 def installed_version(package: str) -> str:
-    """Which version of a package is installed; empty where that is not known."""
+    """Return the installed version of a package; empty if unknown."""
     try:
         return version(package)
     except PackageNotFoundError:

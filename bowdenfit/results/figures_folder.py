@@ -44,7 +44,7 @@ _DRAWN = "drawn"
 
 
 def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:
-    """Keep which figures there are, and what their files are.
+    """Record which figures have been drawn, with checksums of their files.
 
     Args:
         folder: The results folder, whose figures have all been drawn.
@@ -55,7 +55,7 @@ def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:
 
 
 def captions_if_unchanged(folder: Path, names: Collection[str], endings: Collection[str]) -> dict[str, str] | None:
-    """Captions of all figures of a fit, by name; None where those asked for do not all lie there as they would be drawn now.
+    """Return all captions by figure name; None unless every requested figure exists as it would be drawn now.
 
     Args:
         folder: The results folder.

@@ -1,4 +1,4 @@
-"""The results folder as files: their names, writing them whole, and not overwriting what is there.
+"""The results folder as files: their names, writing them atomically, and not overwriting what exists.
 
 `fit.json` is written last, so a folder that has it is complete. A folder with `chain.checkpoint` alone is an interrupted fit.
 """
@@ -31,7 +31,7 @@ _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DA
 
 @contextmanager
 def replace_atomically(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` to write to; it becomes `path` only if nothing went wrong.
+    """Yield a temporary name beside `path` to write to; it becomes `path` only if nothing went wrong.
 
     Raises:
         StoreError: A device, a pipe or a folder would be replaced by a file.
@@ -48,7 +48,7 @@ def replace_atomically(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
-    """A folder beside or inside `folder` to write into; what is in it moves there when all is written, else it is gone.
+    """Yield a temporary folder to write into; its contents move to `folder` when all is written, and are removed otherwise.
 
     Args:
         folder: What it will be called; what lies there already and is called otherwise stays.
@@ -119,7 +119,7 @@ def _is_partial(path: Path) -> bool:
 
 
 def _umask() -> int:
-    """What new files may not have; it can only be read by setting it."""
+    """Return the umask, which can only be read by setting it."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
@@ -127,7 +127,7 @@ def _umask() -> int:
 
 @contextmanager
 def folder_to_write(folder: Path) -> Iterator[Path]:
-    """A folder to write into, made if missing.
+    """Yield a folder to write into, made if missing.
 
     Args:
         folder: The folder.
@@ -144,7 +144,7 @@ def folder_to_write(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def file_to_write(path: Path) -> Iterator[Path]:
-    """A temporary name for a file in a folder that is made if missing; it becomes the file if nothing went wrong.
+    """Yield a temporary name for a file; it becomes the file, in a folder made if missing, if nothing went wrong.
 
     Args:
         path: The file.
@@ -196,7 +196,7 @@ def read_page(path: Path) -> Any:
 
 
 def refuse_unwritable(target: Path) -> None:
-    """Stop before anything is computed that could not be written.
+    """Refuse a target that cannot be written, before anything is computed.
 
     Args:
         target: File or folder; it and folders above it may be missing.
@@ -221,7 +221,7 @@ def refuse_unwritable(target: Path) -> None:
 
 
 def refuse_to_overwrite(folder: Path, force: bool) -> None:
-    """Stop before anything is computed if the results would have no place; notes (*.md) may lie there.
+    """Refuse a results folder that is in use, before anything is computed; notes (*.md) may lie there.
 
     Args:
         folder: The results folder.
@@ -248,7 +248,7 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
 
 @contextmanager
 def reserve_folder(folder: Path | None) -> Iterator[None]:
-    """A results folder that no other process writes into meanwhile; the reservation ends with this process at the latest.
+    """Lock a results folder, so that no other process writes into it; the lock ends with this process at the latest.
 
     Args:
         folder: The folder, made if missing; None for none, and nothing is reserved where a file lies in its place.
@@ -303,7 +303,7 @@ def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
 
 
 def read_checkpoint(folder: Path) -> dict[str, Any]:
-    """What the checkpoint in a folder was started for.
+    """Return the fingerprint of the fit for which the checkpoint in a folder was started.
 
     Raises:
         StoreError: There is no checkpoint, or it is damaged.
@@ -324,7 +324,7 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
 
 
 def refuse_invalid_seed(seed: Any) -> None:
-    """Refuse what no run was started with.
+    """Refuse an invalid seed.
 
     Raises:
         ValueError: It is no seed.

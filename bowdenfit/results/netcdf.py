@@ -54,7 +54,7 @@ def write_groups(
 def _write(
     group: Any, name: str, values: np.ndarray, labels: Sequence[str] | None, attributes: Mapping[str, str]
 ) -> None:
-    """A variable with its dimensions, as xarray would write it, which takes a third of a second to load."""
+    """Write a variable with its dimensions in xarray's layout, without loading xarray, which takes a third of a second."""
     of_readings = [] if labels is None else [f"{name.removeprefix(EXPECTED)}_reading"]
     draw_axes = values.ndim - len(of_readings)
     dimensions = [*("chain", "draw")[:draw_axes], *(f"{name}_dim_{i}" for i in range(draw_axes - 2)), *of_readings]
@@ -71,7 +71,7 @@ def _write(
 
 
 def _key(name: str) -> str:
-    """A name as the file can hold it: "/" would be a group of its own there, "." this one, and spaces at its end be lost."""
+    """Return a name encoded for HDF5, where "/" would be a group, "." this group, and trailing spaces be lost."""
     encoded = name.replace("%", "%25").replace("/", "%2F")
     return encoded.replace(".", "%2E") if not encoded.strip(".") else encoded
 
@@ -83,7 +83,7 @@ def _text() -> Any:
 
 
 def read_groups(path: Path) -> Groups:
-    """Arrays of posterior.nc by group and name, in the order in which they were written.
+    """Return the arrays of posterior.nc by group and name, in the order in which they were written.
 
     Read as the HDF5 that they are: the libraries that give them their labels take longer to load than the draws to read.
     """
@@ -100,7 +100,7 @@ def read_groups(path: Path) -> Groups:
 
 
 def own_member(group: "h5py.Group", name: str) -> Any:
-    """What lies in a group under a name: in this very file, and no larger than that, since nothing is packed in it.
+    """Return a member of a group that lies in this very file and is not larger than it.
 
     Args:
         group: Of an open file.
@@ -124,7 +124,7 @@ def own_member(group: "h5py.Group", name: str) -> Any:
 
 
 def _members(group: "h5py.Group") -> list[str]:
-    """Names in a group, in the order in which they came."""
+    """Return names in a group, in the order in which they were written."""
     import h5py
 
     names: list[bytes] = []

@@ -32,7 +32,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Window:
-    """Shortest stretch of route values that is within a fraction of the best efficiency with a probability.
+    """Range of route values within a fraction of the best efficiency with a required probability.
 
     Args:
         within: Allowed relative loss of efficiency.
@@ -50,13 +50,13 @@ class Window:
 
 
 def is_at_edge(lengths: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """Which optima lie at an end of the range, where the true optimum may be outside."""
+    """Return which optima lie at an end of the range, where the true optimum may be outside."""
     tolerance = EDGE_FRACTION * (limits[1] - limits[0])
     return (lengths <= limits[0] + tolerance) | (lengths >= limits[1] - tolerance)
 
 
 def rank_choices(lengths: np.ndarray, efficiency: np.ndarray) -> tuple[Choice, ...]:
-    """Probability of being best and expected regret of each length that can be bought.
+    """Return probability of being best and expected regret of each length that can be bought.
 
     Args:
         lengths: The choices.
@@ -72,7 +72,7 @@ def rank_choices(lengths: np.ndarray, efficiency: np.ndarray) -> tuple[Choice, .
 def find_best_window(
     grid: np.ndarray, efficiency: np.ndarray, best: np.ndarray, within: float = 0.01, probability: float = 0.95
 ) -> Window:
-    """The longest window whose every length is within a fraction of the draw's best efficiency with a probability.
+    """Return the window whose every length is within a fraction of the best efficiency with a probability.
 
     'Within 1 % of the best with 95 % probability' holds at each length of the window; it is the connected stretch
     around the length where that probability is highest.
@@ -101,7 +101,7 @@ _WORTH_SAYING = 0.02  # probability of an optimum at an end of the range; draws 
 
 @dataclass(frozen=True, repr=False)
 class OptimalLength(Display):
-    """The design answer.
+    """The best length with its uncertainty, the choices, and the window that is good enough.
 
     Args:
         variable: Name of the route variable.
@@ -144,7 +144,7 @@ class OptimalLength(Display):
 
     @property
     def action(self) -> str:
-        """What to do, or what is best, in one clause: the choice that costs least, or the best length where none is named."""
+        """What to do in one clause: take the choice of least regret, or the best length if no choices are named."""
         choice, length = self.best_choice, self.length
         value = f"{choice.length:g}" if choice else f"{length.median:z.{length.digits}f}"
         is_cut = self.variable == "cable_length"
@@ -169,7 +169,7 @@ class OptimalLength(Display):
         return f"{self.action[0].upper()}{self.action[1:]}."
 
     def sentences(self) -> list[str]:
-        """How sure it is, and what would do as well."""
+        """Sentences on how certain the length is, and which others would do."""
         at = "" if self.at_input_force is None else f", at an input force of {significant(self.at_input_force)} N"
         length, eta = self.length, self.efficiency.times(100)
         digits, of_force = length.digits, eta.digits
@@ -187,12 +187,12 @@ class OptimalLength(Display):
 
     @property
     def is_certain(self) -> bool:
-        """Whether some length is good enough for sure."""
+        """Whether some length is good enough with the required probability."""
         return bool(np.isfinite(self.window.start))
 
     @property
     def good_enough(self) -> str:
-        """Which lengths will do."""
+        """Sentence on which lengths are good enough."""
         window = self.window
         digits = decimals(window.stop - window.start, window.start)
         return (
@@ -202,7 +202,7 @@ class OptimalLength(Display):
 
     @property
     def not_good_enough(self) -> str:
-        """That none will do yet."""
+        """Sentence that no length is certain to be good enough."""
         window = self.window
         return (
             f"No single {self.what} is within {percent(window.within, 0)} of the best with "
@@ -214,12 +214,12 @@ class OptimalLength(Display):
 
     @property
     def heads(self) -> tuple[str, str, str]:
-        """Of the table of choices."""
+        """Headings of the table of choices."""
         return f"{self.what.capitalize()} ({self.unit})", "probability of being best", "expected loss of efficiency"
 
     @property
     def rows(self) -> list[tuple[str, str, str]]:
-        """A row for each choice, under `heads`."""
+        """Rows of the table of choices, under `heads`."""
         return [
             (f"{c.length:g}", percent(c.probability_best), f"{100 * c.expected_regret:.2f} points") for c in self.choices
         ]

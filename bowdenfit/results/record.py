@@ -74,16 +74,16 @@ class Draws(Display):
 
     @property
     def n_effective(self) -> float:
-        """Effective number of the draws, by the worst quantity."""
+        """Smallest effective sample size (bulk) of all quantities."""
         return min((d.ess_bulk for d in self.diagnostics.values()), default=float(self.z[..., 0].size))
 
     @property
     def flat_z(self) -> np.ndarray:
-        """All draws, one a row."""
+        """All draws, one in a row."""
         return self.z.reshape(-1, self.z.shape[-1])
 
     def sentences(self) -> list[str]:
-        """How many there are, and what they are worth."""
+        """Number of draws, and their effective sample size."""
         worst = max((d.r_hat for d in self.diagnostics.values()), default=float("nan"))
         return [
             f"{self.z[..., 0].size} draws of {few(self.values, 4)} by {self.sampler}; of the least certain of them they are "
@@ -91,13 +91,13 @@ class Draws(Display):
         ]
 
     def _table(self) -> Rows:
-        """A column a quantity, a row a draw."""
+        """Return a column for each quantity, and a row for each draw."""
         return {name: draws.ravel() for name, draws in (self.values | self.optimum).items()}, self.units
 
 
 @dataclass(frozen=True, repr=False)
 class Provenance(Display):
-    """How a fit came about.
+    """Seed, versions and times of a fit.
 
     Args:
         seed: Seed of everything random.
@@ -121,7 +121,7 @@ class Provenance(Display):
 
 @dataclass(frozen=True)
 class DrawPrograms:
-    """Functions of many z (rows) that were compiled for sampling, handed on so that no question compiles them again.
+    """Functions of many z (rows) compiled for sampling, kept so that no question compiles them again.
 
     Args:
         values: Named values in shown units.
@@ -136,7 +136,7 @@ class DrawPrograms:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Record(Display):
-    """What was found for one data set; every question is asked of this.
+    """A finished fit of one data set; every question is a function of it.
 
     Args:
         dataset: What was fitted.
@@ -167,7 +167,7 @@ class Record(Display):
         return self.dataset.description.name
 
     def parameter(self, name: str) -> Interval:
-        """A parameter's value and uncertainty, in the unit it is shown in.
+        """Return a parameter's value and interval, in the unit in which it is shown.
 
         Raises:
             UsageError: There is no such parameter, or no posterior.
@@ -188,12 +188,12 @@ class Record(Display):
         return compute_along_route(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
 
     def mounting(self) -> np.ndarray:
-        """Effect of one new mounting on the friction exponent of each draw [1]."""
+        """Return the effect of one new mounting on the friction exponent of each draw [1]."""
         draws = self.draws()
         return draw_new_mounting(self.dataset.description, draws.values, len(draws.flat_z), self.provenance.seed)
 
     def efficiency(self, lengths: float | Iterable[float] | None = None) -> Efficiencies:
-        """Efficiency at values of the route variable, with intervals.
+        """Return the efficiency at values of the route variable, with intervals.
 
         Args:
             lengths: Route values; the description's choices if omitted.
@@ -205,7 +205,7 @@ class Record(Display):
         return Efficiencies(map(Interval.of, self.efficiency_draws(at).T), self.dataset.description.route, at)
 
     def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
-        """Efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
+        """Return the efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
         with jax.enable_x64(True):
             return efficiency_at(self.model, self.draws().flat_z, self._lengths(lengths))
 
@@ -221,7 +221,7 @@ class Record(Display):
         return at
 
     def optimal_length(self) -> OptimalLength:
-        """The design answer: which length is best, how sure that is, and what the choices cost.
+        """Return the best length, how certain it is, and what the choices cost.
 
         Raises:
             UsageError: The description has no route to vary, or there is no posterior.
@@ -252,12 +252,12 @@ class Record(Display):
         return replace(self.sampled, units=self._units)
 
     def draws(self) -> Draws:
-        """The same."""
+        """Return the posterior; see `posterior`."""
         return self.posterior
 
     @property
     def _units(self) -> dict[str, str]:
-        """Of every parameter, derived quantity and answer along the route."""
+        """Unit of every parameter, derived quantity and answer along the route."""
         route, units = self.dataset.description.route, {p.name: p.unit for p in self.model.space.parameters}
         units |= {name: unit for name, (unit, _) in derived_units(self.model).items()}
         return units | ({OPTIMAL_LENGTH: route.unit, OPTIMAL_EFFICIENCY: "1"} if route else {})
@@ -272,7 +272,7 @@ class Record(Display):
 
 
 def cached_per_fit(question: Callable[[Record], Answer]) -> Callable[[Record], Answer]:
-    """Decorate a question so that it is worked out once for each record, and its answer kept as long as that record."""
+    """Decorate a function of a record so that it is computed once for each, and kept as long as the record."""
     answers: WeakKeyDictionary[Record, Answer] = WeakKeyDictionary()
 
     @wraps(question)
@@ -286,7 +286,7 @@ def cached_per_fit(question: Callable[[Record], Answer]) -> Callable[[Record], A
 
 @cached_per_fit
 def parameter_values(fit: Record) -> dict[str, np.ndarray]:
-    """Named values of all parameters [internal units] of every draw, or of least squares alone."""
+    """Return named values of all parameters [internal units] for every draw, or for least squares alone."""
     space = fit.model.space
     if fit.sampled is None:
         with jax.enable_x64(True):
@@ -300,11 +300,11 @@ def parameter_values(fit: Record) -> dict[str, np.ndarray]:
 
 
 def thinned_parameter_values(fit: Record, n: int) -> dict[str, np.ndarray]:
-    """The same of so many draws, evenly chosen, or as many times of least squares."""
+    """Return `parameter_values` for `n` evenly chosen draws, or `n` times for least squares."""
     return {name: draws[np.linspace(0, len(draws) - 1, n).astype(int)] for name, draws in parameter_values(fit).items()}
 
 
 @cached_per_fit
 def along_route_program(fit: Record) -> DrawFunction:
-    """See `compile_along_route`."""
+    """Return the compiled program of `compile_along_route`, from sampling if it is there."""
     return fit.programs.along_route if fit.programs and fit.programs.along_route else compile_along_route(fit.model)

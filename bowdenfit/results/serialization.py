@@ -15,7 +15,7 @@ from bowdenfit.results.folder import replace_atomically
 
 
 def plain_data(answer: Any) -> Any:
-    """An answer as programs read it: what is no finite number is None.
+    """Return an answer as plain data for JSON; numbers that are not finite become None.
 
     A dataclass gives its fields, or what its `JSON` lists: names of attributes and methods, where `...` stands for all fields,
     ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None. A field with
@@ -28,7 +28,7 @@ def plain_data(answer: Any) -> Any:
 
 
 def serialize(data: Any, put: Callable[[np.ndarray], Any] | None = None) -> Any:
-    """The same so that `rebuilt` gives it back: all fields of dataclasses, and infinity as a word.
+    """Return data so that `deserialize` restores them: all fields of dataclasses, and infinity as a word.
 
     Args:
         data: As for `plain`.
@@ -57,7 +57,7 @@ def _plain(data: Any, keep: bool, put: Callable[[np.ndarray], Any] | None = None
 
 
 def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
-    """Keys and values of a dataclass."""
+    """Yield keys and values of a dataclass."""
     for entry in listed:
         if entry is ...:
             yield from ((stored_key(f), getattr(data, f.name)) for f in fields(data))
@@ -70,7 +70,7 @@ def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
 
 
 def deserialize(kind: Any, value: Any) -> Any:
-    """A value of an annotated type from what `stored` made of it.
+    """Return a value of an annotated type from what `serialize` made of it.
 
     Args:
         kind: The type; of an optional one the first that is not None.
@@ -142,7 +142,7 @@ def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
-    """What was written under some names, as far as it was.
+    """Return what was written under some names, as far as it was.
 
     Args:
         path: The file.

@@ -158,7 +158,7 @@ def _measurements(page: Mapping[str, Any]) -> Measurements:
 
 
 def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], dict[str, dict[str, str]]]:
-    """Contents of posterior.nc as plain data: groups of variables, the readings' labels, attributes of file and variables."""
+    """Return the contents of posterior.nc: groups of variables, labels of readings, attributes of file and variables."""
     posterior, space = fit.posterior, fit.model.space
     of_trajectories = posterior.trajectories.statistics if posterior.trajectories else {}
     log_prior = -0.5 * np.sum(posterior.z**2 + np.log(2 * np.pi), axis=-1)
@@ -184,7 +184,7 @@ def posterior_page(fit: Record) -> tuple[Groups, Coordinates, dict[str, str], di
 
 
 def _walkers(posterior: Draws) -> dict[str, np.ndarray]:
-    """Of every draw, the walker of its ensemble that took it; nothing of ensembles of one."""
+    """Return the index of the walker of every draw; empty if ensembles have one walker."""
     rows, draws = posterior.z.shape[:2]
     if rows == posterior.n_ensembles:
         return {}
@@ -193,7 +193,7 @@ def _walkers(posterior: Draws) -> dict[str, np.ndarray]:
 
 
 def _as_walkers(groups: Groups) -> Groups:
-    """The other way round."""
+    """Return arrays with one row for each walker instead of one for each ensemble."""
     walker = groups["sample_stats"].pop(WALKER, np.zeros(1))
     n_walkers = int(np.max(walker)) + 1
     return {

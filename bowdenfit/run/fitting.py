@@ -140,12 +140,12 @@ def samplers_of(method: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Programs:
-    """What was compiled for sampling and what follows it.
+    """Compiled programs for sampling and what follows it.
 
     Args:
         samplers: What each sampler runs, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
-        of_draws: What the draws will be asked.
+        of_draws: Programs that questions will need.
     """
 
     samplers: dict[str, Any]
@@ -153,7 +153,7 @@ class Programs:
     draw_programs: DrawPrograms
 
     def quantities(self, z: np.ndarray) -> Mapping[str, np.ndarray]:
-        """What must converge besides the parameters, by name, of many z."""
+        """Return quantities that must converge besides the parameters, by name, for many z."""
         if self.optimum is None:
             return {}
         return dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), self.optimum(z), strict=True))
@@ -197,7 +197,7 @@ def _sampler_draws(model: Model, chain: Chain) -> SamplerDraws:
 
 
 def _posterior(model: Model, chain: Chain, implied: Callable[[np.ndarray], Any], seed: int) -> Draws:
-    """The chain with what its draws imply, and draws from the prior."""
+    """Return the draws of a chain with what they imply, and draws from the prior."""
     z, space, (walkers, draws, size) = chain.z, model.space, chain.z.shape
     n, of_chain = walkers * draws, vars(chain) | {"optimum": chain.quantities}
     prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, size))

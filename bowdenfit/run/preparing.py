@@ -14,7 +14,7 @@ from bowdenfit.results.folder import CHAIN, read_checkpoint, refuse_to_overwrite
 
 
 def choose_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
-    """The same data set, to be sampled by another method than its description says; the description's if None.
+    """Return the data set with another sampler than its description names; unchanged if `method` is None.
 
     Raises:
         UsageError: Nothing is sampled, or the sampler cannot reach what is asked of it.
@@ -43,18 +43,18 @@ def _with_method(data: Dataset, method: str | None) -> Dataset:
 
 
 def _fingerprint(data: Dataset, seed: int) -> dict[str, Any]:
-    """What must not change between an interrupted fit and its continuation; how long to sample may."""
+    """Return what must not change between an interrupted fit and its continuation; how long to sample may."""
     return {"description": _for_good(data.description.to_json()), "sha256": data.sha256, "seed": seed}
 
 
 def _for_good(description: dict[str, Any]) -> dict[str, Any]:
-    """A description without what may change."""
+    """Return a description without what may change."""
     free = {"max_steps", "target_r_hat", "target_ess"}
     return description | {"sampler": {k: v for k, v in description["sampler"].items() if k not in free}}
 
 
 def _with_defaults(description: dict[str, Any]) -> dict[str, Any]:
-    """A checkpoint's description as it reads today: settings that have come since stand at their defaults."""
+    """Return a checkpoint's description with newer settings at their defaults."""
     try:
         return _for_good(parse_description(description).to_json())
     except DescriptionError:
@@ -62,7 +62,7 @@ def _with_defaults(description: dict[str, Any]) -> dict[str, Any]:
 
 
 def choose_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None, resume: bool, force: bool) -> int:
-    """The seed, once it is clear that the results have a place, or that the checkpoint there belongs to this fit."""
+    """Return the seed, after checking that the folder may be written or that its checkpoint belongs to this fit."""
     if resume and (folder is None or not mcmc):
         raise UsageError("--resume needs the results folder of a fit with MCMC; name it with --output.")
     if folder is None or not resume:
@@ -82,7 +82,7 @@ def choose_seed(folder: Path | None, data: Dataset, mcmc: bool, seed: int | None
 
 
 def start_checkpointing(folder: Path | None, data: Dataset, seed: int, resume: bool) -> Path | None:
-    """The checkpoint to sample into, in a folder cleared of what was there; nothing is touched before this."""
+    """Return the checkpoint to sample into, in a folder cleared of an earlier fit; nothing is touched before this."""
     if folder is None:
         return None
     if not resume:

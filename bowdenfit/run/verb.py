@@ -91,7 +91,7 @@ def _reply(fit: "Fit", request: dict[str, Any]) -> Reply:
 
 
 def _show(bar: Any, progress: "Progress") -> None:
-    """Steps, how much wider all starts spread than one (R-hat), and the effective sample size."""
+    """Show steps, R-hat (how much all chains spread beyond one), and the effective sample size."""
     bar.n = progress.steps
     bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
     if progress.r_hat is not None and progress.ess is not None:

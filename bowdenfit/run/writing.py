@@ -73,14 +73,13 @@ def _figure_data(fit: Fit, failed: dict[str, Exception]) -> dict[str, Any]:
 
 
 def _write_captions(folder: Path, captions: dict[str, str], is_complete: bool) -> None:
-
     write_captions(captions, folder / FIGURES)
     if is_complete:
         record_drawn_figures(folder, captions)
 
 
 def _what_is_missing(folder: Path, failed: dict[str, Exception]) -> tuple[str, ...]:
-    """That some figures, texts or the report are missing, in a sentence each.
+    """Return a sentence for each group of figures, texts or report that is missing.
 
     Raises:
         DiskError: The same, where it is for want of room.

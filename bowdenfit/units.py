@@ -170,6 +170,20 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     return float(_registry().Quantity(1.0, _parsed(unit)).to(target).magnitude)
 
 
+def contradiction(stated: str | None, written: str | None) -> str:
+    """Return in words that a stated unit is another than the one written over the numbers; empty where they agree."""
+    stated = (stated or "").strip().lstrip("-\u2212")
+    if not stated or not written or not (is_unit(stated) and is_unit(written)):
+        return ""
+    same_kind = _same_kind(_parsed(stated), _parsed(written))
+    if same_kind and math.isclose(float(_registry().Quantity(1.0, _parsed(stated)).to(_parsed(written)).magnitude), 1.0):
+        return ""
+    return (
+        f"its heading says {written} and the option, or cable.toml, says {stated}; correct the one that is wrong, or leave the "
+        "unit out of the option"
+    )
+
+
 def route_conversion_factor(unit: str, to: str) -> float:
     """Factor between two units of the route variable, whatever it measures.
 

@@ -14,7 +14,14 @@ from bowdenfit.files.matching import Candidate, candidates, meanings, plain_name
 from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.naming import naming
 from bowdenfit.files.spellings import spelled
-from bowdenfit.units import LARGEST, ColumnSource, conversion_factor, route_conversion_factor, speed_dimension
+from bowdenfit.units import (
+    LARGEST,
+    ColumnSource,
+    contradiction,
+    conversion_factor,
+    route_conversion_factor,
+    speed_dimension,
+)
 from bowdenfit.words import listed, quoted, shown
 
 Value = TypeVar("Value")
@@ -86,6 +93,7 @@ def find_columns(
     taken = {source.name for source in sources.values()}
     headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
     _check_single_meaning(table, headings, wanted, sources)
+    _check_known_units(table, headings, wanted, sources)
     can_be = candidates(headings, wanted, tuple(sources))
     for quantity in wanted:
         columns = can_be[quantity.name]
@@ -125,6 +133,24 @@ def _check_single_meaning(
                     f"which: {naming(names[0], heading)}, or in cable.toml "
                     f'columns = {{ {names[0]} = {{ name = "{heading}", unit = ... }} }}.'
                 )
+
+
+def _check_known_units(
+    table: RawTable, headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], sources: Mapping[str, ColumnSource]
+) -> None:
+    """Refuse a heading that names a quantity and then says what is not understood: the column would be passed over."""
+    names = {plain_name(quantity.name): quantity for quantity in wanted if quantity.dimension != "text"}
+    for heading, _ in headings:
+        name, bracket, behind = heading.partition("[" if "[" in heading else "(")
+        quantity = names.get(plain_name(name))
+        if not bracket or quantity is None or quantity.name in sources or meanings(heading, wanted):
+            continue
+        with table.faults.collect():
+            raise DatasetError(
+                f"{table.file}, row {table.header_row}, column {shown(heading)}: this is {quantity.name}, but what follows "
+                f"that, {shown(bracket + behind)}, is no unit alone; state the unit that its numbers are in, "
+                f"{naming(quantity.name, heading, 'UNIT')}, or rename the column if it is something else."
+            )
 
 
 def _several(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
@@ -241,4 +267,7 @@ def _check_source(
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
-    return _column(table, source.name, quantity, source.unit or written or split_brackets(source.name)[1] or None)
+    written = written or split_brackets(source.name)[1] or None
+    if why := contradiction(source.unit, written):
+        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(source.name)}: {why}.")
+    return _column(table, source.name, quantity, source.unit or written)

@@ -117,12 +117,19 @@ def _is_over(above: CsvRecord, names: Sequence[str]) -> bool:
 
 
 def _joined(above: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Headings with the group before them that stands over the first of its columns, as merged cells are exported."""
+    """Headings with the group before them that stands over the first of its columns, as merged cells are exported.
+
+    A column that has a heading in the upper row alone, such as the time beside groups of runs, keeps that.
+    """
     groups, group = [], ""
     for i, _ in enumerate(names):
         group = (above[i].strip() if i < len(above) else "") or group
         groups.append(group)
-    return [" ".join(f"{group} {name}".split()) if name else "" for group, name in zip(groups, names, strict=True)]
+    own = [" ".join(above[i].split()) if i < len(above) else "" for i, _ in enumerate(names)]
+    return [
+        " ".join(f"{group} {name}".split()) if name else alone
+        for group, name, alone in zip(groups, names, own, strict=True)
+    ]
 
 
 def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, file: str) -> None:

@@ -13,6 +13,10 @@ from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
 from bowdenfit.words import quoted, shown
 
+_FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
+_SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
+_DATES = 1e8  # numbers from here on are dates, of which the unit is plain
+
 
 def to_recording(
     file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys, *, is_loop: bool
@@ -129,6 +133,7 @@ def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: Co
     if hertz is not None:
         return np.arange(len(channel.values)) / hertz
     if source is None and channel.time is not None:
+        _refuse_clock_without_unit(file, channel)
         return channel.time
     if time is not None:
         return converted(file, time, "time", source, "time")
@@ -165,3 +170,22 @@ def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource |
     _, unit = stated_unit(file, channel, "velocity", source)
     kind = speed_dimension(unit)
     return converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
+
+
+def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
+    """Refuse a clock that says no unit and is unlikely to be in seconds, because its samples would be seconds apart.
+
+    Raises:
+        DatasetError: It is such a clock.
+    """
+    clock = next((c for c in file.channels if c.name == channel.clock), None)
+    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
+        return
+    step = float(np.nanmedian(np.diff(channel.time)))
+    if step >= _SLOWEST and np.nanmax(np.abs(clock.values)) < _DATES:
+        length = float(np.nanmax(channel.time) - np.nanmin(channel.time))
+        raise DatasetError(
+            f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
+            f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s. Say which it is: "
+            f"--channel time={clock.name}:ms, or --channel time={clock.name}:s."
+        )

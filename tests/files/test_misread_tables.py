@@ -139,3 +139,51 @@ def test_a_held_reading_in_the_first_row_can_be_checked(tmp_path, run):
     code, out, err = run("check", tmp_path / "t.csv")
     assert code == 0, err
     assert "stroke hold" in out
+
+
+@pytest.mark.parametrize("named", ["Input force (kN):N", "Input force (kN):lbf"])
+def test_a_unit_that_contradicts_its_heading_is_refused(tmp_path, run, named):
+    (tmp_path / "t.csv").write_text("Input force (kN),Output force (kN)\n1,0.682\n2,1.367\n3,2.064\n")
+    code, _, err = run("check", tmp_path / "t.csv", "--column", f"input_force={named}", "--wrap-angle", "180deg")
+    assert code == 2 and "its heading says kN" in err
+    assert run("check", tmp_path / "t.csv", "--column", "input_force=Input force (kN):kN", "--wrap-angle", "180deg")[0] == 0
+
+
+def recording(tmp_path, step, heading, missing=0):
+    """A file of three strokes with one sample each `step` in the column of time."""
+    import numpy as np
+
+    force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, 600))
+    output = np.where(np.gradient(force) > 0, 0.7, 1.4) * force
+    output[: 20 * missing : 20] = -9999
+    rows = [f"{step * i:g},{force[i]:.3f},{output[i]:.3f}" for i in range(600)]
+    (tmp_path / "log.csv").write_text("\n".join([f"{heading},input_force_N,output_force_N", *rows]) + "\n")
+    return tmp_path / "log.csv"
+
+
+def test_a_clock_in_milliseconds_without_a_unit_is_asked_about(tmp_path, run):
+    path = recording(tmp_path, 20, "time")
+    code, out, _ = run("check", path)
+    assert code == 2 and "the clock 'time' does not say its unit" in " ".join(out.split())
+    assert run("check", path, "--channel", "time=time:ms")[0] == 0
+    assert run("check", recording(tmp_path, 0.02, "time"))[0] == 0
+
+
+def test_a_code_for_missing_samples_is_named(tmp_path, run):
+    code, out, _ = run("check", recording(tmp_path, 0.02, "time_s", missing=12))
+    assert code == 2 and "12 samples of output_force are exactly -9999 N" in " ".join(out.split())
+
+
+def test_a_time_under_the_upper_of_two_rows_of_headings_is_kept(tmp_path, run):
+    text = recording(tmp_path, 0.02, "time_s").read_text().splitlines()[1:]
+    rows = [f"{line},{line.split(',', 1)[1]}" for line in text]
+    head = ["Time (s),Run 1,,Run 2,", ",F_in (N),F_out (N),F_in (N),F_out (N)"]
+    (tmp_path / "two.csv").write_text("\n".join([*head, *rows]) + "\n")
+    _, out, _ = run("check", tmp_path / "two.csv")
+    assert "a recording of 12 s" in " ".join(out.split())
+
+
+def test_a_known_quantity_in_an_unknown_unit_is_named(tmp_path):
+    (tmp_path / "t.csv").write_text("wrap_angle_deg,wrap_angle [bit] (mean),input_force_N,output_force_N\n90,3,10,8\n")
+    with pytest.raises(bf.DatasetError, match="is no unit alone; state the unit that its numbers are in"):
+        bf.read(tmp_path / "t.csv")

@@ -191,7 +191,7 @@ def _cause(found: Gained) -> str:
     wrong = [stroke for stroke in strokes if found.share(stroke) > _MOSTLY]
     units = _units(found, wrong[0]) if wrong else ""
     if units and (len(strokes) == 1 or wrong != strokes):
-        return f"the unit in one heading, {units} mistaken; correct it, or map the column in cable.toml"
+        return f"the unit in one heading, {units} mistaken; correct the heading"
     if found.mixed:
         return "rows in which the rope slides back and that are not marked so; add a column stroke with pull and return"
     if wrong == strokes:

@@ -8,6 +8,7 @@ from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.types import Vector
 
+_MISSING_CODE = 10.0  # times all other forces: -9999 and the like; no load cell overshoots so far twice to the same digit
 FEWEST_SAMPLES = 20
 LARGEST_FORCE = 1e6
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what is still a recording
@@ -55,6 +56,7 @@ def check_sign(file: str, name: str, force: Vector) -> None:
         DatasetError: More than half of the readings above a fifth of the largest are negative.
     """
     low, high = _range(force)
+    _refuse_missing_code(file, name, force, low, high)
     largest, loaded, below = max(abs(low), abs(high)), 0, 0
     for part in parts(len(force)):
         some = numbers(force, part)
@@ -66,6 +68,28 @@ def check_sign(file: str, name: str, force: Vector) -> None:
             f"{file}: {100 * negative:.0f} % of the readings of {name} under load are negative, down to "
             f"{low:.4g} N, but a rope can only pull; the usual cause is the sign convention of the load cell. "
             f"Turn the sign by mapping the channel with a minus before its unit, such as --channel {name}=NAME:-N."
+        )
+
+
+def _refuse_missing_code(file: str, name: str, force: Vector, low: float, high: float) -> None:
+    """Refuse a value that stands for a missing sample: it is repeated exactly, and ten times beyond all others.
+
+    Raises:
+        DatasetError: There is such a value.
+    """
+    extreme = low if abs(low) > abs(high) else high
+    count, others = 0, 0.0
+    for part in parts(len(force)):
+        some = numbers(force, part)
+        is_extreme = some == extreme
+        count += int(np.count_nonzero(is_extreme))
+        left = np.abs(some[np.isfinite(some) & ~is_extreme])
+        others = max(others, float(left.max(initial=0.0)))
+    if count > 1 and others > 0 and abs(extreme) > _MISSING_CODE * others:
+        raise DatasetError(
+            f"{file}: {count} samples of {name} are exactly {extreme:.6g} N, and all others are below {others:.4g} N; the "
+            "usual cause is a code that a logger writes where a sample is missing. Leave those cells blank, or replace the "
+            "code by NaN."
         )
 
 

@@ -100,6 +100,11 @@ def deserialize(kind: Any, value: Any) -> Any:
     return _number(value) if kind is float else value
 
 
+def values_by_key(data: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass under their stored keys."""
+    return dict(_attributes(data, (...,)))
+
+
 def stored_key(field: Field[Any]) -> str:
     """Return the key under which a field is stored: its name, or the "key" of its metadata."""
     return str(field.metadata.get("key", field.name))

@@ -166,7 +166,7 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
         if name == "emcee":
             programs[name] = compile_walkers(density, settings, beside=beside)
         else:
-            programs[name] = import_module(_MODULES[name]).make_program(density, settings)
+            programs[name] = import_module(_MODULES[name]).compile_nuts(density, settings)
     optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
     implied = replicator(density, seed, beside)
     along_route = compile_along_route(model, beside) if model.description.route is not None else None

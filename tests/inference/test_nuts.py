@@ -118,7 +118,7 @@ def test_nuts_reproduces_a_funnel_down_to_its_narrow_end(funnel):
 def test_fine_steps_get_through_where_the_others_break_off(funnel):
     trajectories = funnel.trajectories
     assert trajectories.fine_diverged <= trajectories.fine / 1000
-    assert trajectories.fine == trajectories.drawn // nuts.FINE_EVERY
+    assert trajectories.fine == trajectories.total // nuts.FINE_EVERY
     assert describe_trajectory_shortfalls(trajectories) == ()
 
 

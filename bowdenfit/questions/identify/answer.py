@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from bowdenfit.display import Display, Named, Rows
 from bowdenfit.inference.identifiability import Combination, CovarianceAnalysis, ParameterContraction
+from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals, listed, significant
 
 if TYPE_CHECKING:
@@ -60,7 +61,11 @@ class Identifiability(Display):
         return said
 
     def _table(self) -> Rows:
-        rows = [{"parameter": p.name, "group": name} | vars(p) for name, group in self.groups.items() for p in group.parameters]
+        rows = [
+            {"parameter": p.name, "group": name} | values_by_key(p)
+            for name, group in self.groups.items()
+            for p in group.parameters
+        ]
         return [{key: value for key, value in row.items() if key != "name"} for row in rows], self.units
 
     @property

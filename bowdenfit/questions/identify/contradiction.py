@@ -1,11 +1,11 @@
 """Which tables of a fit contradict the others, in words."""
 
-from dataclasses import asdict
 from typing import Any
 
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import readings_called
 from bowdenfit.results.record import Record
+from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals
 
 _AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the odd one out
@@ -14,7 +14,7 @@ _AS_MUCH = 0.8  # of the largest conflict: beyond that either table may be the o
 def agreement_page(fit: Record) -> list[dict[str, Any]]:
     """How well each table agrees with everything else, the odd one out first."""
     found = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
-    return [asdict(d) | {"unit": _unit(fit, d)} for d in found]
+    return [values_by_key(d) | {"unit": _unit(fit, d)} for d in found]
 
 
 def contradiction(fit: Record) -> str:

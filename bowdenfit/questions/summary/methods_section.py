@@ -10,6 +10,7 @@ from bowdenfit.questions.summary.sampler_words import sampler_text
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.questions.summary.words import counts_in_words
 from bowdenfit.results.record import Draws, Record
+from bowdenfit.results.serialization import values_by_key
 
 REFERENCES = {
     "capstan": "L. Euler, Remarques sur l'effet du frottement dans l'équilibre, Mémoires de l'académie des sciences de Berlin "
@@ -98,7 +99,7 @@ def _refitted(fit: Record) -> str:
 
 
 def _sampler(drawn: Draws) -> str:
-    trajectories = drawn.trajectories.__dict__ if drawn.trajectories else {}
+    trajectories = values_by_key(drawn.trajectories) if drawn.trajectories else {}
     page = {"method": drawn.sampler, "ensembles": drawn.n_ensembles, "walkers": len(drawn.z) // drawn.n_ensembles}
     page |= {"steps": drawn.steps} | {key: value for key, value in trajectories.items() if key != "statistics"}
     words = sampler_text(page)

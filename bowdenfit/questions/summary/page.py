@@ -24,7 +24,7 @@ from bowdenfit.questions.recorded.stick_slip import stick_slip
 from bowdenfit.questions.summary.verdict import verdict
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Draws, Record
-from bowdenfit.results.serialization import plain_data
+from bowdenfit.results.serialization import plain_data, values_by_key
 
 SCHEMA = 1
 
@@ -119,7 +119,7 @@ def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
         "recommendation": recommend_sampler(posterior.sampler, fit.model.space.size, bool(short)),
     }
     if posterior.trajectories is not None:
-        page |= {k: v for k, v in posterior.trajectories.__dict__.items() if k != "statistics"}
+        page |= {k: v for k, v in values_by_key(posterior.trajectories).items() if k != "statistics"}
     return page
 
 

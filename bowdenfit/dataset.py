@@ -16,11 +16,10 @@ from bowdenfit.files import is_ros2_folder
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, each_table
-from bowdenfit.kinds.fit_commands import WRAP_ANGLE, has_own_angles, only_kind
-from bowdenfit.kinds.kind import Source
-from bowdenfit.kinds.measured_groups import measured_groups
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.settings import load_description, parse_description, with_columns
+from bowdenfit.kinds.descriptions import load_description, measured_groups, parse_description, with_columns
+from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, only_kind
+from bowdenfit.kinds.table_files import Source
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import printable
 

@@ -22,12 +22,10 @@ from bowdenfit.description import (
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, suggest_name
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.measured_cable import measured_cable
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.places import Places, places_of
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Term
-from bowdenfit.kinds.terms import measured_kinds, parameters_asked_for
+from bowdenfit.kinds.terms import measured_cable, measured_kinds, parameters_asked_for
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.parameters.symbols import make_symbol

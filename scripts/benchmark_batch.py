@@ -35,8 +35,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.fleet.fitting import SETTINGS

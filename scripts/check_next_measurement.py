@@ -38,13 +38,11 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.simulated_readings import simulated_readings
 from bowdenfit.questions.next.variance_reduction import explained_share

@@ -30,8 +30,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.questions.calibrate.findings import findings
 from bowdenfit.questions.calibrate.quantities import quantities_of
 from bowdenfit.questions.calibrate.refit import RANKS, Laboratory

@@ -39,7 +39,7 @@ class Table(TableSettings):
 
 
 class Tables(Frozen):
-    """The tables of a data set by their kinds, which `bowdenfit.kinds.settings` adds as fields."""
+    """The tables of a data set by their kinds, which `bowdenfit.kinds.descriptions` adds as fields."""
 
     @model_validator(mode="after")
     def _some(self) -> "Tables":

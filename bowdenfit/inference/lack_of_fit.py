@@ -24,7 +24,7 @@ from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, group_residuals
 from bowdenfit.inference.scalar_priors import clipped_z
-from bowdenfit.kinds.inside_runs import ORDER, SPEED, STROKE, ZERO
+from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model
 

@@ -24,7 +24,7 @@ import optimistix as optx
 from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.padding import rounded_up
+from bowdenfit.kinds.term import rounded_up
 
 _SINGULAR = 1e-13  # relative size of scaled singular values below which a direction takes no step
 _UNCOMPUTABLE = 1e100  # replaces a residual that cannot be computed, so that no step goes there

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.kinds.inside_runs import ORDER, STROKE, InsideRuns
 from bowdenfit.kinds.places import RUN, Places
+from bowdenfit.kinds.sliding_rows import ORDER, STROKE, InsideRuns
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model
 

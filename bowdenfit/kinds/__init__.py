@@ -1,4 +1,20 @@
-"""One folder for each kind of measurement: its tables (NumPy) and its terms in the likelihood (JAX); KINDS lists them all."""
+"""Kinds of measurement: a folder each, what they share, and what all tables of a data set say together.
+
+Imports go downward only (a contract of import-linter in pyproject.toml holds that):
+
+    fit_command  places  run_parts                       commands that fit a lone file; where readings were taken; parts of runs
+    file_kind  terms                                     what a lone file holds; TERMS, the kinds in the likelihood (JAX)
+    descriptions                                         cable.toml and plans, with a field for every kind
+    this module                                          KINDS: the kinds that read and describe tables (NumPy)
+    forces                                               also plans runs, as those of tables and of recordings
+    angles  displacement  efficiencies  loop  preload  recordings  ringdown  stretch     know nothing of each other
+    runs  shared_parameters                              what likelihoods of several kinds share
+    sliding_rows
+    kind  term                                           the interfaces: Kind and TermKind
+    candidate  table_files  plausibility  row_angles     parts of the interfaces; CandidateKind
+    tables                                               tables that several kinds look at
+    rows                                                 rows of tables, read and written
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -9,11 +25,11 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyKind
 from bowdenfit.kinds.forces.kind import ForceKind
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.loop.kind import LoopKind
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.kind import PreloadKind
 from bowdenfit.kinds.recordings.kind import RecordingKind
 from bowdenfit.kinds.ringdown.kind import RingDownKind
 from bowdenfit.kinds.stretch.kind import StretchKind
+from bowdenfit.kinds.tables import Measurements
 
 _ALL: tuple[Kind[Any], ...] = (
     AngleKind(),

@@ -9,9 +9,8 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.kinds.tables import AngleTable, Measurements
 
 UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
 GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates

@@ -22,107 +22,24 @@ its tables where several modules import it, its reader, and whatever else has a 
 import JAX, because reading a table must not wait for it.
 """
 
-import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+from typing_extensions import override
 
-from bowdenfit.description import Description, Table, TableSettings
+from bowdenfit.description import Contact, Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
-from bowdenfit.errors import DatasetError
-from bowdenfit.files.row_account import RowAccount
-from bowdenfit.inputs import matching
-from bowdenfit.kinds.coarse import Coarse
-from bowdenfit.kinds.init_questions import InitQuestions
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page
-from bowdenfit.kinds.rows import ForceRows
+from bowdenfit.errors import DatasetError, Faults
+from bowdenfit.kinds.plausibility import Coarse
+from bowdenfit.kinds.rows import ForceRows, Page, Rows
+from bowdenfit.kinds.table_files import AnyTable, InitQuestions, Source, TableFromFiles
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.types import Vector
-from bowdenfit.units import ColumnSource
 
-AnyTable = TypeVar("AnyTable")
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a table is to be read from, and what is said of it.
-
-    Args:
-        kind: Name of its kind.
-        settings: What stands under that name in [tables].
-        description: The whole description.
-        folder: Where the files are.
-        channels: Channels named on the command line.
-    """
-
-    kind: str
-    settings: Any
-    description: Description
-    folder: Path
-    channels: Mapping[str, ColumnSource] = field(default_factory=dict)
-
-    @property
-    def files(self) -> list[Path]:
-        """Its files; patterns are expanded in sorted order.
-
-        Raises:
-            DatasetError: A pattern matches none.
-        """
-        stated = (getattr(self.settings, "file", None), self.settings.files)
-        named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
-        paths: list[Path] = []
-        for name in named:
-            is_pattern = any(c in name for c in "*?[") and not os.path.isfile(self.folder / name)  # noqa: PTH113  (any name)
-            matches = matching(self.folder, name) if is_pattern else [self.folder / name]
-            if not matches:
-                raise DatasetError(
-                    f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."
-                )
-            paths += matches
-        return paths
-
-    @property
-    def file(self) -> Path:
-        """Its only file.
-
-        Raises:
-            DatasetError: It has several.
-        """
-        paths = self.files
-        if len(paths) != 1:
-            raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
-        return paths[0]
-
-    @property
-    def columns(self) -> dict[str, ColumnSource]:
-        """Columns that do not carry the usual names."""
-        return self.settings.columns
-
-    def name_of(self, path: Path) -> str:
-        """A file as seen from the folder."""
-        return path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name
-
-
-@dataclass(frozen=True)
-class TableFromFiles(Generic[AnyTable]):
-    """A table and where it came from.
-
-    Args:
-        table: The table.
-        files: The files it was read from, by name.
-        remarks: What had to be assumed, in sentences.
-        accounts: How many rows of each file were read, and why the others were not.
-    """
-
-    table: AnyTable
-    files: Mapping[str, Path]
-    remarks: tuple[str, ...] = ()
-    accounts: tuple[RowAccount, ...] = ()
+AnyRows = TypeVar("AnyRows", bound=Rows)
 
 
 @dataclass(frozen=True)
@@ -326,3 +243,59 @@ class PlannedKind(Kind[AnyTable]):
     def design_contradiction(self, design: Any, description: Description) -> str:
         """Return what of a design this cable cannot have, in a sentence; empty if it can have all."""
         return ""
+
+
+class FrictionTableKind(FrictionKind[AnyRows]):
+    """A kind of table that has `route`, `own` wrap angles and `origin` row by row."""
+
+    @override
+    def conditions(self, table: AnyRows) -> AnyRows:
+        return table
+
+    @override
+    def check(self, table: AnyRows, description: Description, measurements: Measurements) -> None:
+        """Refuse a row that cannot be given a wrap angle in every contact.
+
+        Raises:
+            DatasetError: Says which rows, and what to do.
+        """
+        faults, angles = Faults(), measurements.table(AngleTable)
+        for contact in description.contact:
+            with faults.collect():
+                if contact.wrap_angle.constant is None:
+                    _check_contact(description, angles, contact, table)
+        faults.refuse()
+
+
+def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
+    column = contact.wrap_angle.column or ""
+    own, _ = table.own.column(column)
+    if not contact.wrap_angle.curve:
+        missing = np.flatnonzero(np.isnan(own))
+        if len(missing) == len(own):
+            raise DatasetError(
+                f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
+                f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
+            )
+        why = (
+            f"the cell is blank, but the contact {contact.name!r} has no curve that could stand in for it; fill in the "
+        )
+        Faults([_in_row(table, i, column, why + "measured angle.") for i in map(int, missing)]).refuse()
+        return
+    route = description.route
+    assert route is not None and angles is not None  # the description guarantees both
+    outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
+    why = (
+        f"lies outside the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
+        f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, or write them "
+        "into this row."
+    )
+    rows = [int(i) for i in np.flatnonzero(outside) if not np.any(angles.route == table.route[i])]
+    Faults([_in_row(table, i, route.variable, why, f"{table.route[i]:g} {route.unit} ") for i in rows]).refuse()
+
+
+def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
+    """Return what is wrong with a column in a row of a table, behind the value that stands there."""
+    error = DatasetError(f"{table.origin.place(i)}, column {column!r}: {value}{what}")
+    error.fault_key, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
+    return error

@@ -9,8 +9,8 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.display import Part
 from bowdenfit.kinds import kind_of
-from bowdenfit.kinds.inside_runs import STROKE as STROKE
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.sliding_rows import STROKE as STROKE
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.term import WRAP_ANGLE, Term
 from bowdenfit.kinds.terms import term_kind
 

@@ -1,12 +1,44 @@
-"""How far simulated readings may be from what a bench hands in; the limits are wide, and the same for every kind."""
+"""Signs that readings are not what a bench hands in: copied rows, displays too coarse to show noise, impossible values.
+
+Copies count as measurements, and a copied run as another mounting, so that every interval is too narrow and nothing else shows
+it. Two readings often agree to the last digit where a display is coarse, so copies are reported only where *all* rows of a run
+are those of another, or all rows appear equally often, and where noise larger than the last digit would hardly ever do that.
+
+Someone who reads 14 N six times off a display of whole newtons knows the force to half a newton, and no better for the
+repetition: a scatter estimated from differences between such readings is meaningless.
+
+For simulated readings the limits of what a bench hands in are wide, and the same for every kind.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import gcd
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+
+from bowdenfit.kinds.rows import ForceRows, RowOrigin
+from bowdenfit.types import Labels, Matrix, Vector
+from bowdenfit.words import few, listed
 
 GAIN_ERROR = 0.01  # of a reading, that load cells may gain against each other where nothing is stated
 LOWEST, HIGHEST = 0.2, 0.99  # efficiency
 _LEAST_LOSS, _LARGEST_LOSS = -np.log(HIGHEST), -np.log(LOWEST)
 FACTOR = 10.0  # between what is simulated and what was measured, at most
 SCATTER = 0.1  # of log ratios of forces about their stroke's mean, at most
+
+
+CHANCE = 1e-6  # that readings agree which are no copies, below which they are said to be
+_LEAST_FREEDOM = 3  # of the scatter that is compared with the last digit
+_FINE = 3.0  # last digits in the scatter, below which readings are alike because they are rounded alike
+NO_NOISE = 1e-5  # scatter as part of the readings, below which they were computed and not measured
+_DEGREE = 3  # of the polynomial that readings follow
+_MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
+_LEAST_AGAIN = 3  # readings of something that was read before, all alike, from which on the display is said to do that
+_POWERS = range(6, -10, -1)  # of ten, that a last digit may be
+_WHOLE = 1e-9  # as part of a multiple of a last digit, by which it may be off
 
 
 def beyond(loss: np.ndarray, what: str) -> str:
@@ -29,3 +61,184 @@ def parts(group: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
 def within_factor(real: float, made: float) -> bool:
     """Whether a simulated quantity is within a factor of ten of the measured one."""
     return bool(real / FACTOR <= made <= real * FACTOR)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Readings of a table, as they are compared with each other.
+
+    Args:
+        file: What the table is called.
+        part: Number of the run of each row.
+        names: Every run in words, such as "run 3"; none where the table has no runs.
+        settings: Under what each row was read, a column a quantity; NaN where one is not known.
+        read: What was read, a column a quantity; NaN where nothing was.
+        along: What the readings change smoothly with.
+        curve: Number of the curve on which a row lies: those of one run and stroke.
+    """
+
+    file: str
+    part: Labels
+    names: tuple[str, ...]
+    settings: Float[np.ndarray, "rows settings"]
+    read: Float[np.ndarray, "rows readings"]
+    along: Vector
+    curve: Labels
+
+    @property
+    def rows(self) -> Matrix:
+        """Whatever stands in a row; -1 where nothing is."""
+        return np.nan_to_num(np.column_stack([self.settings, self.read]), nan=-1.0)
+
+
+def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, along: Vector, curve: Any = 0) -> Compared:
+    """A table that has no runs; its settings and readings may be one column.
+
+    Args:
+        origin: Where its rows were read.
+        settings, read, along, curve: As of `Compared`; all rows lie on one curve if that is omitted.
+    """
+    n = len(along)
+    none, each = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
+    return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, each)
+
+
+def places_along(rows: ForceRows) -> Vector:
+    """Where rows were read: on the route, or at which wrap angle where there is none."""
+    return rows.route if np.isfinite(rows.route).all() else np.nansum(rows.own.angle, axis=1)
+
+
+def copies(compared: Compared) -> list[str]:
+    """Which readings are copies of others, in sentences without a first capital or remedy; none where chance may do it."""
+    rows = compared.rows
+    parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
+    alike, repeated = _alike(rows, parts), _repeated(rows, parts)
+    if not alike and not repeated:
+        return []
+    chances, told = _chances(compared), []
+    for same in alike:
+        first, *others = (compared.names[k] for k in same)
+        one = parts[same[0]]
+        if _log_chance(chances, compared.read[one]) + 2 * np.log(len(parts)) < np.log(CHANCE):
+            hold = "holds" if len(others) == 1 else "hold"
+            told.append(
+                f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
+            )
+    for times, those in repeated.items():
+        where = np.concatenate([parts[k] for k in those])
+        if (1 - 1 / times) * _log_chance(chances, compared.read[where]) < np.log(CHANCE):
+            whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
+            often = _MULTIPLES.get(times, f"{times} times")
+            told.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
+    return told
+
+
+def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
+    """Runs that hold the same rows, in whatever order, two or more each time."""
+    known: dict[bytes, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        known[rows[where][np.lexsort(rows[where].T)].tobytes()].append(k)
+    return [same for same in known.values() if len(same) > 1]
+
+
+def _repeated(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
+    """Runs in which every row stands equally often, by how often that is, if more than once."""
+    found: dict[int, list[int]] = defaultdict(list)
+    for k, where in parts.items():
+        times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
+        if times > 1:
+            found[times].append(k)
+    return found
+
+
+def _log_chance(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
+    """Logarithm of the chance that as many other readings are the same."""
+    return float(np.sum(np.isfinite(read).sum(axis=0) * np.log(chances)))
+
+
+def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
+    """Chance that two readings of the same agree to the last digit, by column; 1 where that is not known.
+
+    By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
+    width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
+    """
+    found = np.ones(compared.read.shape[1])
+    for c, read in enumerate(compared.read.T):
+        known = np.isfinite(read) & np.isfinite(compared.along)
+        squares = freedom = 0.0
+        for curve in np.unique(compared.curve[known]):
+            here = known & (compared.curve == curve)
+            points = np.unique(np.column_stack([compared.along[here], read[here]]), axis=0)
+            rest, left = _about_a_polynomial(*points.T)
+            squares, freedom = squares + rest, freedom + left
+        values = np.unique(read[known])
+        if freedom < _LEAST_FREEDOM or len(values) < 2:
+            continue
+        scatter = np.sqrt(squares / freedom)
+        last_digit = np.diff(values).min()
+        if scatter > max(_FINE * last_digit, NO_NOISE * np.sqrt(np.mean(values**2))):
+            found[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
+    return found
+
+
+def _about_a_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
+    """Sum of squares about a polynomial of x, and its degrees of freedom."""
+    places = len(np.unique(x))
+    degree = min(_DEGREE, places - 2) if places > 3 else places - 1
+    width = np.ptp(x)
+    design = np.vander((x - x.min()) / width if width > 0 else np.zeros(len(x)), degree + 1)
+    fit = np.linalg.lstsq(design, y, rcond=None)[0]
+    return float(np.sum((y - design @ fit) ** 2)), float(len(y) - degree - 1)
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """What is known of such a table.
+
+    Args:
+        file: What the table is called.
+        last_digit: Of its readings, with their unit.
+        sd: Standard deviation that it gives a reading, in the same.
+        different: Number of readings that do not repeat another.
+        log_sd: Standard deviation that the last digit gives the logarithm of a reading, on average of these.
+    """
+
+    file: str
+    last_digit: str
+    sd: float
+    different: int
+    log_sd: float
+
+
+def coarse(file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, unit: str = "") -> Coarse | None:
+    """What is known of a table whose repeated readings are all alike; None of any other.
+
+    Args:
+        file: What the table is called.
+        settings: Under what each row was read, but for the mounting; NaN where one is not known.
+        read: What was read; readings of 0 and below are not looked at, as their logarithms are not.
+        unit: Its unit.
+    """
+    if not np.all(read > 0):
+        return None
+    settings = np.nan_to_num(settings, nan=-1.0)
+    places = np.unique(settings, axis=0)
+    different = np.unique(np.column_stack([settings, read]), axis=0)[:, -1]
+    if len(different) > len(places) or len(read) - len(places) < _LEAST_AGAIN:
+        return None
+    last_digit = _last_digit(read)
+    if last_digit == 0:
+        return None
+    log_sd = float(np.sqrt(np.mean((last_digit / different) ** 2) / 12))
+    return Coarse(file, f"{last_digit:g} {unit}".strip(), last_digit / 12**0.5, len(different), log_sd)
+
+
+def _last_digit(values: Vector) -> float:
+    """The largest power of ten of which all values are multiples; 0 if there is none that a display would show."""
+    for power in _POWERS:
+        if 10.0**power < NO_NOISE * values.max():
+            break
+        counts = values / 10.0**power
+        if np.all(np.abs(counts - np.round(counts)) < _WHOLE * counts):
+            return 10.0**power
+    return 0.0

@@ -1,12 +1,17 @@
-"""Which wrap angles the rows of a table have, before any parameter is known."""
+"""Wrap angles of the rows of a table: what is known before any parameter is, and their values at given parameters."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
+from jaxtyping import Float
 
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.description import Description
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.rows import ForceRows
+from bowdenfit.kinds.tables import AngleTable
 
 
 @dataclass(frozen=True)
@@ -80,3 +85,14 @@ def _outside_curves(
         if np.isnan(measured[at]).any():
             sd[i] = np.nanmax(detection_limit[at]) / np.sqrt(12)
     return angle, sd
+
+
+def resolve_angles(
+    cable: Cable, values: Mapping[str, Array], rows: Mapping[str, Array]
+) -> tuple[Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
+    """Wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
+    angles = jnp.where(rows["is_own"], rows["own"], cable.wrap_angles(values, rows["route"]))
+    variance = rows["known_variance"]
+    if ANGLE_NOISE in values:
+        variance = variance + jnp.where(rows["noisy"], values[ANGLE_NOISE] ** 2, 0.0)
+    return angles, jnp.asarray(variance)

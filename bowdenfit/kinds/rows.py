@@ -1,23 +1,24 @@
-"""What the rows of several kinds of table have in common: route variable, wrap angles, stroke, and where they stand."""
+"""Rows of tables as people write them: route value, wrap angles, stroke, forces at both ends; read, and written to files."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from bowdenfit.description import Route
+from bowdenfit.description import Description, Route
+from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.spellings import without_accents
-from bowdenfit.kinds.init_questions import WantedColumn
 from bowdenfit.types import Labels, Matrix, Vector
-from bowdenfit.words import shown
+from bowdenfit.words import shown, significant
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
 _ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
@@ -29,6 +30,15 @@ _STROKE_WORDS = {
     0: "hold held holding 0 0.0 halten gehalten maintien tenir mantener tenere",
 }
 _STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in words.split()}
+
+
+ENDS = tuple(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque"))
+Page = tuple[list[str], list[list[str]]]
+"""Headings and rows."""
+_DIGITS = 5
+STROKE_NAMES = {1: "pull", -1: "return"}
+Stroke = Literal["pull", "return"]
+_SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -156,12 +166,6 @@ def _stroke(cell: Cell, held: str) -> int:
     return _STROKES[text]
 
 
-RUN = WantedColumn(Quantity("run", "text"), "which mounting of the cable a row belongs to", optional=True)
-STROKE = WantedColumn(
-    Quantity("stroke", "text"), "whether a row was read while pulling or returning", optional=True, numbers=(-1, 1)
-)
-
-
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
     """Columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
     angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
@@ -233,3 +237,71 @@ def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Seque
                     f"{table.file}, row {table.header_row}: the column {shown(heading)} is not known; did you mean {near[0]}? "
                     "Rename it, or delete it."
                 )
+
+
+def end_column(table: RawTable, found: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
+    """The column of one end, "input" or "output".
+
+    Args:
+        table, found: Where it is looked for.
+        end: Which end.
+        is_loop: Whether torques are as usual as forces, so that both are named where there are none.
+
+    Raises:
+        DatasetError: There is none of forces and none of torques, or one of each.
+    """
+    force, torque = f"{end}_force", f"{end}_torque"
+    if force in found and torque in found:
+        raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
+    named = f"{force}_N or {torque}_N_m" if is_loop else f"{force}_N"
+    return found[torque] if torque in found else require(table, found, force, named)
+
+
+def forces_of(values: Vector, table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+    """Forces at one end [N], from what its column holds.
+
+    Args:
+        values: Numbers of `end_column`, in N or N mm.
+        table, found: Where they were read.
+        end: "input" or "output".
+        pulleys: Their radii.
+
+    Raises:
+        DatasetError: They are torques, and the radius of that pulley is not stated.
+    """
+    return pulleys.forces(values, end, table.file) if f"{end}_torque" in found else values
+
+
+def route_heading(description: Description) -> list[str]:
+    """Heading of the route variable's column in a file that is written; none without a route."""
+    return [f"{description.route.variable}_{description.route.unit}"] if description.route else []
+
+
+def route_cells(route: float, description: Description) -> list[str]:
+    """A row's cell in that column."""
+    return [f"{route:g}"] if description.route else []
+
+
+def fixed(values: Iterable[float], decimals: int) -> list[str]:
+    """Cells of a column: so many decimals, and more where its largest value would else have fewer than five digits."""
+    column = np.array(list(values), dtype=float)
+    largest = float(np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
+    enough = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
+    return [f"{value:.{max(decimals, enough)}f}" for value in column]
+
+
+def in_words(values: np.ndarray, unit: str) -> str:
+    """The range of values, or their one value."""
+    low, high = float(values.min()), float(values.max())
+    least, most = significant(low, 4), significant(high, 4)
+    return f"{least} {unit}" if low == high else f"{least} to {most} {unit}"
+
+
+def signs(strokes: Sequence[Stroke]) -> list[int]:
+    """+1 for each pull, -1 for each return."""
+    return [_SIGNS[stroke] for stroke in strokes]
+
+
+def radians(degrees: Sequence[float]) -> Vector:
+    """Wrap angles as tables have them."""
+    return np.deg2rad(np.array(degrees, dtype=float))

@@ -68,7 +68,10 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
             f"{'load' if unit == 'reading' else 'run'}."
         )
     each = len(term.data["mean"]) // len(term.labels)
-    left = [with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), each) for i in range(len(counts))]
+    left = [
+        with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), each)
+        for i in range(len(counts))
+    ]
     ratio, load = (np.bincount(part, values) / counts for values in (term.rows.log_ratio, term.rows.input_force))
     stacked = jax.tree.map(lambda *arrays: np.stack(arrays), *left)
     return RunParts(names, np.column_stack([counts, ratio, load]), of_part, stacked)
@@ -88,7 +91,9 @@ def _parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, t
     part = part.ravel()
     load = np.bincount(part, rows.input_force) / np.bincount(part)
     strokes = ("return", "pull")
-    names = [f"{term.labels[r]}, {strokes[s]} at {significant(f, 4)} N" for (r, s, _), f in zip(keys, load, strict=True)]
+    names = [
+        f"{term.labels[r]}, {strokes[s]} at {significant(f, 4)} N" for (r, s, _), f in zip(keys, load, strict=True)
+    ]
     return part, tuple(names)
 
 

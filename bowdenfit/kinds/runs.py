@@ -13,10 +13,9 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.kinds.inside_runs import InsideRuns, inside_runs
-from bowdenfit.kinds.padding import rounded_up
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
+from bowdenfit.kinds.row_angles import resolve_angles
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, InsideRuns, SlidingRows, inside_runs
+from bowdenfit.kinds.term import rounded_up
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
@@ -160,7 +159,9 @@ class RunsTerm:
         shares = np.concatenate([[0.0], np.geomspace(_LEAST_SHARE, 1 / _LEAST_SHARE, 49)]) / np.median(per_noise)
         variance = 1 + shares[:, None] * per_noise
         tau_squared = np.mean(squares / variance, axis=1)
-        best = int(np.argmax(-len(squares) * np.log(np.maximum(tau_squared, 1e-300)) - np.sum(np.log(variance), axis=1)))
+        best = int(
+            np.argmax(-len(squares) * np.log(np.maximum(tau_squared, 1e-300)) - np.sum(np.log(variance), axis=1))
+        )
         tau = float(np.sqrt(tau_squared[best]))
         return {RUN_SCATTER: tau, self.reading_noise: tau * float(np.sqrt(max(shares[best], _LEAST_SHARE * shares[1])))}
 

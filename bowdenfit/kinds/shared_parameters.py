@@ -7,9 +7,7 @@ import numpy as np
 from bowdenfit.cable.elasticity import RopeScales, preload_parameter, rope_parameters
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.description import Description
-from bowdenfit.kinds.loop.table import LoopTable
-from bowdenfit.kinds.preload.table import PreloadTable
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
 from bowdenfit.kinds.term import Circumstances
 from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter, Scale
@@ -102,7 +100,9 @@ def _rope_scales(at: Circumstances) -> RopeScales:
         Scale(float(np.median(table.load)), "median load of the stretch", "N"),
         Scale(loads / stretch, "range of loads over that of stretch", "N/mm"),
         Scale(stretch, "range of stretch", "mm"),
-        Scale(stretch / bent, "range of stretch over that of wrap angles", "mm/rad") if bent else _usual_lengthening(bend),
+        Scale(stretch / bent, "range of stretch over that of wrap angles", "mm/rad")
+        if bent
+        else _usual_lengthening(bend),
     )
 
 

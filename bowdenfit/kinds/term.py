@@ -9,7 +9,7 @@ Beside its `Kind` (`kinds/kind.py`, NumPy) every kind has a `TermKind`, `kinds/<
 - `draw`: the same table measured again on the computer.
 
 What else `TermKind` has is optional. A kind whose next reading can be ranked by `bowdenfit next` gives a `CandidateKind` too
-(`kinds/candidate.py`).
+(`kinds/candidate.py`). The simplest term is a subclass of `IndependentReadings`, whose readings scatter alike.
 """
 
 from abc import ABC, abstractmethod
@@ -17,19 +17,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.noise import NoiseLaw, noise_law
+from bowdenfit.cable.noise import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import CandidateKind
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.rows import ForceRows
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 AnyTable = TypeVar("AnyTable")
+LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of places
 
 
 @runtime_checkable
@@ -123,7 +127,42 @@ class Circumstances:
         return noise_law(self.cable.description)
 
 
-LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of places
+@dataclass(frozen=True)
+class Truth:
+    """What tables are measured again with on the computer.
+
+    Args:
+        cable: The cable.
+        angles: Measured wrap angles, which hold outside the range of the curves.
+        values: True values [internal units].
+        key: Random key of the whole bench. A kind makes one of its own of it that no other uses, so that its readings do not
+            depend on which other tables there are.
+        scale: Factor on all noise.
+    """
+
+    cable: Cable
+    angles: AngleTable | None
+    values: Mapping[str, Array]
+    key: Array
+    scale: float = 1.0
+
+    def scatter(self, key: Array, shape: tuple[int, ...]) -> Array:
+        """Deviations of readings in units of their scale."""
+        return scatter(key, shape, self.cable.description)
+
+    def wrap_angles(self, rows: ForceRows) -> tuple[Array, Array]:
+        """Wrap angle [rad] of each row and contact without its error, and the error's variance [rad^2]."""
+        data = row_angles(self.cable.description, rows, self.angles).data
+        return resolve_angles(self.cable, self.values, {name: jnp.asarray(array) for name, array in data.items()})
+
+    def simulate(self, term: Any, key: Array) -> Array:
+        """Return readings drawn from a term whose `simulate` takes a factor on its noise.
+
+        Args:
+            term: The term, whose readings are those of its table in the same order.
+            key: The kind's own key.
+        """
+        return term.simulate(self.values, jax.tree.map(jnp.asarray, term.data), key, self.scale)
 
 
 class TermKind(ABC, Generic[AnyTable]):
@@ -210,3 +249,91 @@ class TermKind(ABC, Generic[AnyTable]):
     def describe_choice(self, description: Description) -> str:
         """Return what sets a description apart from others of the same files; empty where it is as usual."""
         return ""
+
+
+@dataclass(frozen=True)
+class IndependentReadings(ABC):
+    r"""Likelihood of readings that scatter alike about what the model expects of them.
+
+    .. math:: y_i \sim \text{Normal}(f_i, \sigma)
+
+    With Student noise the same mean and scale are a Student-t's. A subclass gives `name`, `unit`, `noise` (see `Term`) and
+    `expected`, which is f.
+
+    Args:
+        cable: The cable.
+        data: Arrays; "reading" holds the readings, and `expected` takes the others.
+        labels: Each reading in words.
+    """
+
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name of its readings in results."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """Unit of its readings."""
+
+    @property
+    @abstractmethod
+    def noise(self) -> str:
+        """Parameter that is the standard deviation of a reading."""
+
+    @abstractmethod
+    def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Expected readings in the term's unit."""
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """All readings scatter alike."""
+        return ((len(self.labels), len(self.labels)),)
+
+    def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Log likelihood of each reading."""
+        deviation = (data["reading"] - self.expected(values, data)) / values[self.noise]
+        return noise_law(self.cable.description).log_density(deviation) - jnp.log(values[self.noise])
+
+    def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
+        """Standardized residuals; the noise follows the parameters but is not differentiated."""
+        noise = jax.lax.stop_gradient(values[self.noise])
+        return noise_law(self.cable.description).residual((data["reading"] - self.expected(values, data)) / noise)
+
+    def simulate(
+        self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array, scale: float = 1.0
+    ) -> Float[Array, " rows"]:
+        """Readings drawn at given parameters, with their noise times `scale`."""
+        expected = self.expected(values, data)
+        return expected + scale * values[self.noise] * scatter(key, expected.shape, self.cable.description)
+
+    def observed(self) -> np.ndarray:
+        """Readings in the term's unit."""
+        return self.data["reading"]
+
+
+def first_less(reading: Float[Array, " read"], expected: Float[Array, " rows"]) -> Float[Array, " read"]:
+    """Readings less what is expected of the first rows; 0 where there is no reading."""
+    of_read = expected[: reading.shape[0]]
+    return jnp.where(jnp.isnan(reading), 0.0, reading - of_read)
+
+
+def last_less(bound: Float[Array, " bounds"], expected: Float[Array, " rows"]) -> Float[Array, " bounds"]:
+    """Bounds less what is expected of the last rows; 0 where there is no bound."""
+    of_bounds = expected[expected.shape[0] - bound.shape[0] :]
+    return jnp.where(jnp.isnan(bound), 0.0, bound - of_bounds)
+
+
+def joined(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
+    """What each reading and bound contributes, one after the other; nothing where there is none."""
+    return jnp.concatenate([jnp.where(jnp.isnan(known), 0.0, contributed) for known, contributed in parts])
+
+
+def rounded_up(count: int) -> int:
+    """The next of few counts: each to eight, then four to every doubling, at most a quarter more than asked for."""
+    step = 1 << max(0, (count - 1).bit_length() - 3)
+    return -(-count // step) * step

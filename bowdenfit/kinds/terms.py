@@ -1,9 +1,16 @@
-"""Every kind's half in the likelihood, by the names of KINDS; what the kinds of a data set ask for together."""
+"""TERMS: every kind's half in the likelihood, by the names of KINDS; what the kinds of a data set contribute together.
 
-from collections.abc import Iterator
+From here come the cable of a data set, the parameters of its model, and all its tables measured again on the computer.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bowdenfit.cable.cable import ANGLE_NOISE, Cable
+import jax
+import numpy as np
+
+from bowdenfit.cable.cable import ANGLE_NOISE, Cable, make_cable
+from bowdenfit.cable.conditions import make_conditions
 from bowdenfit.cable.elasticity import (
     BEDDING_LOAD,
     BEDDING_STRETCH,
@@ -22,20 +29,24 @@ from bowdenfit.cable.load_cells import (
     OUTPUT_OFFSET,
     RUN_SCATTER,
 )
+from bowdenfit.description import Description
+from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds import each_table, kind_of
 from bowdenfit.kinds.angles.term import AngleTerms
 from bowdenfit.kinds.candidate import CandidateKind
+from bowdenfit.kinds.descriptions import measured_groups
 from bowdenfit.kinds.displacement.term import DisplacementTerms
 from bowdenfit.kinds.efficiencies.term import EfficiencyTerms
 from bowdenfit.kinds.forces.term import ForceTerms
+from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.kinds.loop.term import LOOP_MOUNTING, LoopTerms
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.preload.term import PRELOAD_NOISE, PreloadTerms
 from bowdenfit.kinds.recordings.term import RecordingTerms
 from bowdenfit.kinds.ringdown.term import RingDownTerms
 from bowdenfit.kinds.shared_parameters import gain_error
 from bowdenfit.kinds.stretch.term import STRETCH_NOISE, StretchTerms
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.kinds.term import Circumstances, TermKind, Truth
 from bowdenfit.parameters.space import Parameter
 
 _ALL: tuple[TermKind[Any], ...] = (
@@ -58,6 +69,9 @@ _ORDER = (
     *(LOOP_MOUNTING, ANGLE_NOISE, RUN_SCATTER, FORCE_NOISE, BLOCK_NOISE, STRETCH_NOISE, PRELOAD_NOISE),
     *(GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, DELAY_ERROR),
 )  # in z, which what a seed draws depends on; those of other kinds come after these
+
+
+Readings = dict[str, dict[str, jax.Array]]
 
 
 def measured_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[Any], Any]]:
@@ -89,3 +103,90 @@ def term_kind(readings: str) -> TermKind[Any]:
     """
     kind = kind_of(readings)
     return TERMS[kind.name if kind is not None else readings]
+
+
+def measured_cable(description: Description, measurements: Measurements) -> Cable:
+    """Return the cable of a description; nominal angles, reference force and speed are measured ones where none is stated.
+
+    Raises:
+        DescriptionError: A curve family, contact law or friction model is unknown, or velocities are of two kinds.
+    """
+    tables = list(each_table(measurements))
+    friction = [(kind, table) for kind, table in tables if isinstance(kind, FrictionKind)]
+    forces = _positive([kind.forces(table) for kind, table in friction])
+    tensions = _positive([kind.tensions(table) for kind, table in tables if isinstance(kind, RopeKind)])
+    speeds = _positive([kind.speeds(table) for kind, table in friction])
+    unit = _velocity_unit([kind.velocity_unit(table) for kind, table in friction])
+    groups = measured_groups(description, measurements)
+    conditions = make_conditions(description, forces, tensions, speeds, unit, groups)
+    return make_cable(description, _own_angles(description, friction), conditions)
+
+
+def _own_angles(description: Description, friction: Sequence[tuple[FrictionKind[Any], Any]]) -> dict[str, float]:
+    """Return the mean of the measured angles in each column of a contact without a nominal angle [rad]."""
+    rows = [kind.conditions(table).own for kind, table in friction]
+    sources, means = [c.wrap_angle for c in description.contact], {}
+    for name in [s.column for s in sources if s.column is not None and s.curve is None and s.nominal is None]:
+        if rows:
+            means[name] = float(np.mean(np.concatenate([own.column(name)[0] for own in rows])))
+    return means
+
+
+def _velocity_unit(stated: Sequence[str]) -> str:
+    units = {unit for unit in stated if unit}
+    if len(units) > 1:
+        raise DescriptionError(
+            "velocities are of the rope (mm/s) in one table and of the motor (r/min) in another; give both in the same kind."
+        )
+    return units.pop() if units else ""
+
+
+def _positive(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Return all values that are positive and finite."""
+    values = np.concatenate([np.zeros(0), *parts])
+    return values[np.isfinite(values) & (values > 0)]
+
+
+def drawn_readings(
+    cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float = 1.0
+) -> Readings:
+    """New readings by kind of table, of a function that JAX can compile.
+
+    Args:
+        cable: The cable.
+        tables: What is measured again.
+        values: True values [internal units].
+        key: Random key.
+        scale: Factor on all noise.
+    """
+    truth = Truth(cable, tables.table(AngleTable), values, key, scale)
+    return {kind.name: kind.draw(table, truth) for kind, table in measured_kinds(tables)}
+
+
+def slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:
+    """Whether a bench could not have taken some of the readings as it says it did."""
+    return any(np.any(np.asarray(of.get("slipped", False))) for of in readings.values())
+
+
+def with_drawn_readings(
+    description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
+) -> Measurements:
+    """The tables with what `drawn_readings` gave; remarks on how tables were read do not hold for them.
+
+    Raises:
+        DatasetError: The strokes of a recording cannot be found.
+    """
+    return Measurements(tuple(drawn_tables(description, tables, readings)))
+
+
+def drawn_tables(
+    description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
+) -> Iterator[Any]:
+    """The same one by one: most that a bench would not hand in are known before the strokes of recordings are looked for.
+
+    Raises:
+        DatasetError: The strokes of a recording cannot be found.
+    """
+    for kind, table in measured_kinds(tables):
+        drawn = {field: np.asarray(array) for field, array in readings[kind.name].items()}
+        yield kind.with_readings(description, table, drawn)

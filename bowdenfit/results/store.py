@@ -16,8 +16,8 @@ from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, each_table
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups

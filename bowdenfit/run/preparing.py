@@ -9,7 +9,7 @@ from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.results.folder import CHAIN, read_checkpoint, refuse_to_overwrite, remove_earlier_fit, start_checkpoint
 
 

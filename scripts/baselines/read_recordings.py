@@ -52,14 +52,14 @@ def steps(folder: Path) -> dict[str, float]:
     start = time.perf_counter()
     import bowdenfit
     from bowdenfit import dataset
-    from bowdenfit.kinds.recordings import table
+    from bowdenfit.kinds.recordings import reader
 
     seconds["import bowdenfit"] = time.perf_counter() - start
     timed = {
-        "read the files": (table, "read_channels"),
-        "flag, tare and find delays": (table, "inspect_recording"),
-        "average": (table, "average_recording"),
-        "find strokes": (table, "find_strokes"),
+        "read the files": (reader, "read_channels"),
+        "flag, tare and find delays": (reader, "inspect_recording"),
+        "average": (reader, "average_recording"),
+        "find strokes": (reader, "find_strokes"),
         "checksums": (dataset, "_sha256"),
     }
     start = time.perf_counter()

@@ -16,7 +16,7 @@ import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.settings import load_description
+from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.model import build_model
 from recordings.simulated import SEED, Simulated
 from recordings.timing import milliseconds

@@ -14,10 +14,9 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Route
 from bowdenfit.inference.least_squares import LeastSquares
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.rows import RowOrigin
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.physics.geometry import logistic_wrap_angle
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.compare.words import comparison_text

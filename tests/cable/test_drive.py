@@ -11,8 +11,8 @@ from bowdenfit.cable.conditions import LEAST_SHARE, Conditions
 from bowdenfit.cable.drive import LEAST_EXPONENT, Loop, Rope, drive_of
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.load_cells import LoadCells
-from bowdenfit.kinds.measured_cable import measured_cable as cable_of
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.terms import measured_cable as cable_of
 from bowdenfit.physics.friction import force_from_scale, force_scale
 from bowdenfit.recordings.preparation.play import play
 

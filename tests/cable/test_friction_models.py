@@ -13,8 +13,8 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, play_operator, rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording

@@ -11,8 +11,8 @@ from rows import of_rows
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.settings import parse_description
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.next.target import answer_of

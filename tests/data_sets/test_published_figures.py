@@ -16,8 +16,8 @@ from bowdenfit.dataset import Dataset, read_dataset
 from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
 from bowdenfit.results.along_route import make_optimizer

@@ -11,7 +11,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.files import read_channels
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 
 pytestmark = pytest.mark.extended

@@ -43,7 +43,7 @@ def test_nobody_outside_kinds_names_three_kinds_of_measurement():
 def test_the_search_finds_names_of_kinds_wherever_code_may_have_them():
     code = '''
 """stretch"""
-from bowdenfit.kinds.loop.table import LoopTable
+from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.recordings.recording import Recordings
 def forces(): return tables["preload"], "a sentence on recordings"
 '''

@@ -10,10 +10,9 @@ from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.bends.overview import describe_products_with_preload
+from bowdenfit.questions.bends.overview import products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
 from bowdenfit.questions.summary.words import full_text
 
@@ -85,10 +84,8 @@ def estimates_of(tables, design, truth, seeds):
         data, values = measured(cable_with(tables), seed, design=design_of(**design), once=True, **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
         objective = objective or make_objective(posterior)
-        start = find_maximum_posterior(
-            posterior, objective).z
-        estimates = fit_least_squares(posterior, objective, start, intervals=False
-        ).estimates
+        start = find_maximum_posterior(posterior, objective).z
+        estimates = fit_least_squares(posterior, objective, start, intervals=False).estimates
         true = {p.name: values[p.name] * p.shown_scale for p in posterior.model.space.free}
         found.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
     return found, data
@@ -134,11 +131,9 @@ def test_the_summary_says_which_values_fit_as_well():
 def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
     sampler = {"n_walkers": 32, "target_ess": 100, "target_r_hat": 1.1, "max_steps": 400}
     prior = {"preload": {"prior": {"lognormal": {"median": 20.0, "log_sd": 1.0}}}}  # else it may as well be slack
-    data, _ = measured(
-        cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), once=True, **TRUTH
-    )
+    data, _ = measured(cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), once=True, **TRUTH)
     fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
-    (sentence,) = describe_products_with_preload(fit)
+    (sentence,) = products_with_preload(fit)
     assert sentence.startswith(
         "The measurements hardly tell preload and mu apart; what they do determine is preload x mu = 0.6"
     )

@@ -25,11 +25,8 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.settings import parse_description
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.tables import AngleTable, Measurements, StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 

@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import bowdenfit as bf
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.tables import AngleTable
 
 pytestmark = pytest.mark.extended
 

@@ -20,8 +20,8 @@ from bowdenfit.inference.departure import FALSE_ALARM
 from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.inside_runs import ORDER, STROKE
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.sliding_rows import ORDER, STROKE
+from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.model import build_model
 

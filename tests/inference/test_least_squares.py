@@ -18,9 +18,9 @@ from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posteri
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.solver import minimize
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.drawn_readings import drawn_readings
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import with_readings
 

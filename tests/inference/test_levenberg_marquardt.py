@@ -14,7 +14,7 @@ from bowdenfit.inference.levenberg_marquardt import LevenbergMarquardt, RadiusSe
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.solver import minimize
-from bowdenfit.kinds.padding import rounded_up
+from bowdenfit.kinds.term import rounded_up
 from bowdenfit.model import build_model
 
 

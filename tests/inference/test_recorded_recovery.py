@@ -25,9 +25,9 @@ from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.table import RecordingsTable, _File, _prepared, _recording
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.recordings.reader import RecordingsTable, _File, _prepared, _recording
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,

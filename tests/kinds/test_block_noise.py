@@ -9,12 +9,12 @@ import pytest
 from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.recordings.blocks import drift_of
 from bowdenfit.kinds.recordings.simulation import recorded_again
 from bowdenfit.kinds.recordings.term import recordings_term
 from bowdenfit.kinds.runs import RunsTerm
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.play import play

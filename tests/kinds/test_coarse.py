@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.coarse import coarse
+from bowdenfit.kinds.plausibility import coarse
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import COARSE
 from bowdenfit.questions.summary.words import full_text

@@ -6,9 +6,9 @@ from cables import CONTACTS, cable
 from elastic_cables import elastic_cable
 
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.designs import design_of, read_design
+from bowdenfit.kinds.descriptions import design_of, read_design
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 CLAMPED = cable(1, ("forces",), contact=[CONTACTS[4]])

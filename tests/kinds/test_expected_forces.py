@@ -9,7 +9,7 @@ import pytest
 from hand_bench import Readings, pull, write
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.expected_forces import expected_forces
+from bowdenfit.kinds.sliding_rows import expected_forces
 from bowdenfit.model import build_model
 
 EFFICIENCY, ROWS = 0.6, 200_000

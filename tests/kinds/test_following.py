@@ -7,7 +7,7 @@ import pytest
 from hand_bench import Readings, pull
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.forces.impossible import check_following
+from bowdenfit.kinds.forces.impossible_forces import check_following
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 

@@ -8,11 +8,10 @@ from hand_bench import Readings, pull, write
 
 from bowdenfit.description import Sensors
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.forces.impossible import check_gains
-from bowdenfit.kinds.forces.reading_noise import FALSE_ALARM
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.forces.impossible_forces import FALSE_ALARM, check_gains
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.kinds.settings import parse_description
 
 pytestmark = pytest.mark.extended
 

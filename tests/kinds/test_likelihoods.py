@@ -11,15 +11,15 @@ from densities import draws, over_rows
 from scipy import integrate, stats
 
 from bowdenfit.dataset import Dataset, load_dataset, read_dataset
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.descriptions import load_description
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm, sliding_rows
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.runs import RunsTerm
-from bowdenfit.kinds.settings import load_description
 from bowdenfit.kinds.sliding_rows import SlidingRows
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import Model, build_model
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}

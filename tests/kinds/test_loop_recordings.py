@@ -12,7 +12,7 @@ from scipy import integrate, stats
 
 from bowdenfit.cable.drive import Loop
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm
+from bowdenfit.kinds.recordings.whole_recordings import LoopRecordingsTerm
 from bowdenfit.model import build_model
 from bowdenfit.recordings.loop_strokes import loop_limits
 

@@ -11,7 +11,7 @@ from conftest import ROOT
 import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.padding import rounded_up
+from bowdenfit.kinds.term import rounded_up
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import simulated_again
 

@@ -17,14 +17,14 @@ from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posteri
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import runs as runs_of_model
-from bowdenfit.kinds.measured_cable import measured_cable
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.recordings.side_by_side import first_of_groups
-from bowdenfit.kinds.recordings.table import recorded_angles
-from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
+from bowdenfit.kinds.recordings.blocks import first_of_groups
+from bowdenfit.kinds.recordings.reader import recorded_angles
+from bowdenfit.kinds.recordings.whole_recordings import WholeRecordingsTerm, pad_recordings
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.sliding_rows import SlidingRows
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.terms import measured_cable
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
@@ -452,6 +452,6 @@ def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
 def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
-    monkeypatch.setattr("bowdenfit.kinds.recordings.side_by_side.MOST_BLOCKS", 80)
+    monkeypatch.setattr("bowdenfit.kinds.recordings.blocks.MOST_BLOCKS", 80)
     first_of_groups = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
     assert first_of_groups.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

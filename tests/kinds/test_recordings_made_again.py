@@ -9,10 +9,10 @@ import pytest
 from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.drawn_readings import drawn_readings
 from bowdenfit.kinds.recordings.simulation import errors_shared, recorded_again
 from bowdenfit.kinds.recordings.term import recordings_term
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recordings

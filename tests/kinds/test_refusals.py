@@ -8,9 +8,9 @@ from spoiling import copied, spoil
 
 from bowdenfit import cli
 from bowdenfit.dataset import read_dataset
+from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.tables import Measurements
 
 
 @pytest.fixture

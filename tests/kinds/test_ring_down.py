@@ -8,7 +8,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.ringdown.table import RingDownTable
+from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.physics.ring_down import ring_down
 from bowdenfit.questions.bends import ring_down_figure
 

@@ -20,9 +20,8 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.kinds.tables import Measurements, PreloadTable
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.distributions import (
     log_student_cdf,

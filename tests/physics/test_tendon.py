@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from catheters import Catheter, cycles
 
-from bowdenfit.kinds.displacement.turns import in_order
+from bowdenfit.kinds.displacement.table import in_order
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 
 CATHETERS = {

@@ -22,14 +22,14 @@ from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import detection_limit
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.drawn_readings import drawn_readings
+from bowdenfit.kinds.descriptions import design_of
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure

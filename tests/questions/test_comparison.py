@@ -22,8 +22,8 @@ from bowdenfit.inference.comparison import (
 from bowdenfit.inference.leave_one_out import REFIT, LooDensity, LooRefits, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.psis import Affine, find_best_map, match_moments, reliable_k
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison

@@ -20,8 +20,8 @@ from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.drawn_readings import drawn_readings
-from bowdenfit.kinds.loop.table import LoopTable
+from bowdenfit.kinds.tables import LoopTable
+from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import with_parameters_of
 from bowdenfit.questions.figures import figures_of

@@ -8,8 +8,7 @@ from cables import LENGTHS, cable, measured
 
 import bowdenfit as bf
 from bowdenfit.inference.identifiability import analyze_covariance
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.questions.identify.verb import identify
 
 pytestmark = pytest.mark.extended

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.kinds.file_kind import file_kind
 from bowdenfit.kinds.forces.table import ForceTable, count_loads
-from bowdenfit.kinds.single_file import file_kind
 from bowdenfit.recordings.recording import Recordings
 
 pytestmark = pytest.mark.extended

@@ -21,13 +21,13 @@ from bowdenfit.errors import UsageError
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
+from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
+from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.kind import Design
-from bowdenfit.kinds.next_run import typical_run
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
 from bowdenfit.questions.next.candidate_names import parsed_candidates

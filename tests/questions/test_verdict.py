@@ -13,7 +13,7 @@ from one_page import faults
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.questions.summary import answer_section
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import IMPOSSIBLE, NOT_CONVERGED, NOT_DESCRIBED, NOT_IDENTIFIABLE

@@ -9,7 +9,7 @@ from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
 from bowdenfit.inference.departure import FALSE_ALARM, NOTICEABLE_SHIFT
-from bowdenfit.kinds.inside_runs import ZERO
+from bowdenfit.kinds.sliding_rows import ZERO
 
 pytestmark = pytest.mark.extended
 

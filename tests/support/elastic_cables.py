@@ -6,8 +6,7 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.kinds.designs import design_of
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.dataset import Dataset, load_dataset
-from bowdenfit.kinds.drawn_readings import drawn_readings, drawn_tables
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.terms import drawn_readings, drawn_tables
 from bowdenfit.model import build_model
 
 

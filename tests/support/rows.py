@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.tables import Measurements
 
 
 def of_rows(loss: np.ndarray, angle: np.ndarray, angle_sd: float | np.ndarray = 0.0, **more: Any) -> Dataset:

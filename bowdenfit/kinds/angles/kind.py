@@ -12,13 +12,20 @@ from bowdenfit.description.file import Stated
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
-from bowdenfit.kinds.copies import copies, without_runs
-from bowdenfit.kinds.init_questions import InitQuestions
-from bowdenfit.kinds.kind import Design, PlannedKind, Readings, Source, TableFromFiles
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, route_heading
-from bowdenfit.kinds.rows import LARGEST_ANGLE, RowOrigin, provenance_of, read_angle, rounded, route_column
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings
+from bowdenfit.kinds.plausibility import copies, without_runs
+from bowdenfit.kinds.rows import (
+    LARGEST_ANGLE,
+    Page,
+    RowOrigin,
+    provenance_of,
+    read_angle,
+    rounded,
+    route_column,
+    route_heading,
+)
+from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles
+from bowdenfit.kinds.tables import AngleSettings, AngleTable, Measurements
 
 _FEWEST = 3  # detected angles that a plausible table has of each curve
 _NUMBERS = {2: "two", 3: "three"}

@@ -15,11 +15,9 @@ from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
-from bowdenfit.kinds.term import Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleSettings, AngleTable
+from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth, first_less, joined, last_less
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 

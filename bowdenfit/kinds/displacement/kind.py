@@ -12,17 +12,13 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.copies import Compared, copies
 from bowdenfit.kinds.displacement.reader import early, read_displacement
-from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
-from bowdenfit.kinds.displacement.turns import in_order
-from bowdenfit.kinds.friction_table import FrictionTableKind
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, fixed, in_words, radians, route_cells, route_heading
-from bowdenfit.kinds.plausibility import within_factor
-from bowdenfit.kinds.rows import RUN, STROKE, OwnAngles, RowOrigin
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, in_order
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.plausibility import Compared, copies, within_factor
+from bowdenfit.kinds.rows import OwnAngles, Page, RowOrigin, fixed, in_words, radians, route_cells, route_heading
+from bowdenfit.kinds.table_files import RUN, STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Vector
 from bowdenfit.words import listed
 
@@ -162,7 +158,12 @@ class DisplacementKind(
             ]
             for i in range(len(table.run))
         ]
-        heads = [*route_heading(description), *(f"{name}_deg" for name in names), "run", *(["stroke"] if table.sliding else [])]
+        heads = [
+            *route_heading(description),
+            *(f"{name}_deg" for name in names),
+            "run",
+            *(["stroke"] if table.sliding else []),
+        ]
         return [*heads, "displacement_mm", "force_N"], rows
 
     @override
@@ -196,7 +197,11 @@ def _warnings(table: DisplacementTable, description: Description) -> Iterator[st
     file, settings = table.origin.files[0], description.table(DisplacementSettings)
     springy = settings is None or settings.end == "spring"
     rope_known = _ROPE in description.prior or "stretch" in description.tables.stated
-    free = [name for name, known in ((_SPRING, not springy or _SPRING in description.prior), (_ROPE, rope_known)) if not known]
+    free = [
+        name
+        for name, known in ((_SPRING, not springy or _SPRING in description.prior), (_ROPE, rope_known))
+        if not known
+    ]
     low, high = table.shared
     closes = high - low > _FEW_SHARE * np.ptp(table.displacement)
     if free and not closes:

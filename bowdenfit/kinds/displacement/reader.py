@@ -16,9 +16,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.csv_table import RawTable, read_csv
-from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable
-from bowdenfit.kinds.displacement.turns import in_order, sliding
-from bowdenfit.kinds.kind import Source, TableFromFiles
+from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, in_order, sliding
 from bowdenfit.kinds.rows import (
     OwnAngles,
     check_spelling,
@@ -28,6 +26,7 @@ from bowdenfit.kinds.rows import (
     read_strokes,
     shared_columns,
 )
+from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import few, listed
 
@@ -55,12 +54,16 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
     settings, table = source.settings, read_csv(path)
-    ends = [Quantity(name, what) for names, what in zip(_NAMES.values(), ("force", "length"), strict=True) for name in names]
+    ends = [
+        Quantity(name, what) for names, what in zip(_NAMES.values(), ("force", "length"), strict=True) for name in names
+    ]
     others = (Quantity("run", "text"), Quantity("stroke", "text"))
     wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(route, contacts))
     found = find_columns(table, wanted, source.columns, _UNUSED)
     check_spelling(table, found, others)
-    force_column, x_column = (_one_of(table, found, name, unit) for name, unit in (("force", "N"), ("displacement", "mm")))
+    force_column, x_column = (
+        _one_of(table, found, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
+    )
     if "output_force" in found:
         raise DatasetError(
             f"{table.file} has forces at both ends; name it under tables.forces, which tells friction without any spring, or "
@@ -79,7 +82,9 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
     run, names = _runs(found.get("run"), at, own)
-    motion = sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
+    motion = (
+        sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
+    )
     every, origin = np.ones(len(force), dtype=bool), provenance_of(table)
     rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
     if not any(name.startswith(ZERO) for name in source.description.prior):
@@ -93,7 +98,9 @@ def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) 
     """A column by either of its names."""
     named = [each for each in _NAMES[name] if each in found]
     if len(named) > 1:
-        raise DatasetError(f"{table.file} has the columns {listed(named)}, which are both read as {name}; leave one out.")
+        raise DatasetError(
+            f"{table.file} has the columns {listed(named)}, which are both read as {name}; leave one out."
+        )
     return require(table, found, named[0] if named else name, f"{name}_{unit}")
 
 
@@ -121,7 +128,9 @@ def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels,
     """One run is what the column calls so, at one route value and one set of wrap angles."""
     said = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
     where = [
-        ", ".join([f"{at:.5g}"] * bool(np.isfinite(at)) + [f"{angle:.5g} deg" for angle in angles if np.isfinite(angle)])
+        ", ".join(
+            [f"{at:.5g}"] * bool(np.isfinite(at)) + [f"{angle:.5g} deg" for angle in angles if np.isfinite(angle)]
+        )
         for at, angles in zip(route, np.rad2deg(own.angle), strict=True)
     ]
     places: dict[str, set[str]] = {}
@@ -258,7 +267,9 @@ def _before_all_slides(table: DisplacementTable, rows: np.ndarray, back: np.ndar
     beyond = first < low - 0.05 * (high - low) if way > 0 else first > high + 0.05 * (high - low)
     turned = np.sort(x[rows])
     shared = np.linspace(max(low, turned[0]), min(high, turned[-1]), _PLACES)[_PLACES // 2 : -1]
-    there, here = (np.interp(shared, x[these], force[these]) for these in (rows[np.argsort(x[rows], kind="stable")], order))
+    there, here = (
+        np.interp(shared, x[these], force[these]) for these in (rows[np.argsort(x[rows], kind="stable")], order)
+    )
     ratios = (there / np.maximum(here, 1e-12 * force.max())) ** way
     if beyond or shared[0] >= shared[-1] or not np.median(ratios) > 1:
         return _before_half(table, rows)

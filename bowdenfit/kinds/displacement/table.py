@@ -1,15 +1,145 @@
-"""Force at the motor against the displacement of the motor: one load cell and one position, as at catheters and endoscopes."""
+"""Force at the motor against the displacement of the motor, and how the motor moved: its turns and what comes after each."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
+
+import numpy as np
 
 from bowdenfit.description import QuantityValue, Table
 from bowdenfit.display import Part
-from bowdenfit.kinds.displacement.turns import Motion
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Vector
 
+LEAST_SHARE = 0.01  # of all displacements, that the motor must go back for a turn; less is jitter
+
+
 ZERO = "displacement_zero"  # parameter: where the displacement of a run begins
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Turns of the motor, those that others come after first.
+
+    Args:
+        at: Displacement [mm].
+        stroke: +1 where the motor pulled up to it, -1 where it let out; of the start of a run the way it is taken to have come.
+        after: Number of the turn that it comes after; its own where all of the rope slides.
+        run: Number of its run.
+        depth: How many turns must be known before it.
+    """
+
+    at: Vector
+    stroke: Labels
+    after: Labels
+    run: Labels
+    depth: Labels
+
+
+@dataclass(frozen=True, repr=False)
+class Motion(Part):
+    """How the motor moved at each reading.
+
+    Args:
+        stroke: +1 pulling, -1 letting out.
+        after: Number of the turn it comes after.
+        slides: Whether all of the rope is known to slide.
+        first: Whether it belongs to the first stroke of its run, whose start nobody knows.
+        turns: The turns.
+    """
+
+    stroke: Labels
+    after: Labels
+    slides: Flags
+    first: Flags
+    turns: Turns
+
+
+def sliding(stroke: Labels, displacement: Vector, run: Labels) -> Motion:
+    """Readings of which each is known to be taken while all of the rope slides."""
+    n, start = len(stroke), np.zeros(1, dtype=int)
+    turns = Turns(displacement[:1], np.ones(1, dtype=int), start, run[:1], start)
+    return Motion(stroke, np.zeros(n, dtype=int), np.ones(n, dtype=bool), np.zeros(n, dtype=bool), turns)
+
+
+def in_order(displacement: Vector, run: Labels) -> Motion:
+    """Readings in the order in which they were taken, run by run.
+
+    A run starts as if the motor had come to its first displacement the other way, all of the rope sliding. Turns are
+    remembered, and forgotten in pairs once the displacement has passed the one before, as friction between solids has it.
+
+    Args:
+        displacement: Of each reading [mm].
+        run: Number of its run.
+    """
+    n, memory = len(displacement), _Memory()
+    stroke, after, slides, first = (np.zeros(n, dtype=int) for _ in range(4))
+    least = LEAST_SHARE * max(np.ptp(displacement), 1e-300)
+    for number in np.unique(run):
+        rows = np.flatnonzero(run == number)
+        x = displacement[rows]
+        ends = _extremes(x, least)
+        way = 1 if len(ends) < 2 or x[ends[1]] >= x[ends[0]] else -1
+        memory.begin(float(x[0]), -way, int(number))
+        for k, (start, stop) in enumerate(pairwise(ends)):
+            if k:
+                memory.turn(float(x[start]), way, int(number))
+                way = -way
+            for i in range(start if k == 0 else start + 1, stop + 1):
+                memory.pass_by(float(x[i]), way)
+                stroke[rows[i]], slides[rows[i]], first[rows[i]] = way, not memory.open, k == 0
+                after[rows[i]] = memory.open[-1] if memory.open else 0
+    return Motion(stroke, after, slides.astype(bool), first.astype(bool), memory.turns())
+
+
+def _extremes(x: Vector, least: float) -> list[int]:
+    """First and last reading, and those between at which the displacement turned by more than jitter."""
+    ends, far = [0], 0
+    way = 0
+    for i in range(1, len(x)):
+        if way == 0:
+            if abs(x[i] - x[0]) >= least:
+                way, far = (1 if x[i] > x[0] else -1), i
+        elif way * (x[i] - x[far]) >= 0:
+            far = i
+        elif way * (x[far] - x[i]) >= least:
+            ends.append(far)
+            way, far = -way, i
+    return [*ends, len(x) - 1] if len(x) > 1 else [0, 0]
+
+
+class _Memory:
+    """Turns as they come, and which of them are still remembered."""
+
+    def __init__(self) -> None:
+        self.open: list[int] = []
+        self._said: list[tuple[float, int, int, int, int]] = []
+
+    def begin(self, at: float, stroke: int, run: int) -> None:
+        """A run."""
+        self.open = []
+        self._add(at, stroke, run)
+
+    def turn(self, at: float, stroke: int, run: int) -> None:
+        """The motor turns round, having moved one way."""
+        self._add(at, stroke, run)
+
+    def pass_by(self, at: float, way: int) -> None:
+        """The motor moves on to a displacement: what it passes is forgotten."""
+        while len(self.open) > 1 and way * (at - self._said[self.open[-2]][0]) >= 0:
+            self.open = self.open[:-2]
+
+    def _add(self, at: float, stroke: int, run: int) -> None:
+        number = len(self._said)
+        after = self.open[-1] if self.open else number
+        depth = self._said[after][4] + 1 if self.open else 0
+        self._said.append((at, stroke, after, run, depth))
+        self.open.append(number)
+
+    def turns(self) -> Turns:
+        """All of them."""
+        at, *others = zip(*self._said, strict=True)
+        return Turns(np.array(at), *(np.array(values, dtype=int) for values in others))
 
 
 class DisplacementSettings(Table):

@@ -15,14 +15,12 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.load_cells import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.displacement.arrays import angles_of_runs, order_of, readings, turns_by_depth, zero_names
-from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable
-from bowdenfit.kinds.resolve_angles import resolve_angles
+from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_scatter
-from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleTable, StretchTable
+from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
@@ -31,9 +29,57 @@ END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
 _LEAST_GIVE = 1e-9  # of the spring's, below which a rope is as good as one that does not give
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
-
 Values = Mapping[str, Array]
 Data = Mapping[str, Any]
+
+
+def order_of(table: DisplacementTable) -> np.ndarray:
+    """The rows that are used, in order of their runs."""
+    rows = np.flatnonzero(table.used)
+    return rows[np.argsort(table.run[rows], kind="stable")]
+
+
+def readings(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
+    """Arrays of some rows, ordered by run."""
+    run, motion = table.run[rows], table.motion
+    return {
+        "displacement": table.displacement[rows],
+        "stroke": motion.stroke[rows].astype(float),
+        "after": places_of(motion.turns)[motion.after[rows]],
+        "slides": motion.slides[rows],
+        "run": run,
+        "start": np.searchsorted(run, run),
+    }
+
+
+def turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
+    """Turns by depth, each with the place of the one before it among those of lower depth."""
+    place = places_of(turns)
+    at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": place[turns.after], "run": turns.run}
+    return tuple(
+        {name: values[turns.depth == depth] for name, values in at.items()}
+        for depth in range(int(turns.depth.max()) + 1)
+    )
+
+
+def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, np.ndarray]:
+    """Wrap angles of every run, which are those of its first row."""
+    first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
+    own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
+    return row_angles(cable.description, RowConditions(table.route[first], own), angles).data
+
+
+def places_of(turns: Turns) -> np.ndarray:
+    """Place of each turn where they are ordered by depth."""
+    place = np.empty(len(turns.depth), dtype=int)
+    place[np.argsort(turns.depth, kind="stable")] = np.arange(len(turns.depth))
+    return place
+
+
+def zero_names(table: DisplacementTable) -> tuple[str, ...]:
+    """Parameters of the displacement without force, one a run."""
+    n = len(table.run_names)
+    return (ZERO,) if n == 1 else tuple(f"{ZERO}_{i + 1}" for i in range(n))
 
 
 @dataclass(frozen=True)
@@ -121,7 +167,9 @@ class DisplacementTerm:
             more, less = (self.shown(weights, data, exponent, s * weights[DISPLACEMENT_NOISE]) for s in (1.0, -1.0))
             variance = variance + ((more - less) / 2) ** 2
         of_runs = weights[RUN_SCATTER] ** 2 + angle_variance
-        return _Readings(mean, data["force"] - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data["run"])
+        return _Readings(
+            mean, data["force"] - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data["run"]
+        )
 
     def _one_by_one(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Mean and standard deviation of each reading by those before it in its run."""
@@ -148,7 +196,9 @@ class DisplacementTerm:
         mounting, variance = found.mounting
         slope, sd = (jax.lax.stop_gradient(each) for each in (found.slope, jnp.sqrt(found.variance)))
         inside = (found.deviation - slope * mounting[data["run"]]) / sd
-        return jnp.concatenate([law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(found.of_runs + variance))])
+        return jnp.concatenate(
+            [law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(found.of_runs + variance))]
+        )
 
     def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " rows"]:
         """Forces as the bench would give them, each after the readings before it [N]."""
@@ -167,7 +217,9 @@ class DisplacementTerm:
         def effect(at: Values, data: Data) -> Float[Array, " rows"]:
             return self._readings(at, data, at).slope * self.exponents(at, data)[0][data["run"]]
 
-        return np.asarray(jax.jit(effect)(dict(values), self.data))  # one program: primitive by primitive takes ten times it
+        return np.asarray(
+            jax.jit(effect)(dict(values), self.data)
+        )  # one program: primitive by primitive takes ten times it
 
     def observed(self) -> np.ndarray:
         """Measured forces [N]."""
@@ -326,7 +378,9 @@ class DisplacementTerms(TermKind[DisplacementTable]):
         rows = order_of(table)
         angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
         turns, after = table.motion.turns.at, table.motion.after[rows]
-        moved = np.where(table.motion.slides[rows], np.ptp(table.displacement), np.abs(table.displacement[rows] - turns[after]))
+        moved = np.where(
+            table.motion.slides[rows], np.ptp(table.displacement), np.abs(table.displacement[rows] - turns[after])
+        )
         return {AT: table.displacement[rows], SINCE_TURN: moved, WRAP_ANGLE: angles}
 
     @override

@@ -1,25 +1,53 @@
-"""Transmission efficiencies: how they are read, checked and described."""
+"""Transmission efficiencies, output force over input force while pulling: how they are read, checked and described."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from typing_extensions import override
 
 from bowdenfit.description import Description, Finite
+from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.coarse import Coarse, coarse
-from bowdenfit.kinds.copies import copies, places_along, without_runs
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
-from bowdenfit.kinds.friction_table import FrictionTableKind
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Design, PlannedKind, Source, TableFromFiles, efficiencies
-from bowdenfit.kinds.pages import Page, route_cells, route_heading
-from bowdenfit.kinds.plausibility import GAIN_ERROR, beyond
-from bowdenfit.kinds.rows import OwnAngles, RowOrigin, provenance_of, read_own_angles, read_route, shared_columns
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiencies
+from bowdenfit.kinds.plausibility import GAIN_ERROR, Coarse, beyond, coarse, copies, places_along, without_runs
+from bowdenfit.kinds.rows import (
+    OwnAngles,
+    Page,
+    RowOrigin,
+    provenance_of,
+    read_own_angles,
+    read_route,
+    route_cells,
+    route_heading,
+    shared_columns,
+)
+from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent
 
 _FRACTION = 0.01  # as a percentage it is as likely a fraction
 _SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
+
+
+@dataclass(frozen=True, repr=False)
+class EfficiencyTable(Part):
+    """Measured transmission efficiencies.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        efficiency: Output force over input force while pulling [1].
+        sd: Standard deviation where given [1], else 0.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    efficiency: Vector
+    sd: Vector
+    own: OwnAngles
+    origin: RowOrigin
 
 
 class EfficiencyDesign(Design):

@@ -16,14 +16,12 @@ from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
-from bowdenfit.kinds.efficiencies.table import EfficiencyTable
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
-from bowdenfit.kinds.term import Circumstances, TermKind
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.term import Circumstances, TermKind, Truth
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 

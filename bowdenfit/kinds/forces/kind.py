@@ -9,18 +9,35 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.coarse import Coarse, coarse
-from bowdenfit.kinds.copies import Compared, copies, places_along, without_runs
-from bowdenfit.kinds.forces.impossible import check_following, check_gains
+from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
-from bowdenfit.kinds.friction_table import FrictionTableKind
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn, YesNoQuestion
-from bowdenfit.kinds.kind import Design, PlannedKind, Readings, Source, TableFromFiles, efficiencies
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, Stroke, fixed, radians, route_cells, route_heading, signs
-from bowdenfit.kinds.plausibility import SCATTER, beyond, parts
-from bowdenfit.kinds.rows import RUN, STROKE, OwnAngles, RowOrigin
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiencies
+from bowdenfit.kinds.plausibility import (
+    SCATTER,
+    Coarse,
+    Compared,
+    beyond,
+    coarse,
+    copies,
+    parts,
+    places_along,
+    without_runs,
+)
+from bowdenfit.kinds.rows import (
+    STROKE_NAMES,
+    OwnAngles,
+    Page,
+    RowOrigin,
+    Stroke,
+    fixed,
+    radians,
+    route_cells,
+    route_heading,
+    signs,
+)
+from bowdenfit.kinds.table_files import RUN, STROKE, InitQuestions, Source, TableFromFiles, WantedColumn, YesNoQuestion
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent, significant
 
@@ -208,7 +225,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         """Return that wrap angles are of a column that no contact has."""
         known = description.angle_columns
         unknown = next((name for name in design.own_angles if name not in known), None)
-        return f"own_angles.{unknown}: no contact has that column{suggest_name(unknown, known or ['none'])}" if unknown else ""
+        return (
+            f"own_angles.{unknown}: no contact has that column{suggest_name(unknown, known or ['none'])}" if unknown else ""
+        )
 
     @override
     def empty_table(self, design: ForceDesign, description: Description, file: str) -> ForceTable:
@@ -232,7 +251,9 @@ def _warn_of_gains(table: ForceTable, description: Description) -> list[str]:
         return []
     slides = (table.stroke != 0) & (table.input_force > 0) & (table.output_force > 0)
     loss = abs(float(np.mean(np.log(table.input_force[slides] / table.output_force[slides])))) if slides.any() else 0.0
-    wrong = f", coefficients are wrong by {percent(0.01 / loss, 0)}" if loss > _SEEN_LOSS else ", that counts as friction"
+    wrong = (
+        f", coefficients are wrong by {percent(0.01 / loss, 0)}" if loss > _SEEN_LOSS else ", that counts as friction"
+    )
     read = "pulls" if strokes[0] > 0 else "returns"
     return [
         f"only {read} were read, in which load cells that differ in gain look like friction: where they differ by 1 %{wrong}, "

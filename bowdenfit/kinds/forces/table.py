@@ -15,19 +15,20 @@ from bowdenfit.files.columns import Column, Quantity, find_columns, taken_in_pai
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.ends import ENDS, end_column, forces_of
-from bowdenfit.kinds.forces.mountings import each_row_apart, mountings, numbered_anew
-from bowdenfit.kinds.groups import GROUP, NO_GROUP, read_groups
-from bowdenfit.kinds.kind import Source, TableFromFiles
+from bowdenfit.kinds.forces.mountings import GROUP, NO_GROUP, each_row_apart, mountings, numbered_anew, read_groups
 from bowdenfit.kinds.rows import (
+    ENDS,
     OwnAngles,
     RowOrigin,
+    end_column,
+    forces_of,
     provenance_of,
     read_own_angles,
     read_route,
     read_strokes,
     shared_columns,
 )
+from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Labels, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
 

@@ -15,29 +15,31 @@ from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.copies import copies, without_runs
-from bowdenfit.kinds.ends import ENDS, end_column, forces_of
-from bowdenfit.kinds.friction_table import FrictionTableKind
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
-from bowdenfit.kinds.loop.table import LoopTable
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import STROKE_NAMES, Page, Stroke, fixed, in_words, radians, signs
-from bowdenfit.kinds.plausibility import HIGHEST, LOWEST
-from bowdenfit.kinds.preload.table import PreloadTable
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, copies, without_runs
 from bowdenfit.kinds.rows import (
-    STROKE,
+    ENDS,
+    STROKE_NAMES,
     OwnAngles,
+    Page,
     RowOrigin,
+    Stroke,
     check_spelling,
+    end_column,
+    fixed,
+    forces_of,
+    in_words,
     provenance_of,
+    radians,
     read_own_angles,
     read_route,
     read_strokes,
     read_tension,
     shared_columns,
+    signs,
 )
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.table_files import STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.kinds.tables import LoopTable, Measurements, PreloadTable, StretchTable
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, shown
 
@@ -113,7 +115,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         stroke = read_strokes(found, len(table.rows), held="")
         preload = nothing
         if (column := found.get("preload")) is not None:
-            preload = np.array(column.each(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan))
+            preload = np.array(
+                column.each(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan)
+            )
         at, own = read_route(table, found, route), read_own_angles(table, found, contacts)
         table.faults.refuse()
         if not stroke.all():
@@ -126,8 +130,12 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         _check_loss(table, made)
         remarks = []
         if "stroke" not in found:
-            remarks.append(f"{table.file} has no stroke column: every row is taken as moving forward (the motor pulls).")
-        angles = [h for h in table.header if _is_plain_angle(h) and h not in {column.heading for column in found.values()}]
+            remarks.append(
+                f"{table.file} has no stroke column: every row is taken as moving forward (the motor pulls)."
+            )
+        angles = [
+            h for h in table.header if _is_plain_angle(h) and h not in {column.heading for column in found.values()}
+        ]
         if angles:
             remarks.append(
                 f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is left out of "
@@ -139,7 +147,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
     def describe(self, table: LoopTable, description: Description) -> list[str]:
         """Return how many readings of each direction there are, how large, and where their preload comes from."""
         forward = int(np.sum(table.stroke > 0))
-        how = "follows the wrap angle as the stretch model says" if description.preload_follows_stretch else "is constant"
+        how = (
+            "follows the wrap angle as the stretch model says" if description.preload_follows_stretch else "is constant"
+        )
         measured = int(np.isfinite(table.preload).sum())
         own = f"; {measured} rows have their own measured preload" if measured else ""
         return [
@@ -205,7 +215,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
     def file_rows(self, table: LoopTable, description: Description) -> Page:
         """Return headings and rows, of torques where both pulleys' radii are stated."""
         cable, names = description.cable, table.own.names
-        radii = [radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius]
+        radii = [
+            radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius
+        ]
         what, (first, second), digits = ("force_N", (1.0, 1.0), 3) if len(radii) < 2 else ("torque_N_m", radii, 5)
         inputs, outputs = fixed(first * table.input_force, digits), fixed(second * table.output_force, digits)
         rows = [

@@ -16,14 +16,11 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
-from bowdenfit.kinds.loop.table import LoopTable
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleTable, LoopTable
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from

@@ -7,15 +7,11 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind, Source, TableFromFiles
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page, fixed, in_words, radians
+from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import within_factor
-from bowdenfit.kinds.preload.table import PreloadTable, PreloadTableSettings
-from bowdenfit.kinds.rows import RowOrigin, provenance_of, read_angle, read_tension
-from bowdenfit.kinds.stretch.kind import one_angle_warning
-from bowdenfit.kinds.stretch.table import StretchTable
+from bowdenfit.kinds.rows import Page, RowOrigin, fixed, in_words, provenance_of, radians, read_angle, read_tension
+from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.kinds.tables import Measurements, PreloadTable, PreloadTableSettings, StretchTable, one_angle_warning
 from bowdenfit.types import Vector
 from bowdenfit.words import counted
 

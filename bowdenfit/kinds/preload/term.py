@@ -13,9 +13,6 @@ from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import noise_law
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.bounds import first_less, joined, last_less
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -25,10 +22,19 @@ from bowdenfit.kinds.candidate import (
     one_reading_each,
     some_bends,
 )
-from bowdenfit.kinds.independent_readings import IndependentReadings
-from bowdenfit.kinds.preload.table import PreloadTable
 from bowdenfit.kinds.shared_parameters import preload, preload_scale
-from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleTable, PreloadTable
+from bowdenfit.kinds.term import (
+    WRAP_ANGLE,
+    Circumstances,
+    IndependentReadings,
+    Term,
+    TermKind,
+    Truth,
+    first_less,
+    joined,
+    last_less,
+)
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
@@ -120,7 +126,9 @@ class PreloadCandidates(CandidateKind):
     @override
     def candidates(self, at: Situation) -> list[Candidate]:
         table = at.measurements.table(PreloadTable)
-        return [Candidate(self.name, angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+        return (
+            [Candidate(self.name, angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+        )
 
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:

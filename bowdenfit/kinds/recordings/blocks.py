@@ -1,18 +1,42 @@
-"""What each block of a recording is worth to a likelihood: whether it can be used, and how much it says."""
+r"""Blocks of recordings as the likelihood takes them: usable ones, their weights, and arrays of many recordings side by side.
+
+A weight computed from a block's own forces rises with their noise, and with it the log ratio falls or rises, so that the mean
+of a recording would be off by about 1.5 (sd/F)^2 however many blocks it has; see `expected_forces`, which makes the weights
+here too. What noise adds to the mean of a log ratio is taken off, and what it adds to its variance lowers the block's weight:
+to second order, for a force F with normal noise of standard deviation sigma,
+
+.. math:: \operatorname{var} \log F = (\sigma/F)^2 \left(1 + \tfrac{5}{2} (\sigma/F)^2\right).
+
+Noise is that of the recording from block to block (second differences), which neither drift nor friction that changes with
+load or speed enters.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
 from bowdenfit.cable.conditions import LEAST_SHARE
+from bowdenfit.cable.drive import Loop, Rope
+from bowdenfit.description import Description
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, expected_forces
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.preparation.play import white_noise
-from bowdenfit.recordings.recording import Blocks, Recording
-from bowdenfit.types import Vector
+from bowdenfit.recordings.recording import Blocks, Recording, Recordings
+from bowdenfit.types import Labels, Vector
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
 _QUIET = 0.1  # share of the drifts' own spread, up to which noise may be in a drift
 _CORNER = 1  # blocks before and after a turn, over which the force changes as it does there
 _LEAST_KNOWN = 1e-9
 _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
+
+
+MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
+_FREE = ("weight", "worth", "censored", "share", "drift", "restart", "input_noise")
+WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
+_HELD = ("input_force", "likely_force", "output_force", "velocity")
 
 
 def positive(recording: Recording) -> np.ndarray:
@@ -105,3 +129,181 @@ def input_saturated(recording: Recording) -> np.ndarray:
 def restarts(lost: np.ndarray) -> np.ndarray:
     """Blocks after a stretch whose input is not known: where the operator stands there must be read anew."""
     return ~lost & np.append(False, lost[:-1])
+
+
+@dataclass(frozen=True)
+class BlocksUsed:
+    """Blocks of one recording that enter a likelihood.
+
+    Args:
+        used: Their numbers.
+        stroke: +1 sliding toward the motor, -1 sliding back.
+        input_force, output_force: Forces [N].
+        log_ratio: s log(F_in/F_out), without what noise adds to it [1].
+        worth: How many independent readings each counts for [1].
+        tells: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2].
+    """
+
+    used: Labels
+    stroke: Labels
+    input_force: Vector
+    output_force: Vector
+    log_ratio: Vector
+    worth: Vector
+    tells: Vector
+
+
+def sliding_blocks(recording: Recording, description: Description) -> BlocksUsed:
+    """Blocks in which the rope slides, with their log ratio.
+
+    Args:
+        recording: The recording.
+        description: The cable, which says how the noises of its cells compare.
+    """
+    ratio, blocks = description.sensors.noise_ratio, recording.blocks
+    used = np.flatnonzero(recording.strokes.used_sliding & positive(recording))
+    stroke, force_in, force_out = recording.strokes.stroke[used], blocks.input_force[used], blocks.output_force[used]
+    noise = noise_of_output(recording, ratio)
+    group = np.unique(stroke, return_inverse=True)[1]
+    found = expected_forces(force_in, force_out, group, ratio, noise, description.fits_offsets)
+    variance = np.zeros(len(used))
+    for share, force in ((ratio, found.input_force), (1.0, found.output_force)):
+        variance += (share / force) ** 2 * (1 + 2.5 * (share * noise / force) ** 2)
+    log_ratio = stroke * (np.log(force_in / force_out) - found.log_ratio_error)
+    return BlocksUsed(used, stroke, force_in, force_out, log_ratio, worth_of(recording, used), 1 / variance)
+
+
+def noise_of_output(recording: Recording, noise_ratio: float) -> float:
+    """Standard deviation of a block's output force, from block to block, in both cells together [N].
+
+    Args:
+        recording: The recording.
+        noise_ratio: Noise of the input cell over that of the output cell [1].
+    """
+    forces = recording.blocks.output_force, *([recording.blocks.input_force] if noise_ratio else [])
+    return float(np.hypot.reduce([white_noise(force) for force in forces]) / np.hypot(1.0, noise_ratio))
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """Blocks of one recording, joined inside their phases where there are many.
+
+    Args:
+        recording: The recording.
+        starts: First block of each group that is joined.
+    """
+
+    recording: Recording
+    starts: np.ndarray
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """Mean of each group, by samples."""
+        samples = self.recording.blocks.samples
+        return np.add.reduceat(values * samples, self.starts) / np.add.reduceat(samples, self.starts)
+
+    def any_of(self, flags: np.ndarray) -> np.ndarray:
+        """Whether a flag is set in each group."""
+        return np.maximum.reduceat(flags, self.starts)
+
+    def arrays(self, drive: type[Rope | Loop], usable: np.ndarray, censored: bool) -> dict[str, Any]:
+        """What every likelihood of blocks takes of them, but their weight.
+
+        Args:
+            drive: What the recording is of.
+            usable: Blocks that are readings.
+            censored: Whether a saturated output counts as one beyond the end of the range.
+        """
+        blocks = self.recording.blocks
+        force_in, force_out = (
+            np.maximum(self.mean(force), drive.least_share * np.max(np.abs(force)))
+            for force in (blocks.input_force, blocks.output_force)
+        )
+        likely = self.mean(likely_input(blocks.input_force))
+        sliding = self.recording.strokes.contact[self.starts] != 0
+        off = input_saturated(self.recording)
+        lost = self.any_of(off)
+        return self._censored(output_saturated(self.recording) & censored, force_out, lost) | {
+            "input_force": force_in,
+            "likely_force": likely,
+            "input_noise": np.where(sliding, force_in - likely, 0.0),
+            "output_force": force_out,
+            "velocity": self.mean(blocks.velocity),
+            "worth": self._worth(usable & ~off, lost),
+            "restart": restarts(lost),
+            "drift": np.gradient(drive.reading(force_out), self.mean(blocks.time)),
+        }
+
+    def _worth(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
+        """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
+        contact = self.recording.strokes.contact
+        each = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
+        return np.add.reduceat(each * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
+
+    def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
+        """Which end of the range the output lies beyond, and what that says.
+
+        Args:
+            saturated: Blocks whose output is beyond the end of the range, as far as that counts.
+            force_out: Output force of each group [N].
+            lost: Groups whose input is not known.
+        """
+        low, high = self.recording.account.limits
+        end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
+        beyond = self.any_of(saturated) & ~lost
+        each = worth_of(self.recording, np.arange(len(saturated)))
+        share = np.add.reduceat(each * saturated, self.starts)
+        return {"censored": np.where(beyond, end, 0.0), "share": np.where(beyond, share, 0.0)}
+
+
+def group_blocks(recording: Recording) -> Thinned:
+    """The blocks of a recording, in groups where there are more than `MOST_BLOCKS`."""
+    return Thinned(recording, first_of_groups(recording.strokes.contact, MOST_BLOCKS))
+
+
+def side_by_side(
+    recordings: Recordings, parts: Sequence[Mapping[str, Any]], angles: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
+    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
+
+    Args:
+        recordings: The recordings.
+        parts: Arrays of each: those of `Thinned.arrays`, and the weight.
+        angles: `ROW_ARRAYS` of each.
+    """
+    runs = recordings.runs
+    run = np.array([runs.index(r.run) for r in recordings.each])
+    free = {name: beside([p[name] for p in parts], "constant") for name in _FREE}
+    worth = free.pop("worth")
+    counted = free["weight"] > 0
+    readings = np.minimum(worth, 1.0)  # blocks that are joined are one reading, however well it is known
+    ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, readings, 1.0)
+    log_weights = np.where(counted, readings * np.log(ratio), 0.0)
+    arrays = (
+        {name: angles[name] for name in ROW_ARRAYS} | {name: beside([p[name] for p in parts]) for name in _HELD} | free
+    )
+    return arrays | {
+        "run": run,
+        "n": np.bincount(run, readings.sum(axis=0)),
+        "log_weights": np.bincount(run, log_weights.sum(axis=0)),
+    }
+
+
+def beside(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "edge") -> np.ndarray:
+    """Columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
+    longest = max(len(column) for column in columns)
+    return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
+
+
+def first_of_groups(state: np.ndarray, most: int) -> np.ndarray:
+    """First block of each group of blocks that are joined: of one phase only, its first and last block always alone.
+
+    The operator stands where the end of a stroke left it, so the ends must not be averaged away.
+    """
+    factor = -(-len(state) // most)
+    if factor == 1:
+        return np.arange(len(state))
+    phase = np.append(0, np.cumsum(np.diff(state) != 0))
+    first = np.append(True, np.diff(phase) != 0)
+    last = np.append(first[1:], True)
+    place = np.arange(len(state)) - np.maximum.accumulate(np.where(first, np.arange(len(state)), 0))
+    return np.flatnonzero(first | last | (place % factor == 1))

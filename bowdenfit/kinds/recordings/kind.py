@@ -1,5 +1,7 @@
 """Force recordings, sampled while a motor pulls, stops, reverses and returns: how they are checked and described."""
 
+from typing import Any
+
 import numpy as np
 from typing_extensions import override
 
@@ -7,22 +9,127 @@ from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.matching import Quantity
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.copies import NO_NOISE
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import FrictionKind, Readings, Source, TableFromFiles, efficiencies
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.plausibility import FACTOR, SCATTER, beyond
-from bowdenfit.kinds.recordings.table import RecordingsTable, read_recordings, recorded_angles
-from bowdenfit.kinds.recordings.words import recordings_text
+from bowdenfit.kinds.kind import FrictionKind, Readings, efficiencies
+from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, beyond
+from bowdenfit.kinds.recordings.reader import RecordingsTable, read_recordings, recorded_angles
 from bowdenfit.kinds.rows import RowConditions
-from bowdenfit.recordings.recording import PULL, RETURN, Recordings
+from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Recording, Recordings
 from bowdenfit.types import Vector
 from bowdenfit.units import speed_dimension
-from bowdenfit.words import counted
+from bowdenfit.words import counted, filled, listed, narrow_table
+
+_PHASES = (("pulling", PULL), ("returning", RETURN), ("switching", SWITCH))
+_SAMPLES = ("recording", "samples", "used", "left out", "block")
+_HEADS = (*_SAMPLES, "pulling", "switching", "returning", "sliding", "exponent")
+_LOOP_HEADS = (*_SAMPLES, "forward", "between", "back", "moving", "loss", "exponent")
+_NOTE = (
+    "Samples are averaged over blocks; pulling, switching and returning count blocks of each phase, sliding those that "
+    "lie safely inside a pulling or returning phase. The exponent is that of the recording by itself: half the width of "
+    "its hysteresis loop, as a log ratio."
+)
+_LOOP_NOTE = (
+    "Samples are averaged over blocks; forward, between and back count blocks in which the loop moves forward, stands while "
+    "the input force crosses the friction band, and moves back, moving those that lie safely inside a motion. The loss is "
+    "the force that is lost while both sides are taut, 2 x preload x exponent, and the exponent is that of one side, both by "
+    "the recording itself; a dash where it does not tell them."
+)
+
 
 _FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _UNDER_LOAD = 0.2  # of the largest force of a loop, above which it counts as loaded
+
+
+def preparation_pages(recordings: Recordings) -> list[dict[str, Any]]:
+    """Return a dictionary for each recording: its samples, its preparation and its phases, in s, N and Hz."""
+    return [_preparation(recording) for recording in recordings.each]
+
+
+def _preparation(recording: Recording) -> dict[str, Any]:
+    account, strokes = recording.account, recording.strokes
+    phases = {word: int(np.sum(strokes.stroke == sign)) for word, sign in _PHASES}
+    return {
+        "name": recording.name,
+        "file": recording.file,
+        "run": recording.run,
+        "at": recording.route,
+        "samples": account.samples,
+        "counts": dict(account.counts),
+        "rate": account.rate,
+        "bandwidth": account.bandwidth,
+        "block": account.block,
+        "tare": list(account.tare),
+        "delay": account.delay,
+        "delay_sd": account.delay_sd,
+        "noise": list(account.noise),
+        "blocks": phases | {"sliding": int(strokes.used_sliding.sum())},
+        "phases_by_hand": strokes.by_hand,
+        "correlation_time": strokes.correlation * max(account.block, 1 / account.rate),
+        "exponent": strokes.exponent,
+        "center": strokes.center,
+    }
+
+
+def recordings_text(recordings: Recordings) -> list[str]:
+    """What was done to the recordings, line by line."""
+    pages = preparation_pages(recordings)
+    losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.each]
+    rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
+    lines = narrow_table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
+    notes = [
+        _LOOP_NOTE if recordings.loop else _NOTE,
+        *_delay(pages),
+        *_tare(pages),
+        *_by_hand(pages),
+    ]
+    return [*lines, *(line for note in notes for line in filled(note).splitlines())]
+
+
+def _row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
+    counts, blocks = page["counts"], page["blocks"]
+    left_out = [f"{n} {kind}" for kind, n in counts.items() if kind != "used" and n]
+    block = f"{1000 * page['block']:.4g} ms" if page["block"] > 0 else "none"
+    return (
+        page["name"],
+        str(page["samples"]),
+        str(counts["used"]),
+        ", ".join(left_out) or "none",
+        block,
+        *(str(blocks[name]) for name in ("pulling", "switching", "returning", "sliding")),
+        *loss,
+        _or_dash(page["exponent"], ".3f"),
+    )
+
+
+def _or_dash(value: float, digits: str, unit: str = "") -> str:
+    """A number, or a dash where it is not known."""
+    return f"{value:{digits}}{unit}" if np.isfinite(value) else "-"
+
+
+def _delay(pages: list[dict[str, Any]]) -> list[str]:
+    """The delay, once where it is one for all."""
+    said = {}
+    for page in pages:
+        delay, sd = 1000 * page["delay"], 1000 * (page["delay_sd"] if page["delay_sd"] is not None else np.nan)
+        if np.isfinite(sd):
+            said[f"{delay:.1f} ms, give or take {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
+        elif delay:
+            said[f"{delay:.1f} ms (as stated)"] = page["name"]
+    return [f"The output channel was shifted back by a delay of {text}." for text in said]
+
+
+def _tare(pages: list[dict[str, Any]]) -> list[str]:
+    tared = [p for p in pages if any(p["tare"])]
+    if not tared:
+        return []
+    parts = [f"{p['name']} {p['tare'][0]:+.2f} and {p['tare'][1]:+.2f} N" for p in tared]
+    return [f"Tare taken off the input and output force: {listed(parts)}."]
+
+
+def _by_hand(pages: list[dict[str, Any]]) -> list[str]:
+    names = [p["name"] for p in pages if p["phases_by_hand"]]
+    return [f"Phases set by hand in cable.toml: {listed(names)}."] if names else []
 
 
 class RecordingKind(FrictionKind[Recordings]):
@@ -103,7 +210,9 @@ class RecordingKind(FrictionKind[Recordings]):
         if settings is None and description.recording:
             return "[[recording]] needs recordings = {} under [tables], where what they share can be said"
         if settings is not None and not (description.recording or settings.files):
-            return 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
+            return (
+                'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'
+            )
         pages = [settings.prepare] if settings is not None else []
         pages += [entry.prepare for entry in description.recording if entry.prepare is not None]
         return next((why for page in pages if (why := _why_impossible(page))), "")
@@ -115,7 +224,9 @@ class RecordingKind(FrictionKind[Recordings]):
         quantities: list[Stated] = []
         for entry in description.recording:
             where = f"recording {entry.file!r}"
-            quantities += [(f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()]
+            quantities += [
+                (f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()
+            ]
             if entry.velocity is not None:
                 quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
             if entry.prepare is not None:

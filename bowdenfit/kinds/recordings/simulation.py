@@ -17,9 +17,9 @@ from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.recordings.side_by_side import beside
-from bowdenfit.kinds.recordings.table import recorded_angles
+from bowdenfit.kinds.recordings.blocks import beside
+from bowdenfit.kinds.recordings.reader import recorded_angles
+from bowdenfit.kinds.term import Truth
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import cable_of, find_strokes

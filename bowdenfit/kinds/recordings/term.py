@@ -14,29 +14,33 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
+    BlocksUsed,
     drift_of,
     input_saturated,
     inside_phase,
     likely_forces,
     positive,
     restarts,
+    sliding_blocks,
     standing_share,
     worth_of,
 )
-from bowdenfit.kinds.recordings.loops import LoopRecordingsTerm, loop_recordings_term
+from bowdenfit.kinds.recordings.reader import RecordingsTable, recorded_angles
 from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
-from bowdenfit.kinds.recordings.sliding import BlocksUsed, sliding_blocks
-from bowdenfit.kinds.recordings.table import RecordingsTable, recorded_angles
-from bowdenfit.kinds.recordings.whole import WholeRecordingsTerm, pad_recordings
+from bowdenfit.kinds.recordings.whole_recordings import (
+    LoopRecordingsTerm,
+    WholeRecordingsTerm,
+    loop_recordings_term,
+    pad_recordings,
+)
 from bowdenfit.kinds.row_angles import row_angles
 from bowdenfit.kinds.runs import RunsTerm, run_sums
 from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
-from bowdenfit.kinds.term import Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, play
@@ -106,7 +110,9 @@ def _needs_reversal(recording: Recording) -> None:
         )
 
 
-_MOSTLY = 0.9  # share of the blocks that are readings of a rope under tension, from which tension is not what is missing
+_MOSTLY = (
+    0.9  # share of the blocks that are readings of a rope under tension, from which tension is not what is missing
+)
 _NO_TENSION = (
     "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
     "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"
@@ -206,9 +212,7 @@ class RecordingTerms(TermKind[Recordings]):
         return drawn_recordings(table, truth)
 
     @override
-    def with_readings(
-        self, description: Description, table: Recordings, drawn: Mapping[str, np.ndarray]
-    ) -> Recordings:
+    def with_readings(self, description: Description, table: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:
         return recorded_again(description, table, drawn)
 
     @override
@@ -229,7 +233,9 @@ class RecordingTerms(TermKind[Recordings]):
         if readings != RECORDED:
             return super().why_events_differ(readings, descriptions)
         if len({table.likelihood for d in descriptions.values() if (table := d.table(RecordingsTable))}) > 1:
-            return "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
+            return (
+                "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
+            )
         return (
             "the fits do not count the same blocks of them, because they prepare them differently, or because friction that "
             'depends on load or speed takes another way through whole recordings; likelihood = "runs" counts them alike'

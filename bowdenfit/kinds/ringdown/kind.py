@@ -1,21 +1,168 @@
-"""Ring-down, in which the released joint swings against the rope: how it is checked and described."""
+"""Ring-down: the released joint swings against the rope, the motor held; how it is read, checked and described."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from typing_extensions import override
 
-from bowdenfit.description import Description
+from bowdenfit.description import Description, Table
 from bowdenfit.description.file import Stated
+from bowdenfit.description.values import QuantityValue
+from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.init_questions import InitQuestions, WantedColumn
-from bowdenfit.kinds.kind import Kind, Readings, Source, TableFromFiles
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.pages import Page
-from bowdenfit.kinds.ringdown.table import RingDownSettings, RingDownTable, read_ring_down
-from bowdenfit.kinds.rows import RUN
+from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.csv_table import RawTable
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.kind import Kind, Readings
+from bowdenfit.kinds.rows import Page, RowOrigin, provenance_of
+from bowdenfit.kinds.table_files import RUN, InitQuestions, Source, TableFromFiles, WantedColumn
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.types import Labels, Vector
 from bowdenfit.words import counted
+
+_FEWEST_ROWS, _FEWEST_HALF_SWINGS, _FEWEST_A_HALF_SWING = 20, 3, 4
+_STILL = 0.1  # of the largest deflection, within which a bar is taken to have come to rest
+_UNUSED = ("position", "velocity")  # columns that such a table may have and that nothing reads
+
+
+class RingDownSettings(Table):
+    """The table of a ring-down, and the inertia of what swings where that is known."""
+
+    inertia: QuantityValue | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class RingDownTable(Part):
+    """What was read of a bar that swings against the rope, the motor held.
+
+    Args:
+        time: Since the first row of the run [s].
+        reading: Angle [rad], or torque in the rope [N m].
+        is_torque: Which of the two.
+        run: Number of the run of each row.
+        added: Inertia that was added to the bar in each run [kg m^2].
+        inertia: That of the bar, as stated [kg m^2]; NaN where it is not.
+        inertia_sd: Its standard deviation; NaN where it is not stated, or is none.
+        origin: Where each row was read.
+    """
+
+    time: Vector
+    reading: Vector
+    is_torque: bool
+    run: Labels
+    added: Float[np.ndarray, " runs"]
+    inertia: float
+    inertia_sd: float
+    origin: RowOrigin
+
+    def half_swings(self, run: int) -> tuple[int, float]:
+        """How many half swings of a run are seen, and how long one takes [s]."""
+        mine = self.run == run
+        time, reading = self.time[mine], self.reading[mine]
+        away = reading - np.median(reading[-max(len(reading) // 10, 3) :])
+        large = np.abs(away) > _STILL * np.max(np.abs(away))
+        at, left = time[large], away[large]
+        turned = np.flatnonzero(np.diff(np.sign(left)) != 0)
+        if len(turned) < 2:
+            return len(turned), float("nan")
+        share = left[turned] / (left[turned] - left[turned + 1])
+        crossings = at[turned] + share * (at[turned + 1] - at[turned])
+        first = crossings[: max(2, (len(crossings) + 1) // 2)]  # later ones are more by noise and friction
+        return len(turned), float(np.polyfit(np.arange(len(first)), first, 1)[0])
+
+
+def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
+    """Read a table of one ring-down, or of several by the column `run`; the first row of each is its release.
+
+    Args:
+        source: Where it is.
+
+    Raises:
+        DatasetError: See `read_table` and `find_columns`; or time does not grow, a run has several added inertias, or too
+            little is seen of it.
+    """
+    path = source.file
+    table = read_table(path)
+    ends = Quantity("angle", "angle"), Quantity("torque", "torque")
+    others = Quantity("run", "text"), Quantity("added_inertia", "inertia")
+    found = find_columns(table, (Quantity("time", "time"), *ends, *others), source.columns, _UNUSED)
+    if ("angle" in found) == ("torque" in found):
+        raise DatasetError(
+            f"{table.file} needs the angle of the joint (angle_deg), or the torque in the rope (torque_N_m), and has "
+            f"{'both; leave one of the two columns out' if 'angle' in found else 'neither'}."
+        )
+    clock = require(table, found, "time", "time_s")
+    time = np.asarray(clock.numbers())
+    is_torque = "torque" in found
+    reading = np.asarray(found["torque" if is_torque else "angle"].numbers()) / (1000.0 if is_torque else 1.0)
+    run, names = _runs(found, len(table.rows))
+    added = np.asarray(found["added_inertia"].numbers()) if "added_inertia" in found else np.zeros(len(time))
+    table.faults.refuse()
+    each = [_one_run(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
+    since = time - np.array([start for start, _ in each])[run]
+    stated, inertia, sd = source.settings.inertia, np.nan, np.nan
+    if stated is not None:
+        inertia, sd = stated.to("inertia"), stated.sd_to("inertia") or np.nan
+    more = np.array([more for _, more in each])
+    made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, provenance_of(table))
+    for i, name in enumerate(names):
+        _check_swings(table, name, made, i)
+    return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
+
+
+def _runs(found: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
+    if "run" not in found:
+        return np.zeros(n, dtype=int), ("",)
+    texts = [cell.text.strip() for cell in found["run"].cells]
+    names = tuple(dict.fromkeys(texts))
+    return np.array([names.index(text) for text in texts]), names
+
+
+def _one_run(clock: Column, file: str, name: str, mine: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
+    """Time of the release and added inertia of a run."""
+    called, rows = (f"{file}, run {name!r}" if name else file), np.flatnonzero(mine)
+    back = np.flatnonzero(np.diff(time[rows]) <= 0)
+    if len(back):
+        raise clock.cells[rows[back[0] + 1]].refuse(
+            f"time does not grow here, {time[rows[back[0] + 1]]:g} s after {time[rows[back[0]]]:g} s; sort the rows by time, "
+            "and give each ring-down a name of its own in a column run."
+        )
+    if np.ptp(added[mine]) > 0:
+        raise DatasetError(
+            f"{called} has several added inertias; give each ring-down a name of its own in a column run."
+        )
+    if np.any(added[mine] < 0):
+        words = f"the added inertia {added[rows[0]]:g} kg m^2 is negative; write what was added to the joint"
+        raise DatasetError(f"{called}: {words}.")
+    return float(time[rows[0]]), float(added[rows[0]])
+
+
+def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> None:
+    """Refuse a run of which too little is seen to tell damping from friction."""
+    called, rows = (f"{table.file}, run {name!r}" if name else table.file), int(np.sum(made.run == run))
+    reading = made.reading[made.run == run]
+    if rows < _FEWEST_ROWS or np.ptp(reading) == 0:
+        seen = "nothing changes" if rows >= _FEWEST_ROWS else f"there are {rows}"
+        raise DatasetError(
+            f"{called}: a ring-down needs at least {_FEWEST_ROWS} rows in which the joint swings, and here {seen}; record "
+            "from the release on, at 1 kHz or so."
+        )
+    seen_half_swings, half = made.half_swings(run)
+    if seen_half_swings < _FEWEST_HALF_SWINGS:
+        raise DatasetError(
+            f"{called}: the joint turns round {seen_half_swings} times before it stands still, and fewer than "
+            f"{_FEWEST_HALF_SWINGS} do not tell damping from friction; pull it further before the release, or add inertia to "
+            "it (column added_inertia)."
+        )
+    step = float(np.median(np.diff(made.time[made.run == run])))
+    if half < _FEWEST_A_HALF_SWING * step:
+        raise DatasetError(
+            f"{called}: a half swing takes {1000 * half:.3g} ms, and rows are {1000 * step:.3g} ms apart; record at least "
+            f"{_FEWEST_A_HALF_SWING} rows a half swing."
+        )
 
 
 class RingDownKind(Kind[RingDownTable]):
@@ -25,7 +172,9 @@ class RingDownKind(Kind[RingDownTable]):
     table = RingDownTable
     settings = RingDownSettings
     readings = (
-        Readings("ringdown", "ringdown", "readings of the ring-down", "the reading at {}", "Angle (rad) or torque (N m)"),
+        Readings(
+            "ringdown", "ringdown", "readings of the ring-down", "the reading at {}", "Angle (rad) or torque (N m)"
+        ),
     )
     methods_sentence = (
         "The joint, released from rest with the motor held, was a mass on a spring with viscous damping and dry friction, "

@@ -12,11 +12,9 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.independent_readings import IndependentReadings
-from bowdenfit.kinds.ringdown.table import RingDownTable
-from bowdenfit.kinds.term import Circumstances, Term, TermKind
+from bowdenfit.kinds.ringdown.kind import RingDownTable
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.term import Circumstances, IndependentReadings, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.physics.ring_down import ring_down
@@ -25,8 +23,15 @@ INERTIA, STIFFNESS, DAMPING, FRICTION = "ring_inertia", "ring_stiffness", "rope_
 NOISE = "sigma_ringdown"
 _LOG_SD = 0.5  # of inertia and stiffness about what period and added inertia say
 _TIMES = 1.5  # what damping, or friction, would be if it alone stopped the joint
-_NOISE_SHARE, _REST_SHARE = 0.005, 0.1  # of the first deflection: as of an encoder of 2000 counts a turn; zero of a sensor
-_STARTS = (-1.5, 0.0, 1.5)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
+_NOISE_SHARE, _REST_SHARE = (
+    0.005,
+    0.1,
+)  # of the first deflection: as of an encoder of 2000 counts a turn; zero of a sensor
+_STARTS = (
+    -1.5,
+    0.0,
+    1.5,
+)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
 _LEAST = 1e-9  # of a first look, which a positive prior must hold
 _LARGE = 0.15  # of the first swing, above which one counts; smaller ones are more and more noise
 _LEAST_DECAY, _MOST_DECAY = 0.05, 0.999  # decay of a half swing

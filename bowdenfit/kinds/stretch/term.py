@@ -11,8 +11,6 @@ from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, STRETCH_ZERO, spread_matrix
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.bench import Truth
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,
@@ -23,10 +21,9 @@ from bowdenfit.kinds.candidate import (
     some_bends,
     some_loads,
 )
-from bowdenfit.kinds.independent_readings import IndependentReadings
 from bowdenfit.kinds.shared_parameters import rope
-from bowdenfit.kinds.stretch.table import StretchTable
-from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind
+from bowdenfit.kinds.tables import AngleTable, StretchTable
+from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, IndependentReadings, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, Scale
 from bowdenfit.words import significant
@@ -91,7 +88,11 @@ class StretchCandidates(CandidateKind):
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
         load, bend = (np.array(v) for v in ([c.load for c in candidates], [sum(c.angles) for c in candidates]))
-        up, alone, (_, _, origin) = np.zeros(len(candidates), dtype=bool), np.arange(len(candidates)), at.rows(candidates)
+        up, alone, (_, _, origin) = (
+            np.zeros(len(candidates), dtype=bool),
+            np.arange(len(candidates)),
+            at.rows(candidates),
+        )
         table = StretchTable(load, bend, 0.01 * load, up, load, alone, tuple(str(i) for i in alone), origin)
         return one_reading_each(stretch_term(at.cable, table))
 

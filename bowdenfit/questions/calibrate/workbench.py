@@ -17,8 +17,8 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.scalar_priors import z_at
-from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, drawn_tables, slipped
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.terms import Readings, drawn_readings, drawn_tables, slipped
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.acceptable_tables import refusal
 from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of

@@ -73,35 +73,35 @@ def data(fit: Record) -> tuple[CheckedTable, ...] | None:
     """Every table; None without draws."""
     from bowdenfit.questions.check.answer import checks_of
 
-    checks = checks_of(fit)
-    return (checked_tables(checks) or None) if checks is not None else None
+    found = checks_of(fit)
+    return (checked_tables(found) or None) if found is not None else None
 
 
-def checked_tables(checks: Checks) -> tuple[CheckedTable, ...]:
+def checked_tables(found: Checks) -> tuple[CheckedTable, ...]:
     """The readings of each table as they are shown."""
-    return tuple(_checked(t, [r.outlier for r in checks.readings if r.table == t.table]) for t in checks.tables)
+    return tuple(_checked(t, [r.outlier for r in found.readings if r.table == t.table]) for t in found.tables)
 
 
 def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
     from bowdenfit.kinds import readings_called
 
-    uniformity, off, low, high = table.uniformity, *[np.zeros(0)] * 3
-    if uniformity is not None:
-        off, low, high = (part - uniformity.at for part in (uniformity.share, uniformity.low, uniformity.high))
+    found, off, low, high = table.uniformity, *[np.zeros(0)] * 3
+    if found is not None:
+        off, low, high = (part - found.at for part in (found.share, found.low, found.high))
     return CheckedTable(
         readings_called(table.table).words,
         table.z_score,
-        dict(list(table.positions.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
-        table.positions.group,
-        table.positions.back,
-        table.influential,
+        dict(list(table.places.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
+        table.places.group,
+        table.places.back,
+        table.decisive,
         np.array(outlier),
         table.labels,
-        uniformity.at if uniformity else off,
+        found.at if found else off,
         off,
         low,
         high,
-        uniformity.probability if uniformity else float("nan"),
+        found.probability if found else float("nan"),
     )
 
 
@@ -156,22 +156,22 @@ def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     groups = list(dict.fromkeys(table.group))
     for i, group in enumerate(groups):
-        in_group = np.array([g == group for g in table.group])
+        mine = np.array([g == group for g in table.group])
         color, marker = (SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) if len(groups) > 1 else (BLACK, "o")
         name = group.replace("_", " ") if group else "Reading"
         for back in (False, True):
-            here = in_group & (table.back == back)
+            here = mine & (table.back == back)
             if here.any():
                 words = BACK if back else name
                 fill = "white" if back else color
                 axes.plot(
                     numbers[here], z[here], marker, color=color, markerfacecolor=fill, markersize=3.6, label=words
                 )
-    influential = table.decisive & np.isfinite(z)
-    if influential.any():
+    lean = table.decisive & np.isfinite(z)
+    if lean.any():
         axes.plot(
-            numbers[influential], z[influential], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5,
-            markeredgewidth=0.9, label="Influential: the fit would change without it",
+            numbers[lean], z[lean], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5, markeredgewidth=0.9,
+            label="The fit leans on it",
         )  # fmt: skip
     if np.all(numbers == np.round(numbers)):  # as of runs and groups, between which there is nothing
         axes.locator_params(axis="x", integer=True)

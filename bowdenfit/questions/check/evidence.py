@@ -14,7 +14,7 @@ from bowdenfit.inference.predictive_checks import (
 )
 from bowdenfit.inference.prior_sensitivity import RescaledPrior, Sensitivity, compute_sensitivities
 
-_MIN_READINGS = 8  # of a table, below which its distribution cannot be judged
+_LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
 _STREAM = 5  # of the fit's random numbers
 
 
@@ -35,7 +35,7 @@ class TableDraws:
 
 
 @dataclass(frozen=True)
-class CheckInputs:
+class Evidence:
     """What checks are worked out from.
 
     Args:
@@ -60,7 +60,7 @@ class CheckInputs:
 
 
 @dataclass(frozen=True)
-class TableLoo:
+class TableWithoutEach:
     """Readings of one table, each predicted from everything else.
 
     Args:
@@ -70,12 +70,12 @@ class TableLoo:
     """
 
     predicted: LooPredictive
-    pit: np.ndarray
-    uniformity: Uniformity | None
+    placed: np.ndarray
+    uniform: Uniformity | None
 
 
 @dataclass(frozen=True)
-class CheckFindings:
+class Findings:
     """What was worked out.
 
     Args:
@@ -83,24 +83,24 @@ class CheckFindings:
         sensitivities: Of quantities that vary.
     """
 
-    tables: tuple[TableLoo, ...]
+    tables: tuple[TableWithoutEach, ...]
     sensitivities: tuple[Sensitivity, ...]
 
 
-def compute_findings(inputs: CheckInputs) -> CheckFindings:
+def work_out(evidence: Evidence) -> Findings:
     """Predictions of readings without themselves, and weight of the priors."""
-    generator = np.random.default_rng([inputs.seed, _STREAM])
-    tables = tuple(_leave_one_out(table, inputs, generator) for table in inputs.tables)
+    generator = np.random.default_rng([evidence.seed, _STREAM])
+    tables = tuple(_without_each(table, evidence, generator) for table in evidence.tables)
     varying = {
-        name: draws for name, draws in inputs.quantities.items() if np.ptp(draws) > 0
+        name: draws for name, draws in evidence.quantities.items() if np.ptp(draws) > 0
     }  # or an end in all of them
-    prior_sensitivities = compute_sensitivities(varying, inputs.z, inputs.total, inputs.priors) if varying else ()
-    return CheckFindings(tables, prior_sensitivities)
+    found = compute_sensitivities(varying, evidence.z, evidence.total, evidence.priors) if varying else ()
+    return Findings(tables, found)
 
 
-def _leave_one_out(table: TableDraws, inputs: CheckInputs, generator: np.random.Generator) -> TableLoo:
-    draws, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
-    predicted = predict_left_out(*draws, *readings, inputs.n_effective)
-    pit = draw_randomized_pit(predicted, generator)
-    enough = len(table.reading) >= _MIN_READINGS
-    return TableLoo(predicted, pit, check_uniformity(pit, inputs.probability) if enough else None)
+def _without_each(table: TableDraws, evidence: Evidence, generator: np.random.Generator) -> TableWithoutEach:
+    drawn, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
+    predicted = predict_left_out(*drawn, *readings, evidence.n_effective)
+    placed = draw_randomized_pit(predicted, generator)
+    judged = len(table.reading) >= _LEAST_READINGS
+    return TableWithoutEach(predicted, placed, check_uniformity(placed, evidence.probability) if judged else None)

@@ -8,12 +8,11 @@ from bowdenfit.inference.departure import FALSE_ALARM
 from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import build_model
 
 
-def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
+def follows(dataset: Dataset, number: int, family: str) -> bool:
     """Whether it does.
 
     Args:
@@ -29,6 +28,6 @@ def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
     table = dataset.measurements.table(AngleTable)
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
-        fit = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
-    departures = [each for each in fit.departures if each.group == angle.column]
-    return bool(departures) and all(each.p_value >= FALSE_ALARM for each in departures)
+        found = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
+    mine = [each for each in found.departures if each.group == angle.column]
+    return bool(mine) and all(each.p_value >= FALSE_ALARM for each in mine)

@@ -78,15 +78,15 @@ def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:
         seed: Seed of the draws from the priors.
     """
     model = build_model(dataset)
-    draws = _draw_from_priors(model, np.random.default_rng(seed).standard_normal((_DRAWS, model.space.size)), seed)
-    tables = tuple(_prior_table(dataset, term, draws["readings"][term.name]) for term in model.terms if term.labels)
+    drawn = _drawn(model, np.random.default_rng(seed).standard_normal((_DRAWS, model.space.size)), seed)
+    tables = tuple(_table(dataset, term, drawn["readings"][term.name]) for term in model.terms if term.labels)
     name, route = dataset.description.name, dataset.description.route
     if route is None:
         return PriorPredictive(name, tables)
-    return PriorPredictive(name, tables, route.label, route_grid(model), 100 * _quantiles(draws["efficiency"]))
+    return PriorPredictive(name, tables, route.label, route_grid(model), 100 * _quantiles(drawn["efficiency"]))
 
 
-def _draw_from_priors(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
+def _drawn(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
     """Readings of every table, and efficiencies along the route, of every draw (rows)."""
     key, data = jax.random.key(seed), LogDensity(model).data
     route = None if model.description.route is None else jnp.asarray(route_grid(model))
@@ -108,15 +108,15 @@ def _quantiles(draws: np.ndarray) -> np.ndarray:
     return np.nanquantile(np.where(np.isfinite(draws), draws, np.nan), QUANTILES, axis=0)
 
 
-def _prior_table(dataset: Dataset, term: Term, draws: np.ndarray) -> PriorTable:
+def _table(dataset: Dataset, term: Term, drawn: np.ndarray) -> PriorTable:
     """One table's readings beside their quantiles; a reading that is only a bound is outside where it is too low for them."""
-    naming = readings_called(term.name)
-    scale, (reading, at_most) = naming.shown_scale, readings_of(term)
-    quantiles, reading = scale * _quantiles(draws), scale * reading
+    called = readings_called(term.name)
+    scale, (reading, at_most) = called.shown_scale, readings_of(term)
+    quantiles, reading = scale * _quantiles(drawn), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
-    positions = places_of(dataset.description, dataset.measurements, term)
-    label, numbers = next(iter(positions.numbers.items()))
+    places = places_of(dataset.description, dataset.measurements, term)
+    place, numbers = next(iter(places.numbers.items()))
     return PriorTable(
-        naming.words, naming.axis, numbers, label, positions.group,
+        called.words, called.axis, numbers, place, places.group,
         term.labels, np.where(at_most, np.nan, reading), quantiles, outside,
     )  # fmt: skip

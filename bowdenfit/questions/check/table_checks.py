@@ -10,9 +10,7 @@ from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.places import Places
 
-_MIN_DEGREES_OF_FREEDOM = (
-    5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
-)
+_LEAST_FREEDOM = 5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
 FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 
 
@@ -45,15 +43,15 @@ class CheckedReading(Part):
     q95: float
     z: float
     probability: float
-    p_value: float
+    chance: float
     pareto_k: float
     inside: bool
     outlier: bool
-    influential: bool
+    decisive: bool
 
     JSON: ClassVar = (
-        "table", "label", "unit", "at_most?", "measured?", "expected", "sd", "q05", "q95", "z", "probability",
-        ("chance", "p_value"), "pareto_k", "inside", "outlier", ("decisive", "influential"),
+        "table", "label", "unit", "at_most?", "measured?", "expected", "sd", "q05", "q95", "z", "probability", "chance",
+        "pareto_k", "inside", "outlier", "decisive",
     )  # fmt: skip
 
     @property
@@ -90,19 +88,12 @@ class TableChecks(Part):
     reading: np.ndarray
     at_most: np.ndarray
     predicted: LooPredictive
-    positions: Places
-    pit: np.ndarray
+    places: Places
+    probability: np.ndarray
     uniformity: Uniformity | None
     refitted: np.ndarray
 
-    JSON: ClassVar = (
-        "table",
-        ("readings", "measured"),
-        "in_interval",
-        "bounds",
-        ("uniform", "is_uniform"),
-        ("fault", "misfit"),
-    )
+    JSON: ClassVar = ("table", ("readings", "measured"), "in_interval", "bounds", "uniform", "fault")
 
     @property
     def z_score(self) -> np.ndarray:
@@ -113,12 +104,12 @@ class TableChecks(Part):
         return np.where(self.at_most, np.nan, z)
 
     @property
-    def influential(self) -> np.ndarray:
+    def decisive(self) -> np.ndarray:
         """Whether the fit leans on a reading so much that weights cannot leave it out."""
         return ~(self.predicted.pareto_k <= RELIABLE_K)
 
     @property
-    def p_values(self) -> np.ndarray:
+    def chance(self) -> np.ndarray:
         """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were Student-t.
 
         Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide. The
@@ -127,28 +118,28 @@ class TableChecks(Part):
         """
         from scipy.special import stdtr
 
-        dof = max(self.measured - 2, _MIN_DEGREES_OF_FREEDOM)
-        t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(dof / (dof - 2))  # z is in sds of the prediction
-        unreliable = self.influential & ~self.refitted
-        return np.where(unreliable, np.minimum(2 * stdtr(dof, -t), self.predicted.tail), self.predicted.tail)
+        freedom = max(self.measured - 2, _LEAST_FREEDOM)
+        t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(freedom / (freedom - 2))  # z is in sds of the prediction
+        failed = self.decisive & ~self.refitted
+        return np.where(failed, np.minimum(2 * stdtr(freedom, -t), self.predicted.tail), self.predicted.tail)
 
-    def readings(self, n_total: int) -> list[CheckedReading]:
+    def readings(self, among: int) -> list[CheckedReading]:
         """One by one.
 
         Args:
             among: Number of readings of all tables, of which the farthest counts as an outlier.
         """
-        readings, p = [], self.predicted
-        z, p_values, influential = self.z_score, self.p_values, self.influential
+        found, p = [], self.predicted
+        z, chance, decisive = self.z_score, self.chance, self.decisive
         for i, (label, reading, bound) in enumerate(zip(self.labels, self.reading, self.at_most, strict=True)):
-            readings.append(
+            found.append(
                 CheckedReading(
                     self.table, label, self.unit, reading, bool(bound),
-                    p.median[i], p.sd[i], p.q05[i], p.q95[i], z[i], self.pit[i], p_values[i], p.pareto_k[i],
-                    bool(self.positions.inside[i]), bool(p_values[i] * n_total < FALSE_ALARM), bool(influential[i]),
+                    p.median[i], p.sd[i], p.q05[i], p.q95[i], z[i], self.probability[i], chance[i], p.pareto_k[i],
+                    bool(self.places.inside[i]), bool(chance[i] * among < FALSE_ALARM), bool(decisive[i]),
                 )
             )  # fmt: skip
-        return readings
+        return found
 
     @property
     def measured(self) -> int:
@@ -167,11 +158,11 @@ class TableChecks(Part):
         return int(np.sum(inside & ~self.at_most))
 
     @property
-    def is_uniform(self) -> bool | None:
+    def uniform(self) -> bool | None:
         """Whether the readings scatter as predicted; None of few."""
         return None if self.uniformity is None else self.uniformity.holds
 
     @property
-    def misfit(self) -> str:
+    def fault(self) -> str:
         """How else they scatter, in words; empty if they do not."""
         return "" if self.uniformity is None else self.uniformity.fault

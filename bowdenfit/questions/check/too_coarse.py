@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.kinds import each_table, kind_of
-from bowdenfit.kinds.coarse import Coarse
+from bowdenfit.kinds.plausibility import Coarse
 from bowdenfit.kinds.term import Term
 from bowdenfit.results.record import Record
 from bowdenfit.words import percent
@@ -11,7 +11,7 @@ from bowdenfit.words import percent
 _SHARE = 0.5  # of what the last digit leaves open, below which an interval is too narrow
 
 
-def describe_coarse_readings(fit: Record) -> tuple[str, ...]:
+def too_coarse(fit: Record) -> tuple[str, ...]:
     """Tables whose repeated readings are alike to the last digit, where the fit claims to know more than that digit does.
 
     The average of independent errors of rounding in so many different readings, spread over the coefficients, is what the fit
@@ -20,16 +20,16 @@ def describe_coarse_readings(fit: Record) -> tuple[str, ...]:
     if fit.sampled is None:
         return ()
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
-    sentences = []
+    told = []
     for kind, table in each_table(fit.dataset.measurements):
-        coarse = kind.coarse_readings(table)
+        found = kind.coarse_readings(table)
         terms = [term for term in fit.model.terms if kind_of(term.name) is kind and term.name in fit.posterior.expected]
-        if coarse is None or not terms:
+        if found is None or not terms:
             continue
-        left_open = coarse.log_sd * np.sqrt(min(coefficients / coarse.different, 1.0))
+        left_open = found.log_sd * np.sqrt(min(coefficients / found.different, 1.0))
         if all(_log_sd(fit, term) < _SHARE * left_open for term in terms):
-            sentences.append(_coarse_sentence(coarse, terms[0]))
-    return tuple(sentences)
+            told.append(_sentence(found, terms[0]))
+    return tuple(told)
 
 
 def _log_sd(fit: Record, term: Term) -> float:
@@ -40,16 +40,16 @@ def _log_sd(fit: Record, term: Term) -> float:
     return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
 
 
-def _coarse_sentence(coarse: Coarse, term: Term) -> str:
+def _sentence(found: Coarse, term: Term) -> str:
     noise = getattr(term, "reading_noise", "")
     stated = (
-        f"[prior.{noise}] fixed = {coarse.sd:.2g} in cable.toml"
+        f"[prior.{noise}] fixed = {found.sd:.2g} in cable.toml"
         if noise
-        else f"a column efficiency_sd with {coarse.sd:.2g}"
+        else f"a column efficiency_sd with {found.sd:.2g}"
     )
     return (
-        f"Whatever was read more than once in {coarse.file} is alike to the last digit, {coarse.last_digit}, and does not show "
+        f"Whatever was read more than once in {found.file} is alike to the last digit, {found.last_digit}, and does not show "
         "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
-        f"{percent(np.sqrt(3) * coarse.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
+        f"{percent(np.sqrt(3) * found.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
         f"it may be off: {stated}."
     )

@@ -14,7 +14,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, StoreError
 from bowdenfit.files.naming import parse_sources
 from bowdenfit.inference.batch.pieces import ShapedDataset, input_hash, shape_dataset
 from bowdenfit.inputs import refuse_special
-from bowdenfit.kinds.settings import load_description
+from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.questions.fleet.answer import FailedInspection
 from bowdenfit.questions.fleet.inspections import Inspection
 from bowdenfit.reading import Reading, changed_settings, read

@@ -67,7 +67,7 @@ def angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
 
 
 def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
-    from bowdenfit.kinds.angles.table import AngleTable
+    from bowdenfit.kinds.tables import AngleTable
 
     table, route = fit.dataset.measurements.table(AngleTable), fit.dataset.description.route
     assert table is not None and route is not None  # a curve has both

@@ -5,7 +5,7 @@ import numpy as np
 from bowdenfit.errors import UsageError
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Situation
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
 from bowdenfit.results.record import Record

@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.display import Several
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.next_run import typical_run
+from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import (
     LEAST_SHARE,

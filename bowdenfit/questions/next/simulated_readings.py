@@ -10,7 +10,7 @@ from jax import Array
 
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
 from bowdenfit.questions.next.candidates import situation_of

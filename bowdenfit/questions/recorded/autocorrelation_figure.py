@@ -43,15 +43,15 @@ class Autocorrelation:
 
 def data(fit: Record) -> tuple[Autocorrelation, ...] | None:
     """Every recording whose deviations were correlated with each other; None without any."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
+    from bowdenfit.questions.recorded.traces import traces
 
-    autocorrelations = []
-    for trace in trace_recordings(fit):
+    found = []
+    for trace in traces(fit):
         correlation = autocorrelation(trace.deviation)
         if len(correlation) > 1:
             lag = float(np.median(np.diff(trace.time))) * np.arange(len(correlation))
-            autocorrelations.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
-    return tuple(autocorrelations) or None
+            found.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
+    return tuple(found) or None
 
 
 def autocorrelation(deviation: np.ndarray) -> np.ndarray:

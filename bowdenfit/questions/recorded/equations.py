@@ -12,11 +12,10 @@ from jaxtyping import Float
 from bowdenfit.cable.drive import Loop, Rope, drive_of
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.angles.table import AngleTable
-from bowdenfit.kinds.recordings.side_by_side import beside
-from bowdenfit.kinds.recordings.table import recorded_angles
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.recordings.blocks import beside
+from bowdenfit.kinds.recordings.reader import recorded_angles
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.recordings.preparation.likely_input import likely_input
 from bowdenfit.recordings.recording import Recordings
@@ -25,12 +24,12 @@ DRAWS = 200  # enough for the edges of a band
 MOST_BLOCKS = 1000  # of a recording in a figure
 
 
-def choose_blocks(n_blocks: int) -> np.ndarray:
+def blocks_shown(n_blocks: int) -> np.ndarray:
     """Which blocks of a recording are followed: all, or evenly spaced ones of a long recording."""
     return np.arange(0, n_blocks, -(-n_blocks // MOST_BLOCKS))
 
 
-class RecordingFollower:
+class Follower:
     """Follows all recordings of a data set with the cable's play operator, for `DRAWS` draws at a time; compiled once.
 
     Args:
@@ -40,10 +39,10 @@ class RecordingFollower:
     """
 
     def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
-        self._data = _block_arrays(model, recordings, angles)
+        self._data = _arrays(model, recordings, angles)
         values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
-        function = jax.vmap(_follow_function(model), in_axes=(0, 0, None))
+        function = jax.vmap(_followed(model), in_axes=(0, 0, None))
         self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
 
     def __call__(
@@ -59,22 +58,22 @@ class RecordingFollower:
         return np.asarray(force), np.asarray(exponent)
 
 
-def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
+def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
-    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.each]
-    chosen = list(zip(recordings.each, shown, strict=True))
+    shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
+    both = list(zip(recordings.each, shown, strict=True))
     drive = Loop if model.cable.is_loop else Rope
-    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
+    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in both]
     rows = row_angles(model.description, recorded_angles(recordings), angles).data
     held = {
-        name: beside([getattr(r.blocks, name)[s] for r, s in chosen])
+        name: beside([getattr(r.blocks, name)[s] for r, s in both])
         for name in ("input_force", "output_force", "velocity")
     }
-    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in chosen])
+    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in both])
     return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
 
 
-def _follow_function(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
+def _followed(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
     """Function of one draw's values, of mounting effects and of the blocks."""
 
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 from bowdenfit.words import significant
 
-_CLEAR = 0.99  # probability from which a dependence on speed is called one
+_SURE = 0.99  # probability from which a dependence on speed is called one
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
 
 
@@ -46,7 +46,7 @@ class RateEffect:
             "so the data show no dependence on speed"
             if low <= 0 <= high
             else f"so efficiency {way} with speed"
-            if sure > _CLEAR
+            if sure > _SURE
             else f"a hint that efficiency {way} with speed, and no more than that"
         )
         where = f" {self.place}" if self.place else ""
@@ -64,9 +64,9 @@ def rate_effect(fit: Record) -> RateEffect | None:
         return None
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
     slow, fast = typical_speeds(fit)
-    at, place = usual_length(fit)
+    at, place = place_of(fit)
     with jax.enable_x64(True):
-        difference = _efficiency_differences(fit, at, slow, fast)
+        difference = _differences(fit, at, slow, fast)
     interval = Interval.of(difference)
     return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
 
@@ -78,18 +78,18 @@ def typical_speeds(fit: Record) -> tuple[float, float]:
     return min(speeds), max(speeds)
 
 
-def usual_length(fit: Record) -> tuple[float, str]:
+def place_of(fit: Record) -> tuple[float, str]:
     """Where to answer: at the length with most recordings inside the range, else in its middle."""
     route, recordings = fit.dataset.description.route, fit.dataset.measurements.table(Recordings)
     if route is None:
         return 0.0, ""
-    recorded = recordings.each if recordings is not None else ()
-    values = [r.route for r in recorded if route.range[0] <= r.route <= route.range[1]]
+    each = recordings.each if recordings is not None else ()
+    values = [r.route for r in each if route.range[0] <= r.route <= route.range[1]]
     at = max(set(values), key=values.count) if values else route.middle
     return at, f"at {at:g} {route.unit}"
 
 
-def _efficiency_differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
+def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
     model, friction = fit.model, fit.model.cable.friction
 
     def difference(values: Mapping[str, jax.Array]) -> jax.Array:
@@ -99,5 +99,5 @@ def _efficiency_differences(fit: Record, at: float, slow: float, fast: float) ->
         output = friction.output_force(values, force, shifts, jnp.ones(())) / force
         return output[1] - output[0]
 
-    differences: np.ndarray = for_each_value(difference, parameter_values(fit))
-    return differences
+    found: np.ndarray = for_each_value(difference, parameter_values(fit))
+    return found

@@ -28,7 +28,7 @@ from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.recorded.traces import RecordingTrace
+    from bowdenfit.questions.recorded.traces import Trace
     from bowdenfit.results.record import Record
 
 HEADING = "Recordings over time"
@@ -80,30 +80,24 @@ class OverTime:
 
 def data(fit: Record) -> tuple[OverTime, ...] | None:
     """Every recording; None without any of two blocks."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
+    from bowdenfit.questions.recorded.traces import traces
 
-    return tuple(_over_time(trace) for trace in trace_recordings(fit) if len(trace.block_numbers) > 1) or None
+    return tuple(_over_time(trace) for trace in traces(fit) if len(trace.shown) > 1) or None
 
 
-def _over_time(trace: RecordingTrace) -> OverTime:
+def _over_time(trace: Trace) -> OverTime:
     recording, flagged = trace.recording, trace.recording.account.flagged
-    blocks = (
-        trace.time,
-        trace.input_force,
-        trace.output_force,
-        trace.stroke,
-        recording.blocks.saturated[trace.block_numbers],
-    )
+    blocks = trace.time, trace.input_force, trace.output_force, trace.stroke, recording.blocks.saturated[trace.shown]
     left_out = flagged.kind, flagged.time, flagged.input_force, flagged.output_force
-    return OverTime(recording.name, trace.is_loop, *blocks, trace.predicted, trace.fitted, *left_out)
+    return OverTime(recording.name, trace.loop, *blocks, trace.predicted, trace.fitted, *left_out)
 
 
 def caption(recordings: tuple[OverTime, ...]) -> str:
     """What is drawn, in plain words."""
     band = (
-        "the band holds it with 90 % probability, a new mounting included"
-        if len(recordings[0].predicted) > 1
-        else ("the dashed line is the least-squares prediction")
+        "the band holds it with 90 % probability, a new mounting included" if len(recordings[0].predicted) > 1 else (
+            "the dashed line is the least-squares prediction"
+        )
     )
     return (
         f"Both forces over time of {counted(len(recordings), 'recording')}, of many evenly chosen ones: black the "

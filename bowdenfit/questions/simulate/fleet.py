@@ -21,7 +21,7 @@ from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
 from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.drawn_readings import drawn_readings, with_drawn_readings
+from bowdenfit.kinds.terms import drawn_readings, with_drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.simulation import empty_tables, true_values
 from bowdenfit.questions.simulate.tables import (

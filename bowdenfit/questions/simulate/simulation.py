@@ -17,12 +17,11 @@ from bowdenfit.description import Description
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.angles.table import AngleTable
 from bowdenfit.kinds.angles.term import drawn_angles
-from bowdenfit.kinds.bench import Truth
-from bowdenfit.kinds.drawn_readings import Readings, drawn_readings, with_drawn_readings
 from bowdenfit.kinds.kind import Design, PlannedKind
-from bowdenfit.kinds.measurements import Measurements
+from bowdenfit.kinds.tables import AngleTable, Measurements
+from bowdenfit.kinds.term import Truth
+from bowdenfit.kinds.terms import Readings, drawn_readings, with_drawn_readings
 from bowdenfit.model import build_model
 
 

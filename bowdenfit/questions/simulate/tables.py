@@ -14,10 +14,9 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.kinds import each_table
-from bowdenfit.kinds.designs import read_design
+from bowdenfit.kinds.descriptions import parse_description, read_design
 from bowdenfit.kinds.kind import Design
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.settings import parse_description
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
 from bowdenfit.results.folder import fill_folder_atomically, write_text
 from bowdenfit.words import shown

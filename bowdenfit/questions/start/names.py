@@ -24,12 +24,12 @@ _OF_CURVE = ("a", "b", "c", "A", "B", "C", "middle", "slope")  # behind the name
 _NAME = TypeAdapter[str](Name)
 
 
-def ask_cable_name(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
+def cable_name(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
     """A question after what a cable is called."""
-    return Question(words, _checked_name, default, why, example)
+    return Question(words, _nameable, default, why, example)
 
 
-def ask_contact_name(words: str, default: str | None, taken: Collection[str]) -> Question[str]:
+def place_name(words: str, default: str | None, taken: Collection[str]) -> Question[str]:
     """A question after the name of a contact.
 
     Args:
@@ -39,16 +39,16 @@ def ask_contact_name(words: str, default: str | None, taken: Collection[str]) ->
     """
 
     def read(typed: str) -> str:
-        name = _checked_name(typed)
-        if name in taken:
-            raise UsageError(f"{shown(name)} is another place already; write another one.")
-        return name
+        said = _nameable(typed)
+        if said in taken:
+            raise UsageError(f"{shown(said)} is another place already; write another one.")
+        return said
 
     proposed = None if default in taken else default
     return Question(words, read, proposed, "" if proposed else "two places would have the same name.", "edge")
 
 
-def ask_coefficient_name(words: str, default: str, columns: Collection[str]) -> Question[str]:
+def coefficient_name(words: str, default: str, columns: Collection[str]) -> Question[str]:
     """A question after the name of a coefficient of friction.
 
     Args:
@@ -58,27 +58,25 @@ def ask_coefficient_name(words: str, default: str, columns: Collection[str]) -> 
     """
 
     def read(typed: str) -> str:
-        name = _checked_name(typed)
-        _refuse_invalid(lambda: Contact.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
+        said = _nameable(typed)
+        _as_described(lambda: Contact.model_validate({"name": "x", "friction": said, "wrap_angle": {"column": "x"}}))
         of_curves = {f"{column}_{ending}" for column in columns for ending in _OF_CURVE}
-        if name in PARAMETERS or name in TAKEN or name in of_curves or _NUMBERED.fullmatch(name):
-            raise UsageError(
-                f"{shown(name)} is what results call another number; write another name, such as {default}."
-            )
-        return name
+        if said in PARAMETERS or said in TAKEN or said in of_curves or _NUMBERED.fullmatch(said):
+            raise UsageError(f"{shown(said)} is what results call another number; write another name, such as {default}.")
+        return said
 
     return Question(words, read, default)
 
 
-def _checked_name(typed: str) -> str:
-    name = " ".join(typed.split())
-    if name in PLACEHOLDERS:
-        raise UsageError(f"{shown(name)} is left from the template; write {PLACEHOLDERS[name]}.")
-    _refuse_invalid(lambda: _NAME.validate_python(name))
-    return name
+def _nameable(typed: str) -> str:
+    said = " ".join(typed.split())
+    if said in PLACEHOLDERS:
+        raise UsageError(f"{shown(said)} is left from the template; write {PLACEHOLDERS[said]}.")
+    _as_described(lambda: _NAME.validate_python(said))
+    return said
 
 
-def _refuse_invalid(validate: Callable[[], object]) -> None:
+def _as_described(validate: Callable[[], object]) -> None:
     """Refuse what a description would refuse."""
     try:
         validate()

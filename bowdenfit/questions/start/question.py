@@ -52,7 +52,7 @@ class Asker(Protocol):
         ...
 
 
-class Unattended:
+class Nobody:
     """Where there is no person: what files do not say is refused, all of it together, and proposals are no answers."""
 
     def __init__(self) -> None:
@@ -81,14 +81,14 @@ def text(words: str, default: str | None, why: str = "", example: str = "") -> Q
     return Question(words, lambda typed: " ".join(typed.split()), default, why, example)
 
 
-def yes_or_no(words: str, default: bool, why: str = "") -> Question[bool]:
+def agree(words: str, default: bool, why: str = "") -> Question[bool]:
     """A question after yes or no; `why` where the default is only proposed."""
 
     def read(typed: str) -> bool:
-        answer = typed.strip().lower()
-        if answer not in (*_YES, *_NO):
+        said = typed.strip().lower()
+        if said not in (*_YES, *_NO):
             raise UsageError(f"{shown(typed)} is neither yes nor no; write y or n.")
-        return answer in _YES
+        return said in _YES
 
     return Question(f"{words} (y or n)", read, "y" if default else "n", why)
 
@@ -106,19 +106,12 @@ def choose(
     """
 
     def read(typed: str) -> Answer:
-        answer = typed.strip()
-        if answer.isascii() and answer.isdecimal() and 1 <= int(answer) <= len(options):
-            return options[int(answer) - 1][1]
+        said = typed.strip()
+        if said.isascii() and said.isdecimal() and 1 <= int(said) <= len(options):
+            return options[int(said) - 1][1]
         raise UsageError(f"{shown(typed)} is none of them; write a number from 1 to {len(options)}.")
 
-    return Question(
-        words,
-        read,
-        None if default is None else str(default),
-        why,
-        "1",
-        tuple(description for description, _ in options),
-    )
+    return Question(words, read, None if default is None else str(default), why, "1", tuple(each for each, _ in options))
 
 
 def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
@@ -170,16 +163,14 @@ def quantity(
         match = _QUANTITY.fullmatch(typed.strip())
         if not match:
             raise UsageError(f"{shown(typed)} is not a number with its unit; write it as {example}.")
-        value, unit_name = float(match["value"].replace(",", ".")), match["unit"].strip()
+        value, written = float(match["value"].replace(",", ".")), match["unit"].strip()
         try:
-            factor = conversion_factor(unit_name, dimension)
+            factor = conversion_factor(written, dimension)
         except DatasetError as error:
             raise UsageError(f"{error}.") from None
         if not 0 < value * factor < 1e9:
-            raise UsageError(
-                f"{shown(typed)} is not possible here; write a positive number with its unit, as {example}."
-            )
-        return value, unit_name
+            raise UsageError(f"{shown(typed)} is not possible here; write a positive number with its unit, as {example}.")
+        return value, written
 
     return Question(words, read, default, why, example)
 
@@ -189,14 +180,12 @@ def number(words: str, default: str | None, why: str = "", example: str = "") ->
 
     def read(typed: str) -> float:
         try:
-            value = float(typed.strip().removesuffix("Hz").replace(",", "."))
+            found = float(typed.strip().removesuffix("Hz").replace(",", "."))
         except ValueError:
             raise UsageError(f"{shown(typed)} is not a number; write one, such as {example or default}.") from None
-        if not 0 < value < 1e9:
-            raise UsageError(
-                f"{shown(typed)} is not possible here; write a positive number, such as {example or default}."
-            )
-        return value
+        if not 0 < found < 1e9:
+            raise UsageError(f"{shown(typed)} is not possible here; write a positive number, such as {example or default}.")
+        return found
 
     return Question(words, read, default, why, example)
 
@@ -206,17 +195,13 @@ def numbers(words: str, default: str, least: int = 0, exactly: int | None = None
 
     def read(typed: str) -> tuple[float, ...]:
         try:
-            values = tuple(float(part.replace(",", ".")) for part in typed.replace(";", " ").split())
+            found = tuple(float(part.replace(",", ".")) for part in typed.replace(";", " ").split())
         except ValueError:
-            raise UsageError(
-                f"{shown(typed)} are not numbers; write them with blanks between, such as 430 530."
-            ) from None
-        if len(values) < least or (exactly is not None and len(values) != exactly):
-            raise UsageError(
-                f"{shown(typed)}: {exactly or least} numbers are needed, with blanks between, such as 430 530."
-            )
-        if not all(-1e9 < number < 1e9 for number in values) or list(values) != sorted(set(values)):
+            raise UsageError(f"{shown(typed)} are not numbers; write them with blanks between, such as 430 530.") from None
+        if len(found) < least or (exactly is not None and len(found) != exactly):
+            raise UsageError(f"{shown(typed)}: {exactly or least} numbers are needed, with blanks between, such as 430 530.")
+        if not all(-1e9 < number < 1e9 for number in found) or list(found) != sorted(set(found)):
             raise UsageError(f"{shown(typed)} are not in rising order; write the smallest first, such as 430 530.")
-        return values
+        return found
 
     return Question(words, read, default)

@@ -10,7 +10,7 @@ from bowdenfit.inference.diagnostics import describe_convergence_shortfalls
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommend_sampler
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.recordings.words import preparation_pages
+from bowdenfit.kinds.recordings.kind import preparation_pages
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of

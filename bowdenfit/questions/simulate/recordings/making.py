@@ -12,9 +12,8 @@ import numpy as np
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset
-from bowdenfit.kinds.angles.table import AngleSettings, AngleTable
-from bowdenfit.kinds.measurements import Measurements
-from bowdenfit.kinds.planned_recordings import design_without_recordings
+from bowdenfit.kinds.descriptions import design_without_recordings
+from bowdenfit.kinds.tables import AngleSettings, AngleTable, Measurements
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan

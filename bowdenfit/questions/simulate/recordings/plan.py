@@ -12,7 +12,7 @@ from bowdenfit.description import Description, QuantityValue
 from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
-from bowdenfit.kinds.planned_recordings import description_without_recordings
+from bowdenfit.kinds.descriptions import description_without_recordings
 from bowdenfit.questions.simulate.recordings.planned import Page, PlannedRecording, planned_recordings
 from bowdenfit.questions.simulate.tables import plan_page, truth_of
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from bowdenfit.files.columns import Quantity, find_columns, require
 from bowdenfit.files.csv_table import read_csv
-from bowdenfit.kinds.kind import Kind, Readings, TableFromFiles
+from bowdenfit.kinds.kind import Kind, Readings
+from bowdenfit.kinds.table_files import TableFromFiles
 from bowdenfit.types import Vector
 
 

@@ -2,8 +2,7 @@
 
 import jax.numpy as jnp
 
-from bowdenfit.kinds.independent_readings import IndependentReadings
-from bowdenfit.kinds.term import TermKind
+from bowdenfit.kinds.term import IndependentReadings, TermKind
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 from scratch.losses.kind import LossTable

@@ -1,6 +1,7 @@
-"""What a file is that no description names: a table of readings or a recording, why, and whether it could be either."""
+"""What kind of measurement a file without a description holds, why, whether it could be another, and its wrap angle."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,12 +16,25 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.files.sheets import stated_rate
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.spellings import spelled, without_accents
 from bowdenfit.files.tables import WORKBOOKS, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.kinds.forces.table import count_loads
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
+
+_FIRST_BYTES = 1 << 15
+_UNIT = r"(?P<{}>degrees|degree|deg|°|º|grad|rad)"
+_NUMBER = r"(?P<{}>\d+(?:[.,]\d+)?)"
+_WORD = r"(?:wrap\w*|bend\w*|umschling\w*|umlenk\w*|biegewinkel|winkel|enroulement|abraz\w*|avvolgimento|ang[lou]\w*)"
+_GAP = r"[^\d\n]{0,24}?"
+_IN_TEXT = re.compile(
+    rf"\b{_WORD}\b{_GAP}(?:{_NUMBER.format('a')}[\s;,\"]{{0,3}}{_UNIT.format('b')}"
+    rf"|[(\[]{_UNIT.format('c')}[)\]][\s:=;,\"]{{0,4}}{_NUMBER.format('d')})",
+    re.IGNORECASE,
+)
+_IN_NAME = re.compile(rf"(?<![\d.]){_NUMBER.format('a')}[\s_-]?{_UNIT.format('b')}(?![a-z])", re.IGNORECASE)
+
 
 HEAD = 400  # rows by which it is decided
 _FEW, _LONG = 50, 200  # rows of a table with a slow clock, and rows beyond which one without may be a recording
@@ -40,6 +54,34 @@ COLUMNS = (*FORCES, *BESIDE_FORCES)
 """What a table without a description may have."""
 _ONE_FORCE = (Quantity("force", "force"), *FORCES)
 _POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))
+
+
+def stated_angle(path: Path) -> tuple[str, str] | None:
+    """The wrap angle that a file states, such as "90deg", and where; None if it states none, or several.
+
+    Args:
+        path: The file; only the first lines of a text are looked at.
+    """
+    found = {_angle(match): "a line of the file" for line in _lines(path) for match in _IN_TEXT.finditer(line)}
+    found = found or {_angle(match): "its name" for match in _IN_NAME.finditer(path.stem)}
+    return next(iter(found.items())) if len(found) == 1 else None
+
+
+def _angle(match: re.Match[str]) -> str:
+    said = match.groupdict()
+    number, unit = said["a"] or said.get("d") or "", said["b"] or said.get("c") or ""
+    return number.replace(",", ".") + ("rad" if unit.lower() == "rad" else "deg")
+
+
+def _lines(path: Path) -> list[str]:
+    """The first lines of a text without accents; none of another file."""
+    if path.suffix.lower() not in TEXT:
+        return []
+    try:
+        _, lines = first_lines(first_bytes(path, _FIRST_BYTES), path.name, whole=False)
+    except DatasetError:
+        return []
+    return [without_accents(line.text) for line in lines]
 
 
 def columns_of_kind(kind: str) -> tuple[Quantity, ...]:
@@ -82,7 +124,9 @@ def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ())
     if has_channels:
         return FileKind("recordings", "its channels are named with --channel")
     if path.suffix.lower() not in (*TEXT, *WORKBOOKS):
-        return FileKind("recordings", f"files with the ending {path.suffix or '(none)'} are those of acquisition programs")
+        return FileKind(
+            "recordings", f"files with the ending {path.suffix or '(none)'} are those of acquisition programs"
+        )
     try:
         table = read_table(path, HEAD)
     except DatasetError as error:
@@ -141,10 +185,14 @@ def _has_one_force_and_a_position(table: RawTable) -> bool:
 def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
     heading, steps, many = shown(table.header[clock]), _steps(table, clock), len(table.rows) >= _FEW
     if (rows_alone or kind == "efficiencies") and not (many and steps and float(np.median(steps)) < _SLOW):
-        return FileKind(kind, f"its column {rows_alone or 'of efficiencies'} says that each row is a reading of its own")
+        return FileKind(
+            kind, f"its column {rows_alone or 'of efficiencies'} says that each row is a reading of its own"
+        )
     if rows_alone or kind == "efficiencies":
         beside = rows_alone or "of efficiencies"
-        why = f"it has a column of time, {heading}, whose steps are those of a sampled force, but also a column {beside}"
+        why = (
+            f"it has a column of time, {heading}, whose steps are those of a sampled force, but also a column {beside}"
+        )
         return FileKind("recordings", why, kind)
     has_dates = not steps and any(is_date(row[clock].text.strip()) for row in table.rows[:_FEW])
     even = bool(steps) and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)

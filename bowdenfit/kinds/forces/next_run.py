@@ -23,12 +23,11 @@ from bowdenfit.kinds.candidate import (
     some_loads,
 )
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.measurements import Measurements
 from bowdenfit.kinds.recordings.blocks import positive, worth_of
-from bowdenfit.kinds.recordings.table import recorded_angles
-from bowdenfit.kinds.resolve_angles import resolve_angles
-from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.recordings.reader import recorded_angles
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
 from bowdenfit.kinds.rows import RowConditions
+from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 from bowdenfit.words import significant

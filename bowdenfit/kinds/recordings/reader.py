@@ -1,4 +1,4 @@
-"""The recordings of a data set: read, prepared, cut into strokes, and placed on the route."""
+"""Read the recordings of a data set: prepare them, find their strokes, and find where each was made on the route."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -9,21 +9,150 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
+from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, Route, TableSettings
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
+from bowdenfit.files.channels import ChannelFile
+from bowdenfit.files.matching import Quantity
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.kinds.kind import Source, TableFromFiles
-from bowdenfit.kinds.recordings.placing import entry_from_name, place_names, placed_by_channels
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
+from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.forces import to_recording
-from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where
+from bowdenfit.recordings.name_patterns import match_name, pattern_fields
+from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where, steady_value
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 from bowdenfit.types import Vector
-from bowdenfit.units import INTERNAL_UNITS, ChannelSource, ColumnSource, speed_dimension
+from bowdenfit.units import (
+    INTERNAL_UNITS,
+    ChannelSource,
+    ColumnSource,
+    conversion_factor,
+    route_conversion_factor,
+    speed_dimension,
+)
+
+_SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a recording
+_SAME_LENGTH = 0.005  # of the range of the route, by which a length may
+
+
+def entry_from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
+    """Return what the name of a file says, by the table's pattern."""
+    if pattern is None:
+        return RecordingFile(file=file)
+    _check_pattern(description, pattern)
+    values = match_name(pattern, path)
+    angles = {
+        name: QuantityValue(value=float(text), unit=unit or "deg")
+        for name, (text, unit) in values.items()
+        if name in description.angle_columns
+    }
+    velocity = values.get("velocity")
+    return RecordingFile(
+        file=file,
+        run=values["run"][0] if "run" in values else None,
+        at=float(values["at"][0]) if "at" in values else None,
+        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
+        wrap_angles=angles,
+    )
+
+
+def _check_pattern(description: Description, pattern: str) -> None:
+    """Refuse a pattern that names what a recording does not have, or a unit of the wrong kind."""
+    known = ["at", "run", "velocity", *description.angle_columns]
+    place = "cable.toml, tables.recordings.pattern"
+    for name, unit in pattern_fields(pattern):
+        if name not in known:
+            raise DescriptionError(f"{place}: {name!r} is unknown{suggest_name(name, known)}")
+        if unit and name != "at" and name != "run":
+            dimension = speed_dimension(unit) if name == "velocity" else "angle"
+            try:
+                conversion_factor(unit, dimension)
+            except DatasetError as error:
+                raise DescriptionError(f"{place}, {{{name}:{unit}}}: {error}.") from None
+
+
+def place_names(description: Description) -> tuple[str, ...]:
+    """Quantities that say where a recording was made."""
+    return (*description.angle_columns, *([description.route.variable] if description.route else []))
+
+
+def placed_by_channels(
+    description: Description, file: ChannelFile, entry: RecordingFile, sources: Mapping[str, ColumnSource]
+) -> RecordingFile:
+    """A recording's entry with the wrap angles and the length that its channels say, where it does not say them itself.
+
+    A channel is looked for by its name where a contact has no curve, and is that which the user names in any case.
+
+    Args:
+        description: The cable.
+        file: The rows of the recording.
+        entry: What is said of it.
+        sources: Channels that the user names.
+
+    Raises:
+        DatasetError: A channel changes during the recording, or is named beside a value.
+    """
+    angles, at = dict(entry.wrap_angles), entry.at
+    for contact in description.contact:
+        column = contact.wrap_angle.column
+        if column is None or (column not in sources and (contact.wrap_angle.curve or column in angles)):
+            continue
+        if column in angles:
+            raise _twice(entry, column)
+        angle = _angle(file, column, sources.get(column))
+        if angle is not None:
+            angles[column] = QuantityValue(value=angle, unit="rad")
+    route = description.route
+    if route is not None and (route.variable in sources or at is None):
+        found = _length(file, route, sources.get(route.variable))
+        if found is not None and at is not None:
+            raise _twice(entry, route.variable)
+        at = found if found is not None else at
+    return entry.model_copy(update={"wrap_angles": angles, "at": at})
+
+
+def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
+    """A wrap angle [rad]."""
+    found = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
+    if found is None:
+        return None
+    value, low, high = found
+    if high - low > _SAME_BEND:
+        raise _changes(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
+    if value < 0:
+        raise DatasetError(
+            f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so turn that of the "
+            "channel round with a negative gain."
+        )
+    return value
+
+
+def _length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
+    """A value of the route variable, in its unit."""
+    quantity = Quantity(route.variable, "route", route.unit)
+    found = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
+    if found is None:
+        return None
+    value, low, high = found
+    if high - low > _SAME_LENGTH * abs(route.range[1] - route.range[0]):
+        raise _changes(file, route.variable, low, high, route.unit)
+    return float(f"{value:.12g}")
+
+
+def _changes(file: ChannelFile, name: str, low: float, high: float, unit: str) -> DatasetError:
+    return DatasetError(
+        f"{file.path.name}: {name} changes from {low:.4g} to {high:.4g} {unit} during the recording, which is of one bend; "
+        "choose its rows by where = { ... } in a [[recording]] for each, or state the value there and rename the channel."
+    )
+
+
+def _twice(entry: RecordingFile, name: str) -> DatasetError:
+    return DatasetError(
+        f"{entry.file}: {name} is stated in its [[recording]], and a channel is named for it too; keep one of the two."
+    )
 
 
 class RecordingsTable(TableSettings):

@@ -1,0 +1,242 @@
+"""Descriptions of cables (cable.toml) and designs of plans, with a field under [tables] and [design] for every kind."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError, create_model
+
+from bowdenfit.description import BY_GROUP, Description, Table, Tables
+from bowdenfit.description.file import check_quantities, read_toml, validate
+from bowdenfit.description.placeholders import Place, placeholders_in
+from bowdenfit.description.values import Frozen
+from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.errors import DescriptionError, Faults, suggest_name
+from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds.kind import Design, FrictionKind, Kind, PlannedKind
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.units import ColumnSource
+from bowdenfit.words import listed
+
+_ASKED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
+"""Keys without which tables cannot be read."""
+
+
+_FITTED_FRICTION = ("friction_model", "reference_force", "reference_velocity")
+
+
+def load_description(
+    path: Path,
+    overrides: Sequence[str] = (),
+    columns: Mapping[str, ColumnSource] | None = None,
+    faults: Faults | None = None,
+) -> Description:
+    """Read `cable.toml`.
+
+    Args:
+        path: The file.
+        overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
+        columns: Columns of tables named on the command line.
+        faults: Takes what is wrong with keys that no table asks for, so that the tables can be looked at too.
+
+    Raises:
+        DescriptionError: The file is missing or no TOML, keys are unknown, or values are impossible or left from the template.
+    """
+    text, stated = read_toml(path, overrides)
+    raw, wrong = with_columns(stated, columns or {}), Faults()
+    left = placeholders_in(raw, text, path.name)
+    wrong.faults += left.values()
+    try:
+        description = parse_description(raw, path.name)
+    except DescriptionError as error:
+        wrong.faults += [each for each in error.faults or (error,) if not _is_about(each.key_path, left)]
+        keys = {str(each.key_path[0]) if each.key_path else "schema" for each in wrong.faults}
+        if keys & _ASKED_BY_TABLES or not keys <= set(raw):
+            wrong.refuse()
+        try:
+            known = {key: value for key, value in raw.items() if key not in keys}
+            description = parse_description({"name": path.stem, **known}, path.name)
+        except DescriptionError:
+            wrong.refuse()
+            raise
+    if faults is None:
+        wrong.refuse()
+    else:
+        faults.faults += wrong.faults
+    return description
+
+
+def _is_about(place: Place, left: Mapping[Place, DescriptionError]) -> bool:
+    """Whether a fault is one of a placeholder's."""
+    return any(bool(place) and place[: len(other)] == other[: len(place)] for other in left)
+
+
+def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
+    """A description from plain data, with errors that name the key.
+
+    Raises:
+        DescriptionError: A key is unknown, or a value is missing or impossible.
+    """
+    kinds = tuple(KINDS.values())
+    description = validate(raw, _models(kinds)[0], file)
+    faults = Faults()
+    for kind in kinds:
+        settings = description.tables.stated.get(kind.name)
+        with faults.collect(key_path=("tables",)):
+            if why := kind.contradiction(settings, description):
+                raise DescriptionError(f"{file}: {why}.")
+            if settings is not None:
+                check_quantities(kind.quantities(settings, description), file)
+    faults.refuse()
+    return description
+
+
+def with_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:
+    """Plain data of a description whose table has the named columns.
+
+    Args:
+        raw: The data; changed in place.
+        columns: By quantity, such as input_force; of several tables with the table before it, as forces.input_force.
+
+    Raises:
+        DescriptionError: There is no such table, or it is not clear which is meant.
+    """
+    stated = raw.get("tables")
+    tables = [name for name in stated if _has_columns(name, stated[name])] if isinstance(stated, dict) else []
+    for named, source in columns.items():
+        table, _, quantity = named.rpartition(".")
+        if not table and len(tables) > 1:
+            raise DescriptionError(
+                f"--column {named}=... does not say of which table, and the data set has several; write the table before it, "
+                f"such as --column {tables[0]}.{named}=..., of {listed(tables)}."
+            )
+        if (table and table not in tables) or not tables:
+            what = f"no table {table!r}" if table else "no table"
+            hint = f"it has {listed(tables)}" if tables else "channels of recordings are named by --channel"
+            raise DescriptionError(f"--column {named}=...: the data set has {what} with columns; {hint}.")
+        settings = raw["tables"][table or tables[0]]
+        settings["columns"] = {**settings.get("columns", {}), quantity: source.model_dump(exclude_none=True)}
+    return raw
+
+
+def _has_columns(name: str, settings: Any) -> bool:
+    return name in KINDS and issubclass(KINDS[name].settings, Table) and isinstance(settings, dict)
+
+
+@lru_cache
+def _models(kinds: tuple[Kind[Any], ...]) -> tuple[type[Description], type[Tables]]:
+    """A description, and its tables, with a field for each kind."""
+    fields: dict[str, Any] = {kind.name: (kind.settings | None, None) for kind in kinds}
+    tables = create_model("CableTables", __base__=Tables, __module__=__name__, **fields)
+    return create_model("CableDescription", __base__=Description, __module__=__name__, tables=(tables, ...)), tables
+
+
+CableDescription, CableTables = _models(tuple(KINDS.values()))  # found here by other processes
+
+
+def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:
+    """The design of a plan.
+
+    Args:
+        page: [design] as read.
+        description: The cable.
+        file: Its file, for errors.
+
+    Raises:
+        DescriptionError: A key or a value is wrong, or this cable cannot have what is asked for.
+    """
+    design = _parsed(page, file)
+    for kind in _planned_kinds():
+        if why := kind.design_contradiction(design, description):
+            raise DescriptionError(f"{file}, design.{why}")
+    return design
+
+
+def design_of(**measured: Any) -> Design:
+    """A design of any cable, from keywords; what a cable does not have of it is not measured."""
+    return _parsed(measured, "the design")
+
+
+def _planned_kinds() -> list[PlannedKind[Any]]:
+    return [kind for kind in KINDS.values() if isinstance(kind, PlannedKind)]
+
+
+def _parsed(page: Mapping[str, Any], file: str) -> Design:
+    model = _page(tuple(kind.design for kind in _planned_kinds()))
+    raw = {"design": dict(page)}
+    try:
+        return model.model_validate(raw).design  # type: ignore[attr-defined]
+    except ValidationError as error:
+        raise wrong_keys(error, raw, model, file, "write it, such as loads = [10, 20, 40]") from None
+
+
+@lru_cache
+def _page(parts: tuple[type[Design], ...]) -> type[BaseModel]:
+    """What is read of a plan."""
+    whole = create_model("WholeDesign", __base__=parts, __module__=__name__)
+    return create_model("DesignPage", __base__=Frozen, __module__=__name__, design=(whole, ...))
+
+
+def description_without_recordings(raw: Mapping[str, Any], file: str) -> Description:
+    """The cable of a plan without what needs its recordings, whose files do not exist yet: a table of efficiencies stands in
+    for them, and [recordings.friction] for a model of friction.
+
+    Args:
+        raw: The plan.
+        file: Its file, for errors.
+
+    Raises:
+        DescriptionError: A table or key is wrong, or cannot be made beside recordings.
+    """
+    tables = raw.get("tables", {})
+    if "recording" in raw:
+        raise DescriptionError(f"{file}: a plan has no [[recording]]; these are made from [recordings].")
+    for name in tables:
+        if name not in {"angles", "recordings"}:
+            raise DescriptionError(
+                f"{file}, tables.{name}: a plan of recordings makes angles and recordings only; leave it out, or plan it "
+                "with [design] in a file of its own."
+            )
+    kept = {k: v for k, v in raw.items() if k not in {"truth", "recordings", "tables", *_FITTED_FRICTION}}
+    angles = {"angles": tables["angles"]} if "angles" in tables else {}
+    description = parse_description({**kept, "tables": {**angles, "efficiencies": {"file": "none.csv"}}}, file)
+    for contact in description.contact:
+        if contact.wrap_angle.constant is None and contact.wrap_angle.curve is None:
+            raise DescriptionError(
+                f"{file}, contact {contact.name!r}: recordings are simulated from a constant wrap angle or a curve; "
+                "this contact has only a column."
+            )
+    return description
+
+
+def design_without_recordings(description: Description, angles: Sequence[float]) -> Design:
+    """What is measured beside them, at those route values; the table that stands in is read where all curves hold."""
+    return design_of(angles=angles, efficiencies=(description.route.middle if description.route else 0.0,))
+
+
+def measured_groups(description: Description, measurements: Measurements) -> tuple[str, ...]:
+    """Groups in the order in which they come, but first the one that predictions are for where that is stated.
+
+    Raises:
+        DescriptionError: Groups are to have coefficients of their own, and a table says nothing of groups, or there is one
+            group only; or the one that predictions are for is not there.
+    """
+    tables = [(kind, kind.groups(table)) for kind, table in each_table(measurements) if isinstance(kind, FrictionKind)]
+    names = list(dict.fromkeys(name for _, groups in tables for name in groups))
+    without = [kind.name for kind, groups in tables if not groups]
+    if description.by_group and without:
+        raise DescriptionError(
+            f'friction_model has "{BY_GROUP}", but the tables of {listed(without)} say nothing of groups, so nobody knows '
+            "whose friction they show; add a column group where the table can have one, or fit them apart."
+        )
+    if description.by_group and len(names) < 2:
+        raise DescriptionError(
+            f'friction_model has "{BY_GROUP}", but all readings are of one group ({", ".join(names)}); leave it out, or add '
+            "readings of another group."
+        )
+    if description.group is not None and description.group not in names:
+        raise DescriptionError(
+            f"cable.toml, group: there is no group {description.group!r}{suggest_name(description.group, names)}"
+        )
+    return tuple(sorted(names, key=lambda name: name != description.group))

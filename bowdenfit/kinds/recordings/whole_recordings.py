@@ -1,0 +1,368 @@
+"""Every block of whole recordings through the play operator, the effect of each run's mounting integrated out.
+
+A single rope and a pull-pull loop differ only in what a recording by itself says of its friction, which is where the operator
+is linearized, and in the reading of a run in results: an efficiency of a rope, a mean lost force of a loop.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.cable.drive import Each, Loop, Recorded, Rope, drive_of
+from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.kinds.recordings.blocks import (
+    RECORDED,
+    WITHOUT_WEIGHT,
+    beside,
+    group_blocks,
+    likely_forces,
+    positive,
+    side_by_side,
+)
+from bowdenfit.kinds.row_angles import resolve_angles
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
+from bowdenfit.kinds.term import rounded_up
+from bowdenfit.physics.distributions import log_normal_cdf
+from bowdenfit.physics.friction import transmission_efficiency
+from bowdenfit.physics.loop import loop_output_force
+from bowdenfit.recordings.loop_strokes import loop_limits
+from bowdenfit.recordings.recording import Recording, Recordings
+
+_LEAST_TOTAL = 1e-20
+
+Values = Mapping[str, Array]
+Data = Mapping[str, Any]
+
+
+_ROPE_REACH = 0.5  # of a recording's own friction exponent, that the first guess of its mounting effect is corrected by
+RECORDED_LOSS = "recorded_loss"  # name of the readings of a loop's recordings in results
+_LEAST_PRELOAD = 1e-6  # of the loads
+_LARGEST_EXPONENT = 3.0  # that a recording's own loss is taken to mean, however small the preload
+_LOOP_REACH = 0.5  # of the friction exponent, that its first guess is corrected by
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Mounted:
+    """What blocks say with the mounting effects integrated out.
+
+    Args:
+        within: Deviations of the blocks from their run's own mounting effect.
+        effect: That effect, of each run [1].
+        sd: Its standard deviation, of each run [1].
+        total: What the blocks of each run tell of it.
+    """
+
+    within: Array
+    effect: Array
+    sd: Array
+    total: Array
+
+
+@dataclass(frozen=True)
+class BlocksTerm(ABC):
+    r"""Likelihood of every block of whole recordings, one value a run.
+
+    The output is linear in the mounting effect m ~ Normal(0, tau) of a run but for changes of contact (and, of a loop, while
+    its return side is taut), so that m integrates out in closed form at the value that suits the recording best: two passes
+    of the operator, one to find it, one to linearize there. With Student noise each run's mounting effect, with what noise
+    adds to it, is a Student-t; the blocks scatter normally about their run.
+
+    Args:
+        cable: The cable.
+        data: Arrays over time and recordings (forces, velocity, weight), over recordings and over runs.
+        labels: Each run in words.
+    """
+
+    cable: Cable = field(repr=False)
+    data: dict[str, Any] = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
+    noise: str = RUN_SCATTER
+    reading_noise: str = BLOCK_NOISE
+
+    @abstractmethod
+    def _first_guess(self, drive: Any, data: Data) -> tuple[Each, Each]:
+        """Mounting effect of each recording by its own hysteresis, and how far from it a better one is looked for [1]."""
+
+    @property
+    def residual_blocks(self) -> tuple[tuple[int, int], ...]:
+        """Runs scatter by their mounting; the blocks of a run about it by the load cells."""
+        runs, blocks = len(self.labels), int(np.sum(self.data["n"]))
+        return ((runs, runs), (self.data["weight"].size, max(blocks - runs, 1)))
+
+    @property
+    def padded(self) -> dict[str, Any]:
+        """See `LogDensity.padded`: recordings that stand still for longer at their end, with no weight."""
+        blocks = len(self.data["weight"])
+        missing = ((0, rounded_up(blocks) - blocks), (0, 0))
+        long = {
+            name: np.pad(values, missing, "constant" if name in WITHOUT_WEIGHT else "edge")
+            for name, values in self.data.items()
+            if np.ndim(values) == 2 and name not in ROW_ARRAYS
+        }
+        return self.data | long
+
+    def _per_run(self, data: Data, blocks: Recorded) -> Float[Array, " runs"]:
+        """Sum over the blocks of each run."""
+        return jnp.zeros_like(data["n"]).at[data["run"]].add(jnp.sum(blocks, axis=0))
+
+    def _drive(self, values: Values, data: Data) -> tuple[Any, Array, Array]:
+        """The cable as it lies in each recording, its wrap angles and their variances."""
+        angles, variance = resolve_angles(self.cable, values, data)
+        return drive_of(self.cable, values, angles, data["velocity"]), angles, variance
+
+    def _followed(self, drive: Rope | Loop, cells: LoadCells, data: Data, mounting: Each) -> tuple[Recorded, Recorded]:
+        """Deviation of the readings from the operator's output, and the output's derivative by the exponent."""
+        stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
+        force = cells.true_input(data["likely_force"], drive.least_force)
+        anew = jnp.where(data["restart"], stands, jnp.nan)
+        followed = drive.follow(force, mounting, stands[0], anew, data["input_noise"])
+        expected, loading = drive.shown(cells, *followed)
+        return data["reading"] + cells.late(data["drift"]) - expected, loading
+
+    def _deviations(self, values: Values, data: Data, weights: Values) -> Mounted:
+        """What the blocks say with the mounting integrated out."""
+        (drive, angles, variance), cells = self._drive(values, data), LoadCells.of(values)
+        guess, reach = self._first_guess(drive, data)
+        deviation, loading = self._followed(drive, cells, data, guess)
+        by_recording = jnp.sum(data["weight"] * loading**2, axis=0)
+        step = jnp.sum(data["weight"] * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
+        guess = guess + jnp.clip(step, -reach, reach)
+        deviation, loading = self._followed(drive, cells, data, guess)
+        of_angles = self.cable.exponent_variance(weights, angles, variance)
+        return self._mounted(data, weights, deviation + loading * guess, loading, of_angles)
+
+    def _mounted(self, data: Data, weights: Values, deviation: Recorded, loading: Recorded, of_angles: Each) -> Mounted:
+        """The mounting effect of each run in closed form.
+
+        Args:
+            data: Arrays of the term.
+            weights: Values of the parameters that make the weights.
+            deviation: Of the blocks, without mounting effects.
+            loading: Change of the operator's output with the friction exponent.
+            of_angles: Variance of each recording's friction exponent by its wrap angles.
+        """
+        # Blocks that no friction of this size can explain tell nothing of the effect: the limit, instead of 0 / 0.
+        total = jnp.maximum(self._per_run(data, data["weight"] * loading**2), _LEAST_TOTAL)
+        effect = self._per_run(data, data["weight"] * loading * deviation) / total
+        from_angles = self._per_run(data, data["weight"] * loading**2 * of_angles) / total
+        sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
+        return Mounted(deviation - loading * effect[data["run"]], effect, sd, total)
+
+    def _beyond(self, data: Data, found: Mounted, noise: Array) -> Recorded:
+        """How far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
+        return data["censored"] * -found.within * data["newtons"] / noise
+
+    def log_likelihood(self, values: Values, data: Data) -> Float[Array, " runs"]:
+        """Log likelihood of each run, all blocks together; these scatter normally about the run."""
+        found, noise, n = self._deviations(values, data, values), values[self.reading_noise], data["n"]
+        squares = self._per_run(data, data["weight"] * found.within**2)
+        constant = (data["log_weights"] - jnp.log(found.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
+        inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
+        log_probability = log_normal_cdf(self._beyond(data, found, noise)) * data["share"]
+        censored = self._per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
+        return inside + noise_law(self.cable.description).log_density(found.effect, 0.0, found.sd) + censored
+
+    def residuals(self, values: Values, data: Data) -> Float[Array, " runs_and_blocks"]:
+        """Standardized residuals of the same likelihood: between runs, and of the blocks of a run."""
+        found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
+        noise = jax.lax.stop_gradient(values[self.reading_noise])
+        beyond = self._beyond(data, found, noise)
+        inside = jnp.sqrt(data["weight"]) * found.within / noise
+        # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
+        root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
+        censored = jnp.where((data["censored"] != 0) & (beyond < 30.0), root, 0.0)
+        between = noise_law(self.cable.description).residual(found.effect / jax.lax.stop_gradient(found.sd))
+        return jnp.concatenate([between, (inside + censored).ravel()])
+
+
+@dataclass(frozen=True)
+class WholeRecordingsTerm(BlocksTerm):
+    r"""Likelihood of every block of whole recordings of a single rope, one value a run.
+
+    .. math:: y_t = \text{clip}(y_{t-1},\ x_t - \Lambda_t - m,\ x_t + \Lambda_t + m), \quad
+              x = g(F_\text{in} - b_\text{in}), \quad
+              \log F_\text{out} = \log\left(g^{-1}(y) e^{-\gamma} + b_\text{out}\right) + e
+
+    with the offsets b and gain error gamma of the load cells.
+    """
+
+    name: str = RECORDED
+    unit: str = "1"
+
+    def _first_guess(self, drive: Rope, data: Data) -> tuple[Each, Each]:
+        guess = jnp.zeros_like(drive.exponent)
+        if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
+            guess = data["exponent"] - self._typical(drive, data)
+        return guess, _ROPE_REACH * jnp.asarray(data["exponent"])
+
+    def _typical(self, drive: Rope, data: Data) -> Each:
+        """Friction exponent of each recording at its mean speed [1]."""
+        return drive.exponent * drive.friction.rate(drive.values, data["speed"])
+
+    def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
+        """Expected efficiency of each run, the effect of its mounting left out [1]."""
+        return transmission_efficiency(self._of_run(self._typical(self._drive(values, data)[0], data)))
+
+    def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " runs"]:
+        """Efficiency of each run as the bench would give it [1]."""
+        sd = self._deviations(values, data, values).sd
+        of_run = self._of_run(self._typical(self._drive(values, data)[0], data))
+        return transmission_efficiency(of_run + sd * scatter(key, sd.shape, self.cable.description))
+
+    def _of_run(self, of_recording: Array) -> Array:
+        """Mean over the recordings of each run."""
+        run, runs = jnp.asarray(self.data["run"]), len(self.labels)
+        counts = jnp.zeros(runs).at[run].add(1.0)
+        return jnp.zeros(runs).at[run].add(of_recording) / counts
+
+    def observed(self) -> np.ndarray:
+        """Efficiency of each run by the width of its own hysteresis loop [1]."""
+        run, exponent = self.data["run"], self.data["exponent"]
+        return np.exp(-np.bincount(run, exponent) / np.bincount(run))
+
+
+def pad_recordings(
+    recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
+) -> dict[str, Any]:
+    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
+
+    The noise ratio is that of the input over that of the output.
+    """
+    data = side_by_side(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.each], angles)
+    speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
+    return data | {
+        "reading": np.log(data["output_force"]),
+        "newtons": data["output_force"],
+        "exponent": np.array([r.strokes.exponent for r in recordings.each]),
+        "speed": np.array([float(speed.mean()) if len(speed) else float("nan") for speed in speeds]),
+    }
+
+
+def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
+    """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
+    groups = group_blocks(recording)
+    arrays = groups.arrays(Rope, positive(recording), censored)
+    likely_in, likely_out = (groups.mean(force) for force in likely_forces(recording.blocks))
+    of_input = noise_ratio * (recording.strokes.contact[groups.starts] != 0)
+    return arrays | {"weight": arrays["worth"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}
+
+
+@dataclass(frozen=True)
+class LoopRecordingsTerm(BlocksTerm):
+    r"""Likelihood of every block of a loop's recordings, one value a run.
+
+    .. math:: y_t = \text{clip}(y_{t-1},\ f_-(x_t),\ f_+(x_t)), \quad x = F_\text{in} - b_\text{in}, \quad
+              F_\text{out} = y e^{-\gamma} + b_\text{out} + e, \quad e \sim \text{Normal}(0, \sigma_B / \sqrt{w})
+
+    where f are the output forces of `bowdenfit.physics.loop.loop_band` moving forward and back, at the cable's preload and
+    at the friction exponent Lambda + m of the run.
+
+    The reading of a run in results is the mean force lost while it moves, over the blocks inside its phases of motion.
+    """
+
+    name: str = RECORDED_LOSS
+    unit: str = "N"
+
+    def _first_guess(self, drive: Loop, data: Data) -> tuple[Each, Each]:
+        """That with which the loop is as wide as the recording's own; none where that is not known."""
+        least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
+        by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, least))
+        own = jnp.where(data["tells_loss"], jnp.minimum(by_loss, _LARGEST_EXPONENT), data["exponent"])
+        guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
+        return guess, _LOOP_REACH * (drive.exponent + guess)
+
+    def _lost(self, values: Values, data: Data, drive: Loop, more: Each | float = 0.0) -> Float[Array, " runs"]:
+        """Mean force lost in the blocks that move [N], with more friction exponent than the cable's."""
+        cells, force = LoadCells.of(values), data["input_force"]
+        stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
+        exponent = (drive.exponent + more)[None, :]
+        output = loop_output_force(cells.true_input(force), drive.preload[None, :], exponent, stroke)
+        return self._per_run(data, data["moving"] * (force - cells.shown_output(output)))
+
+    def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
+        """Expected mean force lost while each run moves, the effect of its mounting left out [N]."""
+        return self._lost(values, data, self._drive(values, data)[0])
+
+    def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " runs"]:
+        """Mean force lost while each run moves as the bench would give it [N]."""
+        drive = self._drive(values, data)[0]
+
+        def lost(more: Array) -> Array:
+            return self._lost(values, data, drive, more)
+
+        mean, by_exponent = jax.jvp(lost, (jnp.zeros_like(drive.exponent),), (jnp.ones_like(drive.exponent),))
+        sd = self._deviations(values, data, values).sd
+        return mean + by_exponent * sd * scatter(key, mean.shape, self.cable.description)
+
+    def observed(self) -> np.ndarray:
+        """Mean force lost while each run moved [N]."""
+        lost = self.data["moving"] * (self.data["input_force"] - self.data["output_force"])
+        return np.bincount(self.data["run"], lost.sum(axis=0))
+
+
+def loop_recordings_term(
+    cable: Cable, recordings: Recordings, angles: Mapping[str, np.ndarray], labels: tuple[str, ...], censored: bool
+) -> LoopRecordingsTerm:
+    """The term of a loop's recordings.
+
+    Args:
+        cable: The cable.
+        recordings: Its recordings.
+        angles: `ROW_ARRAYS` of each recording.
+        labels: Each run in words.
+        censored: Whether a saturated output counts as one beyond the end of the range.
+    """
+    noise_ratio = cable.description.sensors.noise_ratio
+    parts = [_loop_blocks(r, censored, noise_ratio) for r in recordings.each]
+    data = side_by_side(recordings, parts, angles)
+    moving = beside([p["moving"] for p in parts], "constant")
+    of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
+    loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.each]) for name in ("drag", "exponent"))
+    return LoopRecordingsTerm(
+        cable,
+        data
+        | {
+            "reading": data["output_force"],
+            "newtons": np.ones_like(data["output_force"]),
+            "moving": moving / np.maximum(of_run, 1)[data["run"]],
+            "loss": np.nan_to_num(loss),
+            "tells_loss": np.isfinite(loss),
+            "exponent": np.nan_to_num(exponent),
+            "tells_exponent": np.isfinite(exponent),
+        },
+        labels,
+    )
+
+
+def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
+    """Blocks of one recording, joined inside their phases where there are many.
+
+    `moving` is the number of samples that show the loss, with the sign of the motion.
+    """
+    blocks, strokes, groups = recording.blocks, recording.strokes, group_blocks(recording)
+    arrays = groups.arrays(Loop, ~blocks.saturated, censored)
+    stroke = strokes.stroke[groups.starts]
+    used = strokes.used_sliding & ~blocks.saturated
+    return arrays | {
+        "weight": arrays["worth"] / (1 + (noise_ratio * _input_share(recording, arrays["input_force"], stroke)) ** 2),
+        "moving": stroke * np.add.reduceat(blocks.samples * used, groups.starts).astype(float),
+    }
+
+
+def _input_share(recording: Recording, force: np.ndarray, stroke: np.ndarray) -> np.ndarray:
+    """How much of the input's noise each block's output has in it: what the recording's own loop passes on while it moves."""
+    loss, exponent = (float(np.nan_to_num(value)) for value in (recording.strokes.drag, recording.strokes.exponent))
+    taut = np.where(stroke > 0, loop_limits(force, loss, 0.0)[0], loop_limits(force, loss, 0.0)[1])
+    moving = np.where(stroke > 0, loop_limits(force, loss, exponent)[0], loop_limits(force, loss, exponent)[1])
+    growth = np.where(moving == taut, 1.0, np.exp(-stroke * np.sign(force) * exponent))
+    return np.where(stroke == 0, 0.0, growth)

@@ -1,0 +1,165 @@
+"""From files to tables: where a table is read from, what comes of it, and what `bowdenfit init` asks about such files."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from bowdenfit.description import Description
+from bowdenfit.errors import DatasetError
+from bowdenfit.files.matching import Quantity
+from bowdenfit.files.row_account import RowAccount
+from bowdenfit.inputs import matching
+from bowdenfit.units import ColumnSource
+
+AnyTable = TypeVar("AnyTable")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a table is to be read from, and what is said of it.
+
+    Args:
+        kind: Name of its kind.
+        settings: What stands under that name in [tables].
+        description: The whole description.
+        folder: Where the files are.
+        channels: Channels named on the command line.
+    """
+
+    kind: str
+    settings: Any
+    description: Description
+    folder: Path
+    channels: Mapping[str, ColumnSource] = field(default_factory=dict)
+
+    @property
+    def files(self) -> list[Path]:
+        """Its files; patterns are expanded in sorted order.
+
+        Raises:
+            DatasetError: A pattern matches none.
+        """
+        stated = (getattr(self.settings, "file", None), self.settings.files)
+        named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
+        paths: list[Path] = []
+        for name in named:
+            is_pattern = any(c in name for c in "*?[") and not os.path.isfile(self.folder / name)  # noqa: PTH113  (any name)
+            matches = matching(self.folder, name) if is_pattern else [self.folder / name]
+            if not matches:
+                raise DatasetError(
+                    f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."
+                )
+            paths += matches
+        return paths
+
+    @property
+    def file(self) -> Path:
+        """Its only file.
+
+        Raises:
+            DatasetError: It has several.
+        """
+        paths = self.files
+        if len(paths) != 1:
+            raise DatasetError(f"the table {self.kind} must be one file; cable.toml names {len(paths)}.")
+        return paths[0]
+
+    @property
+    def columns(self) -> dict[str, ColumnSource]:
+        """Columns that do not carry the usual names."""
+        return self.settings.columns
+
+    def name_of(self, path: Path) -> str:
+        """A file as seen from the folder."""
+        return path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name
+
+
+@dataclass(frozen=True)
+class TableFromFiles(Generic[AnyTable]):
+    """A table and where it came from.
+
+    Args:
+        table: The table.
+        files: The files it was read from, by name.
+        remarks: What had to be assumed, in sentences.
+        accounts: How many rows of each file were read, and why the others were not.
+    """
+
+    table: AnyTable
+    files: Mapping[str, Path]
+    remarks: tuple[str, ...] = ()
+    accounts: tuple[RowAccount, ...] = ()
+
+
+@dataclass(frozen=True)
+class WantedColumn:
+    """A column of a table.
+
+    Args:
+        quantity: What it holds.
+        words: The same for people, such as "the force at the motor".
+        also: Quantities that do instead.
+        optional: Whether a table can be without it.
+        numbers: The lowest and the highest number that may stand for words.
+    """
+
+    quantity: Quantity
+    words: str
+    also: tuple[Quantity, ...] = ()
+    optional: bool = False
+    numbers: tuple[float, float] = (-inf, inf)
+
+
+RUN = WantedColumn(Quantity("run", "text"), "which mounting of the cable a row belongs to", optional=True)
+STROKE = WantedColumn(
+    Quantity("stroke", "text"), "whether a row was read while pulling or returning", optional=True, numbers=(-1, 1)
+)
+
+
+@dataclass(frozen=True)
+class YesNoQuestion:
+    """A question whose yes writes a setting beside the file.
+
+    Args:
+        unless: Name of the column that answers it; it is asked only where there is none.
+        words: The question, with braces for the name of the file.
+        key, value: The setting.
+    """
+
+    unless: str
+    words: str
+    key: str
+    value: str
+
+
+@dataclass(frozen=True)
+class InitQuestions:
+    """How files of a kind are recognized, and what is asked about them.
+
+    Args:
+        holds: What such a file holds, for people.
+        columns: Its columns but for lengths and wrap angles of contacts.
+        yes_no: Questions beside those for its columns.
+        by_length: Whether its columns are the wrap angles of contacts at several lengths.
+        has_own_angles: Whether its rows may have a length, and wrap angles of contacts.
+        several: Whether it may be several files.
+        is_guessed: Whether a file that has the columns is taken for one.
+        description: What such a table makes of the rest of the description.
+    """
+
+    holds: str
+    columns: tuple[WantedColumn, ...] = ()
+    yes_no: tuple[YesNoQuestion, ...] = ()
+    by_length: bool = False
+    has_own_angles: bool = False
+    several: bool = False
+    is_guessed: bool = True
+    description: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def required(self) -> tuple[WantedColumn, ...]:
+        """The columns that a table cannot be without."""
+        return tuple(column for column in self.columns if not column.optional)

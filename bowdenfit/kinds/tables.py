@@ -1,0 +1,158 @@
+"""Tables that several kinds of measurement look at, and everything that was measured on one cable.
+
+The table of a kind that nobody else looks at stands with its kind; recordings are `bowdenfit.recordings.recording.Recordings`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from bowdenfit.description import QuantityValue, Table
+from bowdenfit.display import Display, Part
+from bowdenfit.kinds.rows import OwnAngles, RowOrigin
+from bowdenfit.types import Flags, Labels, Matrix, Vector
+
+AnyTable = TypeVar("AnyTable")
+
+
+@dataclass(frozen=True, repr=False)
+class Measurements(Display):
+    """The tables of one cable, each found by its class, and remarks on how they were read.
+
+    Args:
+        tables: At most one of a class.
+        remarks: What had to be assumed.
+    """
+
+    tables: tuple[Any, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """Which tables there are."""
+        return [f"{', '.join(type(table).__name__ for table in self.tables) or 'No table'}.", *self.remarks]
+
+    def table(self, of: type[AnyTable]) -> AnyTable | None:
+        """The table of a class; None if nothing of that kind was measured."""
+        return next((table for table in self.tables if type(table) is of), None)
+
+    def with_tables(self, *tables: Any) -> "Measurements":
+        """The same with other tables in place of those of their classes; None changes nothing."""
+        new = {type(table): table for table in tables if table is not None}
+        kept = {type(table): table for table in self.tables}
+        return replace(self, tables=tuple((kept | new).values()))
+
+
+class AngleSettings(Table):
+    """The table of wrap angles; how angles too small to detect enter the fit."""
+
+    detection_limit: QuantityValue | None = None
+    undetected: Literal["censored", "zero", "dropped"] = "censored"
+
+
+@dataclass(frozen=True, repr=False)
+class AngleTable(Part):
+    """Wrap angle of each curved contact against the route variable.
+
+    Args:
+        route: Route variable, in the unit of the description.
+        names: Column of each contact.
+        angle: Measured wrap angle [rad]; NaN where it was not detected.
+        limit: Detection limit where it was not detected [rad]; NaN elsewhere.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    names: tuple[str, ...]
+    angle: Matrix
+    limit: Matrix
+    origin: RowOrigin
+
+    def column(self, name: str) -> tuple[Vector, Vector]:
+        """Angles and detection limits of one contact."""
+        k = self.names.index(name)
+        return self.angle[:, k], self.limit[:, k]
+
+
+@dataclass(frozen=True, repr=False)
+class StretchTable(Part):
+    """Stretch of the rope, seen at its loaded end while the far end is held, under loads and at wrap angles.
+
+    Args:
+        load: Tension at the loaded end [N].
+        wrap_angle: Total wrap angle of the cable [rad].
+        stretch: Reading [mm]; what counts as zero is unknown.
+        unloading: Whether the load was larger before, in the same cycle.
+        peak: Largest load of the row's cycle [N].
+        cycle: Number of the cycle of each row.
+        cycle_names: Name of each cycle.
+        origin: Where each row was read.
+    """
+
+    load: Vector
+    wrap_angle: Vector
+    stretch: Vector
+    unloading: Flags
+    peak: Vector
+    cycle: Labels
+    cycle_names: tuple[str, ...]
+    origin: RowOrigin
+
+
+class PreloadTableSettings(Table):
+    """The table of preload, by which it follows the stretch of the rope unless the description says otherwise."""
+
+    @property
+    def tells_preload(self) -> bool:
+        """It does."""
+        return True
+
+
+@dataclass(frozen=True, repr=False)
+class PreloadTable(Part):
+    """Preload between fixed ends at wrap angles.
+
+    Args:
+        wrap_angle: Total wrap angle of the cable [rad].
+        preload: Tension at rest [N]; 0 where the rope is slack.
+        origin: Where each row was read.
+    """
+
+    wrap_angle: Vector
+    preload: Vector
+    origin: RowOrigin
+
+
+@dataclass(frozen=True, repr=False)
+class LoopTable(Part):
+    """Forces at both ends of a pull-pull loop while it moves.
+
+    Args:
+        route: Route variable; NaN where the cable has no route.
+        input_force: Difference of the tensions at the motor side [N].
+        output_force: Difference of the tensions at the load side [N].
+        stroke: +1 moving forward, -1 moving back.
+        preload: Preload measured with the row [N]; NaN where the cable's own counts.
+        own: Wrap angles measured with the row.
+        origin: Where each row was read.
+    """
+
+    route: Vector
+    input_force: Vector
+    output_force: Vector
+    stroke: Labels
+    preload: Vector
+    own: OwnAngles
+    origin: RowOrigin
+
+
+def one_angle_warning(measurements: Measurements) -> list[str]:
+    """Return a warning where stretch and preload are all read at one wrap angle, which tells no lengthening."""
+    tables = measurements.table(StretchTable), measurements.table(PreloadTable)
+    different = np.unique(np.concatenate([table.wrap_angle for table in tables if table is not None]))
+    if len(different) != 1:
+        return []
+    return [
+        f"every row of stretch and preload is at one wrap angle, {np.rad2deg(different[0]):g} deg, so how far bending "
+        "lengthens the sheath (lengthening) is not identifiable; read at several."
+    ]

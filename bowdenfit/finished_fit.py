@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 from bowdenfit.display import Rows, text_of
-from bowdenfit.questions.bends.answer import Elastic, elastic_answers
+from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.words import checks_page
@@ -59,7 +59,7 @@ class Fit(Record):
         return FigureMethods(self)
 
     @property
-    def elastic(self) -> Elastic:
+    def elastic(self) -> ElasticAnswers:
         """Answers about stretch, preload and loops at wrap angles."""
         return elastic_answers(self)
 
@@ -111,7 +111,7 @@ _WORDS: dict[type, Callable[..., str]] = {
     Record: summary_text,
     Verdict: verdict_text,
     Checks: checks_page,
-    Elastic: bends_text,
+    ElasticAnswers: bends_text,
     Identifiability: identifiability_text,
     Efficiencies: lambda efficiencies: predictions_text(efficiencies.rows),
 }

@@ -101,7 +101,7 @@ def init(
         example: Write a data set that comes with bowdenfit; without a name, list them.
     """
     from bowdenfit.questions.start.folder import refuse_existing, write_template
-    from bowdenfit.questions.start.question import Nobody
+    from bowdenfit.questions.start.question import Unattended
 
     if example is not None:
         _example(example, folder, files)
@@ -109,7 +109,7 @@ def init(
     target, measured = split_folder_and_files(folder, files or [])
     if not is_interactive() and target is None and not measured:
         raise UsageError(f"name the folder to write, such as bowdenfit init {FOLDER}.")
-    ask: Asker = Terminal() if is_interactive() else Nobody()
+    ask: Asker = Terminal() if is_interactive() else Unattended()
     refuse_existing(target or Path(FOLDER))
     ask.say("Enter takes the answer that stands in brackets; Ctrl-C ends it all, and nothing is written.")
     target = target or _ask_folder(ask)
@@ -191,15 +191,15 @@ def _ask_files(ask: "Asker") -> list[Path]:
 def _start_from_files(folder_: Path, files: Sequence[Path], ask: "Asker") -> None:
     """Describe the files, write the folder, and check that `check` accepts it."""
     from bowdenfit.questions.check.verb import check
-    from bowdenfit.questions.start.describe import description_of
-    from bowdenfit.questions.start.folder import refuse_files, write_data_set, written
+    from bowdenfit.questions.start.describe import write_description
+    from bowdenfit.questions.start.folder import describe_written_files, refuse_files, write_data_set
 
     refuse_files(files)
     called = printable(folder_.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
-    text = description_of(files, (called.strip() and called) or "cable", ask)
+    text = write_description(files, (called.strip() and called) or "cable", ask)
     write_data_set(folder_, text, files)
     say("")
-    say(filled(written(folder_)))
+    say(filled(describe_written_files(folder_)))
     folder = shlex.quote(str(folder_))
     try:
         check(folder_)

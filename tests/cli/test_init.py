@@ -14,9 +14,9 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.model import build_model
-from bowdenfit.questions.start.describe import description_of
+from bowdenfit.questions.start.describe import write_description
 from bowdenfit.questions.start.folder import examples, new_folder
-from bowdenfit.questions.start.names import coefficient_name
+from bowdenfit.questions.start.names import ask_coefficient_name
 from bowdenfit.questions.start.page import toml_text
 from bowdenfit.questions.start.question import quantity
 
@@ -74,7 +74,7 @@ def foreign(tmp_path, monkeypatch):
 def described(folder, person, *names):
     """What check makes of the description that a person's answers give."""
     paths = [folder / name for name in names]
-    (folder / "cable.toml").write_text(description_of(paths, "glove", person))
+    (folder / "cable.toml").write_text(write_description(paths, "glove", person))
     return bf.read(folder)
 
 
@@ -96,7 +96,7 @@ def test_what_the_files_say_is_not_asked(on_body):
     person = Person()
     names = ("angles.csv", "efficiencies.csv", "forces.csv")
     paths = [on_body / name for name in names if (on_body / name).exists()]
-    description_of(paths, "glove", person)
+    write_description(paths, "glove", person)
     said = " ".join(question.words for question in person.asked)
     for settled in ("In which unit", "Which column", "What does it hold", "Blank cells"):
         assert settled not in said
@@ -113,7 +113,9 @@ def test_a_unit_is_asked_for_without_any_default(foreign):
 @pytest.mark.parametrize("heading", ["rendement", "eta", "Wirkungsgrad", "efficiency", "eta mean"])
 def test_a_unit_that_a_person_says_of_efficiencies_is_kept_whatever_they_are_called(foreign, heading):
     (foreign / "eta.csv").write_text(EFFICIENCIES.replace("eta mean", heading))
-    data = described(foreign, Person(What_does_it_hold="2", In_which_unit="%", Blank_cells="10 deg"), "eta.csv", "winkel.csv")
+    data = described(
+        foreign, Person(What_does_it_hold="2", In_which_unit="%", Blank_cells="10 deg"), "eta.csv", "winkel.csv"
+    )
     (table,) = [table for table in data.measurements.tables if hasattr(table, "efficiency")]
     assert table.efficiency.tolist() == pytest.approx([0.78, 0.76, 0.73])
 
@@ -142,7 +144,10 @@ def test_where_nobody_can_be_asked_all_that_is_not_said_is_refused_and_nothing_w
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("Winkel (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n", "whether its column 'Winkel (deg)' is the wrap angle"),
+        (
+            "Winkel (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n",
+            "whether its column 'Winkel (deg)' is the wrap angle",
+        ),
         ("humidity (%),wrap angle (deg)\n78,90\n60,180\n", "does not say what it holds"),
         ("wrap angle (deg),F_in (N),Cell B (N)\n90,50,40\n180,60,38\n", "does not say what it holds"),
         ("F_in (N),F_out (N)\n50,40\n60,48\n", "is a wrap angle; add one"),
@@ -233,12 +238,12 @@ def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
 )
 def test_a_coefficient_is_not_called_what_check_would_refuse(typed, said):
     with pytest.raises(UsageError, match=said):
-        coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
+        ask_coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
 
 
 @pytest.mark.extended
 def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
-    question = coefficient_name("What is it called?", "mu1", ())
+    question = ask_coefficient_name("What is it called?", "mu1", ())
     kept = ("mu1", " µ  edge ", "knie_mu", "friction")
     assert [question.read(name) for name in kept] == ["mu1", "µ edge", "knie_mu", "friction"]
     for name in examples():
@@ -349,8 +354,17 @@ def test_a_folder_that_exists_is_refused_before_the_first_question(foreign):
 @pytest.mark.parametrize(
     "page",
     [
-        {"schema": 1, "name": 'a "cable"\\ \u00e4', "contact": [{"name": "a", "angle": {"value": 1e-7, "unit": "deg"}}] * 2},
-        {"tables": {"forces": {"file": "f.csv", "columns": {f"key {i}": {"name": f"Kanal {i}"} for i in range(9)}}, "a": {}}},
+        {
+            "schema": 1,
+            "name": 'a "cable"\\ \u00e4',
+            "contact": [{"name": "a", "angle": {"value": 1e-7, "unit": "deg"}}] * 2,
+        },
+        {
+            "tables": {
+                "forces": {"file": "f.csv", "columns": {f"key {i}": {"name": f"Kanal {i}"} for i in range(9)}},
+                "a": {},
+            }
+        },
         {"tables": {"recordings": {}}, "route": {"range": [0.1, 3], "choices": [i / 3 for i in range(60)]}},
     ],
 )

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.data_set_words import describe_data_set
 
 DATASETS = sorted(path.parent for path in (Path(__file__).parents[2] / "datasets").glob("*/cable.toml"))
 
@@ -19,6 +19,6 @@ def test_every_row_of_every_data_set_is_read_or_named(folder):
         assert account.rows == len(files[account.file].read_bytes().splitlines()) == account.accounted
     read = {account.file for account in data.accounts}
     assert read == {Path(name).name for name in data.sha256 if name.endswith(".csv")}
-    words = check_text(data)
+    words = describe_data_set(data)
     for account in data.accounts:
         assert f"{account.file}: of {account.rows} rows {account.read} hold readings" in words

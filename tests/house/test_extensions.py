@@ -19,7 +19,7 @@ from bowdenfit.cli.commands import command
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.terms import TERMS
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import FIGURES
 
 MU, ANGLE = 0.1, np.deg2rad(180.0)
@@ -78,7 +78,7 @@ def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tm
     force = np.linspace(10.0, 80.0, 15)
     loss = force * -np.expm1(-MU * ANGLE) + 0.2 * np.random.default_rng(2).standard_normal(15)
     folder = data_set("losses", "input_force_N,loss_N", (force, loss))
-    assert "15 lost forces" in check_text(bf.read(folder))
+    assert "15 lost forces" in describe_data_set(bf.read(folder))
     found = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
     interval = found.parameter("mu")
     assert abs(interval.mean - MU) < 4 * interval.sd

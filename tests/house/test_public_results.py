@@ -33,7 +33,9 @@ def known_to(module) -> dict[str, Any]:
     names = dict(vars(module))
     for node in ast.walk(ast.parse(inspect.getsource(module))):
         if isinstance(node, ast.ImportFrom) and node.module:
-            names |= {a.asname or a.name: getattr(importlib.import_module(node.module), a.name, None) for a in node.names}
+            names |= {
+                a.asname or a.name: getattr(importlib.import_module(node.module), a.name, None) for a in node.names
+            }
     return names
 
 
@@ -71,14 +73,16 @@ CLASSES = sorted({part for every in RESULTS.values() for part in every} - PLAIN,
 def test_the_public_functions_are_found_with_what_they_return():
     names = {part.__name__ for part in CLASSES if isinstance(part, type)}
     assert names >= {
-        "Calibration", "Checks", "Comparison", "Draws", "Efficiencies", "Elastic", "Files", "Fit", "Groups",
+        "Calibration", "Checks", "Comparison", "Draws", "Efficiencies", "ElasticAnswers", "Files", "Fit", "Groups",
         "Identifiability", "Interval", "NextMeasurement", "OptimalLength", "Predictions", "Report", "Summary", "Verdict",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize("result", CLASSES, ids=lambda part: getattr(part, "__name__", str(part)))
 def test_every_public_result_shows_itself(result):
-    assert isinstance(result, type), f"{result} is no class of its own; {[n for n, p in RESULTS.items() if result in p]}"
+    assert isinstance(result, type), (
+        f"{result} is no class of its own; {[n for n, p in RESULTS.items() if result in p]}"
+    )
     if result.__module__.startswith("bowdenfit"):
         assert issubclass(result, Display)
         assert result.__repr__ is Display.__repr__, "its dataclass writes its own; decorate it with repr=False"
@@ -224,12 +228,19 @@ def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, answers,
     )  # fmt: skip
     for answer in (*answers.values(), *others):
         look_at(answer)
-    assert bf.check(on_body)._repr_html_().startswith("<h4>On-body knee exoskeleton</h4><p><b>Everything could be read.")
+    assert (
+        bf.check(on_body)._repr_html_().startswith("<h4>On-body knee exoskeleton</h4><p><b>Everything could be read.")
+    )
     assert bf.predict(fit, [455])[0]["mean"] == pytest.approx(fit.efficiency(455)[0].mean)
 
 
 def test_all_that_can_be_reached_from_a_result_is_short(fit, answers):
-    for name, value in {"fit": fit, "summary": fit.summary(), "optimal_length": fit.optimal_length(), **answers}.items():
+    for name, value in {
+        "fit": fit,
+        "summary": fit.summary(),
+        "optimal_length": fit.optimal_length(),
+        **answers,
+    }.items():
         assert look_inside(value, name) > 3
     assert look_inside(bf.read("datasets/synthetic-recordings"), "read") > 100
     assert list(answers["compare"].predictions.to_frame()["name"]) == ["a", "b"]

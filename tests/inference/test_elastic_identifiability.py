@@ -12,7 +12,7 @@ from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.bends.overview import products_with_preload
+from bowdenfit.questions.bends.overview import describe_products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
 from bowdenfit.questions.summary.words import full_text
 
@@ -131,11 +131,13 @@ def test_the_summary_says_which_values_fit_as_well():
 def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
     sampler = {"n_walkers": 32, "target_ess": 100, "target_r_hat": 1.1, "max_steps": 400}
     prior = {"preload": {"prior": {"lognormal": {"median": 20.0, "log_sd": 1.0}}}}  # else it may as well be slack
-    data, _ = measured(cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), once=True, **TRUTH)
+    data, _ = measured(
+        cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), once=True, **TRUTH
+    )
     fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
-    (sentence,) = products_with_preload(fit)
+    (sentence,) = describe_products_with_preload(fit)
     assert sentence.startswith(
-        "The measurements hardly tell preload and mu apart; what they do determine is preload x mu = 0.6"
+        "The measurements hardly separate preload from mu; they determine the product preload x mu = 0.6"
     )
     product = fit.posterior.values["preload"] * fit.posterior.values["mu"]
     assert np.std(np.log(fit.posterior.values["preload"])) > 5 * np.std(np.log(product))

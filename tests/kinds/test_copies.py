@@ -9,8 +9,8 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.kinds.plausibility import Compared, copies
-from bowdenfit.questions.check.copied import copied_readings
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.copied import describe_copied_readings
+from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.verdict import COPIED
 
@@ -44,14 +44,14 @@ def pasted(folder, name, file):
 
 @pytest.mark.parametrize(("name", "file"), TABLES)
 def test_a_table_that_was_pasted_twice_is_said_to_be(tmp_path, name, file):
-    (sentence,) = copied_readings(pasted(tmp_path, name, file))
+    (sentence,) = describe_copied_readings(pasted(tmp_path, name, file))
     assert sentence.startswith("Every reading") and f"{file} stands there twice, to the last digit." in sentence
     assert "leave them out" in sentence
 
 
 def test_no_published_table_is_said_to_be_copied():
     for path in sorted(DATASETS.glob("*/cable.toml")):
-        assert copied_readings(bf.read(path.parent)) == (), path.parent.name
+        assert describe_copied_readings(bf.read(path.parent)) == (), path.parent.name
 
 
 def test_a_run_that_was_saved_as_another_one_is_named_and_its_fit_is_not_trusted(tmp_path):
@@ -65,7 +65,7 @@ def test_a_run_that_was_saved_as_another_one_is_named_and_its_fit_is_not_trusted
     (sentence,) = fit.verdict().troubles[COPIED]
     assert sentence.startswith("Run 5 of forces.csv holds the same 20 readings as run 1, to the last digit.")
     assert "some of the readings are copies of others" in summary_text(fit).splitlines()[0]
-    assert "1 warning" in check_text(fit.dataset)
+    assert "1 warning" in describe_data_set(fit.dataset)
     clean = bf.fit(hand_bench.write(tmp_path / "clean", rows), mcmc=False)
     assert COPIED not in clean.verdict().troubles
 
@@ -75,8 +75,10 @@ def test_a_recording_under_another_name_is_said_to_be_the_same(tmp_path):
     shutil.copytree(DATASETS / "synthetic-recordings", folder)
     names = sorted(path.name for path in (folder / "recordings").glob("*.csv"))
     shutil.copy(folder / "recordings" / names[0], folder / "recordings" / names[1])
-    (sentence,) = copied_readings(bf.read(folder))
-    assert sentence.startswith("The recording 470 mm, 20 r/min holds the same forces as the recording 440 mm, 20 r/min, to")
+    (sentence,) = describe_copied_readings(bf.read(folder))
+    assert sentence.startswith(
+        "The recording 470 mm, 20 r/min holds the same forces as the recording 440 mm, 20 r/min, to"
+    )
 
 
 def simulated(generator):

@@ -8,7 +8,7 @@ from spoiling import copied, spoil
 import bowdenfit as bf
 from bowdenfit.kinds.displacement.table import DisplacementTable, in_order
 from bowdenfit.kinds.rows import fixed, in_words
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.data_set_words import describe_data_set
 
 NAMES = ("cable.toml", "displacement.csv")
 TOML, CSV = NAMES
@@ -38,7 +38,7 @@ def test_every_row_is_a_reading_or_said_to_be_unused(catheter):
     data = bf.read(catheter)
     table = data.measurements.table(DisplacementTable)
     assert len(table.used) == data.accounts[0].read == 147
-    text = " ".join(check_text(data).split())
+    text = " ".join(describe_data_set(data).split())
     assert f"{table.used.sum()} forces against displacement in 3 runs" in text
     assert f"{147 - table.used.sum()} of 147 rows are not used" in text
     assert 120 < table.used.sum() < 147
@@ -108,7 +108,9 @@ def test_a_run_of_one_reading_is_refused_unless_it_is_said_where_its_displacemen
     lines[41] = lines[41].replace("180,", "1800,", 1)
     (catheter / CSV).write_text("\n".join(lines))
     sentence = refuse("check", catheter)
-    assert all(part in sentence for part in ("row 42 (1800 deg)", "a run of one reading", "slipped digit", "leave the row out"))
+    assert all(
+        part in sentence for part in ("row 42 (1800 deg)", "a run of one reading", "slipped digit", "leave the row out")
+    )
     with (catheter / TOML).open("a") as toml:
         toml.write("\n[prior.displacement_zero_2]\nfixed = 0.4\n")
     assert len(bf.read(catheter).measurements.table(DisplacementTable).run_names) == 4
@@ -126,7 +128,7 @@ def test_rows_with_strokes_are_taken_while_all_of_the_rope_slides(catheter, refu
     data = bf.read(catheter)
     table = data.measurements.table(DisplacementTable)
     assert table.sliding and table.used.all() and table.motion.slides.all()
-    text = check_text(data)
+    text = describe_data_set(data)
     assert 'rows = "in order"' in text
     assert "only to a factor of two" in text
     spoil(catheter / CSV, "pull,8", "hold,8")
@@ -135,7 +137,7 @@ def test_rows_with_strokes_are_taken_while_all_of_the_rope_slides(catheter, refu
 
 def test_a_free_spring_without_a_closed_loop_is_warned_of(catheter):
     with_columns(catheter, lambda rows: np.concatenate([part[:17] for part in np.split(rows, 3)]))
-    assert "friction cannot be told from the stiffness" in check_text(bf.read(catheter))
+    assert "friction cannot be told from the stiffness" in describe_data_set(bf.read(catheter))
 
 
 def test_rows_before_a_stop_are_counted_and_left_out(catheter):
@@ -144,7 +146,7 @@ def test_rows_before_a_stop_are_counted_and_left_out(catheter):
     table = data.measurements.table(DisplacementTable)
     before = int(np.sum(table.displacement <= 12))
     assert not np.any(table.used & (table.displacement <= 12))
-    assert "rows lie before the stop" in check_text(data) and before > 10
+    assert "rows lie before the stop" in describe_data_set(data) and before > 10
 
 
 PLAN = """name = "planned"
@@ -173,7 +175,7 @@ displacement_zero_2 = 1
 def test_a_plan_is_simulated_row_by_row_as_friction_at_every_place_has_it(tmp_path, accept):
     (tmp_path / "bench.toml").write_text(PLAN)
     accept("simulate", tmp_path / "bench.toml", "-o", tmp_path / "out", "--seed", 1)
-    text = check_text(bf.read(tmp_path / "out"))
+    text = describe_data_set(bf.read(tmp_path / "out"))
     assert "in 2 runs" in text
     rows = np.loadtxt(tmp_path / "out" / "tip.csv", delimiter=",", skiprows=1, usecols=(0, 2, 3))
     for bend in (180, 360):
@@ -191,7 +193,7 @@ def test_of_a_long_table_some_rows_are_used_and_all_turns(catheter):
     data = bf.read(catheter)
     table = data.measurements.table(DisplacementTable)
     assert 300 < table.used.sum() <= 600 and len(table.motion.turns.at) == 4
-    assert "is used" in check_text(data)
+    assert "is used" in describe_data_set(data)
 
 
 def test_turns_are_remembered_and_forgotten_once_they_are_passed():

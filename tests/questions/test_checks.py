@@ -37,9 +37,9 @@ from bowdenfit.questions.check import checks_figure, prior_figure
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
 from bowdenfit.questions.check.prior_predictive import prior_predictive
-from bowdenfit.questions.check.sensitivity_words import assumed_widths, priors_text
-from bowdenfit.questions.check.suspects import suspects_of
-from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths, describe_prior_influence
+from bowdenfit.questions.check.suspects import find_influential_outliers
+from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.summary import methods_section
 from bowdenfit.questions.summary.trust_words import next_step
 from bowdenfit.results.record import Draws, Provenance, Record
@@ -205,10 +205,11 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
     ratios = {"mu2": (1.4, 0.7), "tau": (1.38, 0.71), "mu1": (1.1, 0.9)}
     widths = tuple(WidthSensitivity(name, *ratio, 0.1, 0.1) for name, ratio in ratios.items())
     sensitivity = Sensitivity("mu2", "mu2", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths)
-    told = [priors_text(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
+    told = [describe_prior_influence(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
     assert told == [
-        "The prior of tau sets widths, because 4 readings tell 3 coefficients too: the 90 % interval of mu2 would be 1.38 "
-        "times as wide with twice its scale and 0.71 times as wide with half of it. Widths also follow the prior of mu2.",
+        "The prior of tau sets widths, because 4 readings must also determine 3 coefficients: the 90 % interval of mu2 would "
+        "be 1.38 times as wide with twice its scale and 0.71 times as wide with half of it. "
+        "Widths also follow the prior of mu2.",
         "The prior of mu2 sets widths: the 90 % interval of mu2 would be 1.40 times as wide with twice its scale and 0.70 "
         "times as wide with half of it. Widths also follow the prior of tau.",
     ]
@@ -217,9 +218,11 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
 def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_it():
     def said(doubled, told_by):
         widths = (WidthSensitivity("tau", doubled, 0.95, 0.1, 0.1),)
-        return assumed_widths(Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by))
+        return describe_assumed_widths(
+            Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by)
+        )
 
-    assert said(1.5, {"tau": (2, 1)}) == "Interval widths rest on what was assumed of tau: 2 readings, 1 coefficient."
+    assert said(1.5, {"tau": (2, 1)}) == "Widths follow the prior of the noise tau; add readings (2 for 1 coefficient)."
     assert said(1.1, {"tau": (2, 1)}) == said(1.5, {}) == ""
 
 
@@ -261,7 +264,7 @@ def fit(quick_fit):
 
 def said(fit):
     """What the summary says of the checks, in one line."""
-    return " ".join(checks_text(fit.checks).split())
+    return " ".join(describe_checks(fit.checks).split())
 
 
 def test_a_best_length_that_leaves_the_end_of_the_range_in_a_draw_that_thinning_passes_over_has_no_sensitivity(
@@ -287,7 +290,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     text = said(fit)
     assert "No reading is an outlier." in text
     assert re.search(r"Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 6[6-9]\.", text)
-    assert len(checks_text(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
+    assert len(describe_checks(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
 
 
 def test_in_doubt_what_the_fit_leans_on_is_to_be_measured_again(fit):
@@ -322,7 +325,7 @@ def test_without_draws_there_are_no_checks(on_body_squares):
     squares = on_body_squares
     assert squares.checks is None
     assert "checks" not in squares.summary()
-    assert checks_text(squares.checks) == ""
+    assert describe_checks(squares.checks) == ""
 
 
 def changed(dataset, table, column, row, by):
@@ -345,8 +348,8 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     assert f"], {n} of them against that of a fit without it." in methods
     (far,) = found.outliers
     assert far.label == "free_sheath_angle at 490 mm"
-    assert 8.5 < far.z < 9.5 and far.decisive
-    text = " ".join(checks_text(found).split())
+    assert 8.5 < far.z < 9.5 and far.influential
+    text = " ".join(describe_checks(found).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
     figure = checks_figure.draw(checked_tables(found))
     check_words(figure, "an outlier")
@@ -373,14 +376,14 @@ def test_a_run_read_a_quarter_too_low_among_four_is_an_outlier(scale, tmp_path):
 
 def test_fits_without_a_reading_are_made_of_the_three_farthest_that_the_fit_leans_on():
     """Of 100 readings, weights call one of a healthy fit so far out in one fit of ten where its chance is 0.001."""
-    chance, decisive = np.full(60, 0.5), np.ones(60, dtype=bool)
-    chance[[3, 7, 11]], decisive[11] = (9e-4, 1.1e-3, 1e-9), False
-    first = SimpleNamespace(chance=chance, decisive=decisive)
-    second = SimpleNamespace(chance=np.full(40, 0.5), decisive=np.ones(40, dtype=bool))
-    assert suspects_of([]) == []
-    assert suspects_of([first, second]) == [(0, 3)]
-    second.chance[[1, 5, 9]] = 1e-5, 1e-7, 1e-4
-    assert suspects_of([first, second]) == [(1, 5), (1, 1), (1, 9)]
+    p_values, influential = np.full(60, 0.5), np.ones(60, dtype=bool)
+    p_values[[3, 7, 11]], influential[11] = (9e-4, 1.1e-3, 1e-9), False
+    first = SimpleNamespace(p_values=p_values, influential=influential)
+    second = SimpleNamespace(p_values=np.full(40, 0.5), influential=np.ones(40, dtype=bool))
+    assert find_influential_outliers([]) == []
+    assert find_influential_outliers([first, second]) == [(0, 3)]
+    second.p_values[[1, 5, 9]] = 1e-5, 1e-7, 1e-4
+    assert find_influential_outliers([first, second]) == [(1, 5), (1, 1), (1, 9)]
 
 
 @pytest.fixture(scope="module")
@@ -459,7 +462,8 @@ def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     table = right.measurements.table(StretchTable)
     wrong = changed(right, "stretch", "stretch", slice(None), 999 * table.stretch)
     of_wrong, of_right = (
-        KINDS["stretch"].warnings(d.measurements.table(StretchTable), d.description, d.measurements) for d in (wrong, right)
+        KINDS["stretch"].warnings(d.measurements.table(StretchTable), d.description, d.measurements)
+        for d in (wrong, right)
     )
     (said,) = set(of_wrong) - set(of_right)
     assert "gives 4030 mm under 99 N more" in said

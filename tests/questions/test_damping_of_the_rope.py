@@ -10,7 +10,7 @@ from bowdenfit.device.known import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.questions.bends import ring_down
-from bowdenfit.questions.bends.ring_down import device_for
+from bowdenfit.questions.bends.ring_down import device_with_ring_down
 
 pytestmark = pytest.mark.extended
 
@@ -58,7 +58,7 @@ def named(monkeypatch):
 
 def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_path, named):
     asked = named(Fitted())
-    found = device_for(Fitted(rings=False), device(tmp_path))
+    found = device_with_ring_down(Fitted(rings=False), device(tmp_path))
     assert asked == [tmp_path / "../bar"], "as seen from device.toml"
     keys = "rope.damping", "joint.damping"
     rope, joint = draw_device(found.needed("an answer", *keys), 40_000, 7).values()
@@ -70,10 +70,10 @@ def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_
 
 def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(tmp_path):
     path = device(tmp_path, "mounting", ('inertia = { value = 1e-3, unit = "kg*m^2", sd = 0.1e-3 }\n', ""))
-    found = device_for(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
+    found = device_with_ring_down(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
     draws = draw_device(found, 5000, 1)
     np.testing.assert_allclose(draws["joint.inertia"], 1e-3 + 0.02 * (draws["rope.damping"] + draws["joint.damping"]))
-    assert device_for(Fitted(rings=False), DEVICE) == read_device(DEVICE)
+    assert device_with_ring_down(Fitted(rings=False), DEVICE) == read_device(DEVICE)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
 def test_what_a_ring_down_cannot_tell_is_refused(tmp_path, named, own, other, change, says):
     named(other)
     with pytest.raises(DescriptionError, match=says):
-        device_for(Fitted(rings=own), device(tmp_path, **change))
+        device_with_ring_down(Fitted(rings=own), device(tmp_path, **change))
 
 
 def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):
@@ -98,7 +98,7 @@ def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):
     doubtful.converged, doubtful.reasons = False, ("R-hat is 1.7",)
     named(doubtful)
     with pytest.raises(DescriptionError, match=r"not to be trusted \(R-hat is 1.7\); sample longer"):
-        device_for(Fitted(rings=False), device(tmp_path))
+        device_with_ring_down(Fitted(rings=False), device(tmp_path))
 
 
 def test_where_nothing_tells_it_a_ring_down_is_the_remedy(tmp_path):

@@ -12,8 +12,8 @@ from kept_data import assert_kept
 from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.questions.bends.bending_loss_figure import BendingLoss, EfficiencyLine
 from bowdenfit.questions.bends.loops_figure import LoopCurve
-from bowdenfit.questions.bends.preload_figure import PreloadCurve, stretches
-from bowdenfit.questions.bends.preload_window_figure import PreloadWindow
+from bowdenfit.questions.bends.preload_figure import PreloadCurve, true_stretches
+from bowdenfit.questions.bends.preload_window_figure import PreloadWindowCurves
 from bowdenfit.questions.bends.stretch_figure import StretchCurve
 from bowdenfit.questions.figures import FIGURES, draw_figure
 
@@ -144,7 +144,7 @@ def preload_window(made, top=60.0, force=60.0, bends=(0.0, 270.0)):
     preload = np.linspace(0.0, top, 61)
     exponent = made.friction * np.deg2rad(bends[1])
     lowest = force * mean_tension(1.0, exponent) / 2 + 2.0 * (made.preload - np.median(made.preload))
-    return PreloadWindow(
+    return PreloadWindowCurves(
         preload, "at 0 deg", made.quantiles(2 * preload * exponent * RADIUS), "N*mm", (preload >= lowest).mean(axis=0),
         np.quantile(lowest, QUANTILES), bends, force,
     )  # fmt: skip
@@ -356,8 +356,8 @@ def test_slack_is_shaded_by_its_probability_in_both_panels():
 
 
 def test_stretches_of_true_values_are_found_to_the_last_place():
-    assert stretches(np.array([1, 1, 0, 0, 1, 0, 1], dtype=bool)) == [(0, 1), (4, 4), (6, 6)]
-    assert stretches(np.zeros(3, dtype=bool)) == []
+    assert true_stretches(np.array([1, 1, 0, 0, 1, 0, 1], dtype=bool)) == [(0, 1), (4, 4), (6, 6)]
+    assert true_stretches(np.zeros(3, dtype=bool)) == []
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 from bowdenfit.description import Description
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.least_squares import LeastSquares
-from bowdenfit.questions.bends.words import elastic_text
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.bends.words import describe_elastic
+from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.results.record import Draws, Provenance
 
 BENDS = np.deg2rad([0.0, 30.0, 75.0, 120.0, 180.0, 270.0])
@@ -319,5 +319,5 @@ def test_a_bend_below_twenty_rope_diameters_is_warned_of_in_check_and_summary(di
     sizes = {"kind": "single", "rope_diameter": diameter, "bend_radius": radius}
     fit = known(elastic_cable(("stretch",), cable=sizes), spread=0.01, n=4)
     says = re.compile(r"bend radius is [\d.]+ rope diameters")
-    assert bool(says.search(check_text(fit.dataset))) == sharp
-    assert bool(says.search(" ".join(elastic_text(fit).split()))) == sharp
+    assert bool(says.search(describe_data_set(fit.dataset))) == sharp
+    assert bool(says.search(" ".join(describe_elastic(fit).split()))) == sharp

@@ -10,10 +10,10 @@ from loop_benches import MU, PRELOAD, folder_of, recorded, several_in
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import FIGURES, figures_of
 from bowdenfit.questions.recorded.loop_traces import loop_points
-from bowdenfit.questions.recorded.traces import traces
+from bowdenfit.questions.recorded.traces import trace_recordings
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.store import _measurements, _measurements_page
 
@@ -57,7 +57,7 @@ def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
 
 
 def test_the_report_speaks_of_moving_forward_and_back(several):
-    text = check_text(load_dataset(several))
+    text = describe_data_set(load_dataset(several))
     for words in ("forward", "between", "back", "loss", "2 x preload x exponent", "not estimated for a loop"):
         assert words in " ".join(text.split())
     for words in ("pulling", "switching", "sliding"):
@@ -68,12 +68,12 @@ def test_the_report_speaks_of_moving_forward_and_back(several):
 
 
 def test_traces_follow_the_recorded_output(sampled):
-    for trace in traces(sampled):
+    for trace in trace_recordings(sampled):
         assert np.median(np.abs(trace.fitted - trace.output_force)) < 0.2
         low, _, high = trace.predicted
         assert np.mean((trace.output_force > low - 0.5) & (trace.output_force < high + 0.5)) > 0.9
         assert trace.output_force.min() < -1
-        assert trace.loop
+        assert trace.is_loop
 
 
 def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
@@ -85,7 +85,7 @@ def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
     more = f"[prior]\n{prior}\n[friction.mu]\nfixed = {MU}\n"
     sensors = '[sensors]\ninput_gain_error_sd = 0\noutput_gain_error_sd = 0.1\noffset_sd = { value = 1, unit = "N" }'
     fit = bf.fit(folder_of(tmp_path, [columns], more=f"{sensors}\n{more}[tables]\nrecordings = {{}}"), mcmc=False)
-    trace = traces(fit)[0]
+    trace = trace_recordings(fit)[0]
     assert len(trace.predicted) == 1
     assert np.abs(trace.predicted[0] - trace.output_force).max() < 0.3
     assert np.median(np.abs(trace.predicted[0] - trace.output_force)) < 0.02

@@ -15,12 +15,12 @@ from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compar
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.descriptions import design_of
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.questions.check.data_set_words import check_text
+from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import figures_of
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
-from bowdenfit.questions.recorded.traces import traces
+from bowdenfit.questions.recorded.traces import trace_recordings
 from bowdenfit.questions.summary.answer import answer
 from bowdenfit.questions.summary.brief_words import summary_text
 from bowdenfit.questions.summary.words import full_text
@@ -131,14 +131,14 @@ def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(p
 
 
 def test_check_shows_the_recordings_and_has_no_false_warning(recorded):
-    text = check_text(bf.check(recorded))
+    text = describe_data_set(bf.check(recorded))
     assert "470 mm, 60 r/min" in text
     assert "Warning" not in text
     assert "Nothing is wrong" in text
 
 
 def test_figures_of_a_fit_show_every_recording_with_a_band_that_holds_most_of_it(plain):
-    found = traces(plain[0])
+    found = trace_recordings(plain[0])
     assert len(found) == 7
     for trace in found:
         low, _, high = trace.predicted[:, trace.used]

@@ -19,12 +19,12 @@ from bowdenfit.kinds import each_table
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import stiffness_with_springs
-from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_preload, knows_stretch
-from bowdenfit.questions.bends.preload_window import TAUT, PreloadAnswer
+from bowdenfit.questions.bends.equations import BentCable, bending_contact, has_preload, has_stretch
+from bowdenfit.questions.bends.preload_window import TAUT, PreloadWindow
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 
-_BENDS = 25  # wrap angles at which a range of bends is looked at
-_SHOWN = 5  # wrap angles of a summary
+_WINDOW_BENDS = 25  # wrap angles across a range of bends, on which extremes are searched
+_MAX_BENDS = 5  # wrap angles shown in a summary
 _QUANTILES = 0.5, 0.05, 0.95
 _UNITS = {
     "preload": "N", "friction": "N", "slack_load": "N", "efficiency": "1", "position_error": "mm", "lost_motion": "mm",
@@ -33,60 +33,60 @@ _UNITS = {
 
 
 @dataclass(frozen=True, repr=False)
-class Elastic(Display):
-    """The elastic answers of one fit. Angles are in rad, forces in N, lengths in mm."""
+class ElasticAnswers(Display):
+    """Answers of one fit about stretch, preload and loops. Angles are in rad, forces in N, lengths in mm."""
 
     fit: Record
 
     def _table(self) -> Rows:
-        """The usual answers at the wrap angles that were measured at."""
+        """Return a table of the answers at the measured wrap angles."""
         bends, draws, _ = self.usual
         names = [f"{name}{of}" for name in draws for of in ("", "_q05", "_q95")]
-        values = [q for drawn in draws.values() for q in np.quantile(drawn, _QUANTILES, axis=0)]
+        values = [q for values in draws.values() for q in np.quantile(values, _QUANTILES, axis=0)]
         return {"wrap_angle": np.rad2deg(bends)} | dict(zip(names, values, strict=True)), {"wrap_angle": "deg"} | {
             name: _UNITS[name.removesuffix("_q05").removesuffix("_q95")] for name in names
         }
 
     @cached_property
     def contact(self) -> int:
-        """Number of the contact that a wrap angle means."""
+        """Number of the contact that a wrap angle refers to."""
         return bending_contact(self.fit.model)
 
-    def bent(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
-        """The cable at wrap angles [rad].
+    def bend_to(self, wrap_angles: Sequence[float] | np.ndarray) -> BentCable:
+        """Return the cable bent to wrap angles [rad].
 
         Raises:
             UsageError: A wrap angle does not say which of several contacts is bent.
         """
         with jax.enable_x64(True):
-            return Bent(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+            return BentCable(self.fit.model, self.contact, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
 
-    def stretched(self, wrap_angles: Sequence[float] | np.ndarray) -> Bent:
-        """The same for the stretch of a single rope, to which only all its bends together matter."""
+    def bend_rope_to(self, wrap_angles: Sequence[float] | np.ndarray) -> BentCable:
+        """Return the cable bent to total wrap angles [rad], on which the stretch of a single rope depends."""
         model = self.fit.model
         if model.cable.is_loop or len(model.description.contact) == 1:
-            return self.bent(wrap_angles)
+            return self.bend_to(wrap_angles)
         with jax.enable_x64(True):
-            return Bent(model, None, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
+            return BentCable(model, None, jnp.asarray(np.atleast_1d(wrap_angles), dtype=float))
 
-    def over(self, function: Callable[..., Any], *data: Any) -> Any:
-        """A function of named values (and of data that are the same for all), for every draw, or for least squares alone."""
+    def evaluate(self, function: Callable[..., Any], *data: Any) -> Any:
+        """Evaluate a function of named values (and of shared data) for every draw, or for the least-squares values."""
         with jax.enable_x64(True):
             return for_each_value(function, parameter_values(self.fit), *data)
 
     @cached_property
     def measured_bends(self) -> np.ndarray:
-        """Different wrap angles that anything was measured at [rad]."""
+        """Distinct wrap angles at which anything was measured [rad]."""
         contact = self.fit.dataset.description.contact[self.contact]
-        column, found = contact.wrap_angle.column, []
+        column, angles_by_table = contact.wrap_angle.column, []
         for kind, table in each_table(self.fit.dataset.measurements):
             if isinstance(kind, FrictionKind):
-                found += [] if column is None else [kind.conditions(table).own.column(column)[0]]
+                angles_by_table += [] if column is None else [kind.conditions(table).own.column(column)[0]]
             elif isinstance(kind, RopeKind):
-                found.append(kind.bends(table))
+                angles_by_table.append(kind.bends(table))
         if contact.wrap_angle.constant is not None:
-            found.append(np.array([contact.wrap_angle.constant.to("angle")]))
-        angles = np.concatenate(found) if found else np.zeros(0)
+            angles_by_table.append(np.array([contact.wrap_angle.constant.to("angle")]))
+        angles = np.concatenate(angles_by_table) if angles_by_table else np.zeros(0)
         return np.unique(np.round(angles[np.isfinite(angles)], 9))
 
     @property
@@ -110,15 +110,15 @@ class Elastic(Display):
         self, wrap_angles: np.ndarray, input_force: float, stroke: int = 1, preload: float | None = None
     ) -> np.ndarray:
         """Output force [N] of every draw (rows) at wrap angles (columns)."""
-        bent, force = self.bent(wrap_angles), float(input_force)
-        return self.over(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
+        bent, force = self.bend_to(wrap_angles), float(input_force)
+        return self.evaluate(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
 
     def input_force(
         self, wrap_angles: np.ndarray, output_force: float, stroke: int = 1, preload: float | None = None
     ) -> np.ndarray:
         """Input force [N] that gives an output force, of every draw (rows) at wrap angles (columns)."""
-        bent, force = self.bent(wrap_angles), float(output_force)
-        return self.over(lambda values: bent.input_force(values, jnp.asarray(force), float(stroke), preload))
+        bent, force = self.bend_to(wrap_angles), float(output_force)
+        return self.evaluate(lambda values: bent.input_force(values, jnp.asarray(force), float(stroke), preload))
 
     def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
         """Force felt in free motion [N], draws by wrap angles.
@@ -126,9 +126,9 @@ class Elastic(Display):
         Raises:
             UsageError: The cable has no preload, and none is stated.
         """
-        self._needs_preload(preload)
-        bent = self.bent(wrap_angles)
-        return self.over(lambda values: bent.friction(values, preload))
+        self._require_preload(preload)
+        bent = self.bend_to(wrap_angles)
+        return self.evaluate(lambda values: bent.friction(values, preload))
 
     def preload(self, wrap_angles: np.ndarray, preload: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Preload [N] and slack [mm], draws by wrap angles.
@@ -136,9 +136,9 @@ class Elastic(Display):
         Raises:
             UsageError: The cable has no preload, and none is stated.
         """
-        self._needs_preload(preload)
-        bent = self.bent(wrap_angles)
-        return self.over(lambda values: bent.preload(values, preload))
+        self._require_preload(preload)
+        bent = self.bend_to(wrap_angles)
+        return self.evaluate(lambda values: bent.preload(values, preload))
 
     def slack_load(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
         """Input force at which the return side of a loop goes slack [N], draws by wrap angles.
@@ -146,9 +146,9 @@ class Elastic(Display):
         Raises:
             UsageError: The cable has no preload, and none is stated.
         """
-        self._needs_preload(preload)
-        bent = self.bent(wrap_angles)
-        return self.over(lambda values: bent.slack_load(values, preload))
+        self._require_preload(preload)
+        bent = self.bend_to(wrap_angles)
+        return self.evaluate(lambda values: bent.slack_load(values, preload))
 
     def position(
         self, wrap_angles: np.ndarray, input_force: float, preload: float | None = None
@@ -158,9 +158,9 @@ class Elastic(Display):
         Raises:
             UsageError: Nothing says how the rope stretches.
         """
-        self._needs_stretch()
-        bent = self.stretched(wrap_angles)
-        error, lost = self.over(lambda values: bent.position(values, float(input_force), preload))
+        self._require_stretch()
+        bent = self.bend_rope_to(wrap_angles)
+        error, lost = self.evaluate(lambda values: bent.position(values, float(input_force), preload))
         return error + self._backlash, lost + self._backlash
 
     def tension(self, extensions: np.ndarray) -> np.ndarray:
@@ -169,9 +169,9 @@ class Elastic(Display):
         Raises:
             UsageError: Nothing says how the rope stretches.
         """
-        self._needs_stretch()
+        self._require_stretch()
         extended, elastic = np.atleast_1d(np.asarray(extensions, dtype=float)), self.fit.model.cable.elasticity
-        return self.over(lambda values: elastic.tension(values, jnp.asarray(extended)))
+        return self.evaluate(lambda values: elastic.tension(values, jnp.asarray(extended)))
 
     def stiffness(
         self, wrap_angles: np.ndarray, load: float, preload: float | None = None, spring: float | None = None
@@ -187,17 +187,17 @@ class Elastic(Display):
         Raises:
             UsageError: Nothing says how the rope stretches.
         """
-        self._needs_stretch()
-        bent, is_loop = self.stretched(wrap_angles), self.fit.model.cable.is_loop
+        self._require_stretch()
+        bent, is_loop = self.bend_rope_to(wrap_angles), self.fit.model.cable.is_loop
 
         def answer(values: Mapping[str, Any]) -> Any:
-            found = bent.stiffness(values, float(load), preload)
+            stiffness = bent.stiffness(values, float(load), preload)
             if spring is None:
-                return found
-            one, both = (stiffness_with_springs(found, jnp.asarray(spring), sides) for sides in (1, 2))
+                return stiffness
+            one, both = (stiffness_with_springs(stiffness, jnp.asarray(spring), sides) for sides in (1, 2))
             return jnp.where(bent.slack_load(values, preload) > load, both, one) if is_loop else one
 
-        return self.over(answer)
+        return self.evaluate(answer)
 
     def dynamic_range(self, wrap_angles: np.ndarray, largest_force: float, preload: float | None = None) -> np.ndarray:
         """Largest force over what moving the unloaded loop takes [1], draws by wrap angles.
@@ -205,13 +205,15 @@ class Elastic(Display):
         Raises:
             UsageError: The cable has no preload, and none is stated.
         """
-        self._needs_preload(preload)
-        bent, force = self.bent(wrap_angles), jnp.asarray(float(largest_force))
-        return self.over(lambda values: dynamic_range(force, bent.preload(values, preload)[0], bent.exponent(values)))
+        self._require_preload(preload)
+        bent, force = self.bend_to(wrap_angles), jnp.asarray(float(largest_force))
+        return self.evaluate(
+            lambda values: dynamic_range(force, bent.preload(values, preload)[0], bent.exponent(values))
+        )
 
     def preload_window(
         self, bends: tuple[float, float], input_force: float = 0.0, friction: float | None = None
-    ) -> PreloadAnswer:
+    ) -> PreloadWindow:
         """Lowest preload without slack over a range of bends, highest for a given friction, and the best.
 
         Args:
@@ -222,16 +224,16 @@ class Elastic(Display):
         Raises:
             UsageError: The cable has no preload.
         """
-        self._needs_preload(None)
-        bent = self.bent(np.linspace(*bends, _BENDS))
+        self._require_preload(None)
+        bent = self.bend_to(np.linspace(*bends, _WINDOW_BENDS))
         limit = np.inf if friction is None else friction
 
         def answers(values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
             lowest = bent.lowest_preload(values, input_force)
-            felt = jnp.max(bent.friction(values, lowest))
-            return lowest, bent.highest_preload(values, min(limit, 1e9)), felt <= limit * (1 + 1e-9)
+            friction_felt = jnp.max(bent.friction(values, lowest))
+            return lowest, bent.highest_preload(values, min(limit, 1e9)), friction_felt <= limit * (1 + 1e-9)
 
-        return self._window(bends, input_force, limit, *self.over(answers))
+        return self._window(bends, input_force, limit, *self.evaluate(answers))
 
     def _window(
         self,
@@ -241,17 +243,17 @@ class Elastic(Display):
         lowest: np.ndarray,
         highest: np.ndarray,
         possible: np.ndarray,
-    ) -> PreloadAnswer:
-        """The answer that draws of the lowest and highest preload, and of whether the lowest will do, give.
+    ) -> PreloadWindow:
+        """Return the preload window from draws of the lowest and highest preload and of whether the lowest suffices.
 
         With an infinite limit there is no highest.
         """
-        bent, best = self.bent(np.linspace(*bends, _BENDS)), float(np.quantile(lowest, TAUT))
-        felt = self.over(lambda values, preload: jnp.max(bent.friction(values, preload)), np.array(best))
+        bent, best = self.bend_to(np.linspace(*bends, _WINDOW_BENDS)), float(np.quantile(lowest, TAUT))
+        friction_felt = self.evaluate(lambda values, preload: jnp.max(bent.friction(values, preload)), np.array(best))
         follows, limited = self.fit.dataset.description.preload_follows_stretch, np.isfinite(limit)
         low, high = np.rad2deg(bends)
         arm, unit = friction_arm(self.fit)
-        return PreloadAnswer(
+        return PreloadWindow(
             (float(low), float(high)),
             float(np.rad2deg(self.fit.model.cable.elasticity.reference_angle)) if follows else float("nan"),
             input_force,
@@ -260,12 +262,12 @@ class Elastic(Display):
             Interval.of(lowest),
             Interval.of(highest) if limited else None,
             best,
-            Interval.of(felt).times(arm),
+            Interval.of(friction_felt).times(arm),
             float(np.mean(possible)) if limited else 1.0,
         )
 
     @cached_property
-    def usual(self) -> tuple[np.ndarray, dict[str, np.ndarray], PreloadAnswer | None]:
+    def usual(self) -> tuple[np.ndarray, dict[str, np.ndarray], PreloadWindow | None]:
         """What a summary shows, computed by one program: wrap angles [rad], draws by wrap angles, and the preload window.
 
         The draws are of preload [N], friction [N], slack load [N], efficiency [1], position error and lost motion [mm],
@@ -274,65 +276,65 @@ class Elastic(Display):
         bends, model, force = self.measured_bends, self.fit.model, self.reference_force
         if not len(bends):
             return bends, {}, None
-        shown = some_of(bends, _SHOWN)
-        preloaded, stretches, ends = knows_preload(model), knows_stretch(model), (float(bends[0]), float(bends[-1]))
-        bent, every = self.bent(shown), self.bent(np.linspace(*ends, _BENDS))
-        under = self.window_force
+        angles = pick_evenly(bends, _MAX_BENDS)
+        preloaded, stretches, ends = has_preload(model), has_stretch(model), (float(bends[0]), float(bends[-1]))
+        bent, window_bends = self.bend_to(angles), self.bend_to(np.linspace(*ends, _WINDOW_BENDS))
+        window_force = self.window_force
 
         def answers(values: Mapping[str, Any]) -> dict[str, Any]:
-            found = {"efficiency": bent.output_force(values, jnp.asarray(force)) / force}
+            answers = {"efficiency": bent.output_force(values, jnp.asarray(force)) / force}
             if preloaded:
-                found |= {"preload": bent.preload(values)[0], "friction": bent.friction(values)}
-                found["lowest"] = every.lowest_preload(values, under)
+                answers |= {"preload": bent.preload(values)[0], "friction": bent.friction(values)}
+                answers["lowest"] = window_bends.lowest_preload(values, window_force)
             if preloaded and model.cable.is_loop:
-                found["slack_load"] = bent.slack_load(values)
+                answers["slack_load"] = bent.slack_load(values)
             if stretches:
-                found["position_error"], found["lost_motion"] = bent.position(values, force)
-                found["stiffness"] = bent.stiffness(values, force)
-            return found
+                answers["position_error"], answers["lost_motion"] = bent.position(values, force)
+                answers["stiffness"] = bent.stiffness(values, force)
+            return answers
 
-        draws = self.over(answers)
+        draws = self.evaluate(answers)
         lowest = draws.pop("lowest", None)
         if lowest is None or len(bends) == 1:
-            return shown, self._with_backlash(draws), None
-        return shown, self._with_backlash(draws), self._window(ends, under, np.inf, lowest, lowest, lowest)
+            return angles, self._add_backlash(draws), None
+        return angles, self._add_backlash(draws), self._window(ends, window_force, np.inf, lowest, lowest, lowest)
 
-    def _with_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        moved = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}
-        return draws | moved
+    def _add_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        shifted = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}
+        return draws | shifted
 
     @property
     def _backlash(self) -> float:
         stated = self.fit.dataset.description.cable.backlash
         return stated.to("length") if stated is not None else 0.0
 
-    def _needs_preload(self, stated: float | None) -> None:
-        if stated is None and not knows_preload(self.fit.model):
+    def _require_preload(self, stated: float | None) -> None:
+        if stated is None and not has_preload(self.fit.model):
             raise UsageError(
                 "nothing measured on this cable says what its preload is; state one with --preload 20N, or add a table of "
                 "preload, or of the loop, to cable.toml."
             )
 
-    def _needs_stretch(self) -> None:
-        if not knows_stretch(self.fit.model):
+    def _require_stretch(self) -> None:
+        if not has_stretch(self.fit.model):
             raise UsageError(
                 "nothing measured on this cable says how its rope stretches; add a table of stretch under load to cable.toml."
             )
 
 
 @cached_per_fit
-def elastic_answers(fit: Record) -> Elastic:
+def elastic_answers(fit: Record) -> ElasticAnswers:
     """Return the elastic answers of a fit; of a copy, so that what is kept for a record does not keep the record itself."""
-    return Elastic(replace(fit))
+    return ElasticAnswers(replace(fit))
 
 
 def has_elastic_answers(fit: Record) -> bool:
     """Whether a fit says anything of stretch or preload."""
-    return knows_stretch(fit.model) or knows_preload(fit.model)
+    return has_stretch(fit.model) or has_preload(fit.model)
 
 
-def some_of(values: np.ndarray, most: int) -> np.ndarray:
-    """So many of the values at most, from the first to the last."""
+def pick_evenly(values: np.ndarray, most: int) -> np.ndarray:
+    """Pick at most so many of the values, evenly from the first to the last."""
     return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))] if len(values) else values
 
 
@@ -343,7 +345,7 @@ def friction_arm(fit: Record) -> tuple[float, str]:
 
 
 def typical_preload(fit: Record) -> float:
-    """Preload [N]: its median, or least squares without draws, or the median of its prior where these do not tell it."""
+    """Preload [N]: its median, or least squares without draws, or the median of its prior where neither determines it."""
     if fit.sampled is not None and PRELOAD in fit.sampled.values:
         return fit.parameter(PRELOAD).median
     estimate = fit.least_squares.estimates[PRELOAD].value

@@ -13,7 +13,7 @@ from bowdenfit.plots.curves import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, count_columns, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
-from bowdenfit.questions.bends.loop_readings import measured_efficiency, readings_of_loop
+from bowdenfit.questions.bends.loop_readings import efficiency_between_readings, loop_readings
 from bowdenfit.words import counted, significant
 
 if TYPE_CHECKING:
@@ -81,20 +81,20 @@ def data(fit: Record) -> BendingLoss | None:
     from bowdenfit.questions.bends.curves import (
         POINTS,
         Values,
-        loop_bends,
-        of_draws,
-        quantiles,
+        describe_reference_angle,
+        evaluate_curves,
+        measured_loop_bends,
+        quantiles_of_draws,
         range_of_bends,
-        reference_angle,
     )
 
-    bends, measured = range_of_bends(fit), loop_bends(fit)
+    bends, measured = range_of_bends(fit), measured_loop_bends(fit)
     if bends is None or measured is None:
         return None
     elastic, typical = elastic_answers(fit), typical_preload(fit)
     angles, force = np.linspace(*bends, POINTS), elastic.reference_force
     preloads = np.unique([float(f"{typical * factor:.2g}") for factor in TIMES_PRELOAD])
-    bent = elastic.bent(angles)
+    bent = elastic.bend_to(angles)
 
     def curves(values: Values) -> dict[str, Any]:
         exponent, own = bent.exponent(values), bent.preload(values)[0]
@@ -109,16 +109,16 @@ def data(fit: Record) -> BendingLoss | None:
             "preloads": efficiency(bent.preloads(values, jnp.asarray(preloads))),
         }
 
-    draws = of_draws(fit, curves)
+    draws = evaluate_curves(fit, curves)
     lines = {name: np.median(drawn, axis=0) for name, drawn in draws.items()}
     coefficient = lines["exponent"][-1] / angles[-1]
     capstan = np.exp(-lines["exponent"])  # of a rope without preload
     return BendingLoss(
         np.rad2deg(angles),
         force,
-        quantiles(draws["fitted"]),
+        quantiles_of_draws(draws["fitted"]),
         capstan,
-        " ".join(filter(None, (f"as fitted, preload {significant(typical)} N", reference_angle(fit)))),
+        " ".join(filter(None, (f"as fitted, preload {significant(typical)} N", describe_reference_angle(fit)))),
         tuple(
             EfficiencyLine(f"coefficient {factor * coefficient:.2g}", line, capstan**factor)
             for factor, line in zip(TIMES_COEFFICIENT, lines["coefficients"], strict=True)
@@ -127,7 +127,7 @@ def data(fit: Record) -> BendingLoss | None:
             EfficiencyLine(f"preload {significant(preload)} N", line, capstan)
             for preload, line in zip(preloads, lines["preloads"], strict=True)
         ),
-        *measured_efficiency(readings_of_loop(fit, measured), force),
+        *efficiency_between_readings(loop_readings(fit, measured), force),
     )
 
 

@@ -8,8 +8,8 @@ from bowdenfit.results.record import Record
 
 def section(fit: Record) -> Section | None:
     """The answers at wrap angles; None of a cable that has none."""
-    found = elastic_overview(fit)
-    if found is None:
+    overview = elastic_overview(fit)
+    if overview is None:
         return None
-    tables = [Table(*cells, HEADING) for cells in elastic_tables(found)]
-    return prose("Stretch and preload", found.sentences, tables)
+    tables = [Table(*cells, HEADING) for cells in elastic_tables(overview)]
+    return prose("Stretch and preload", overview.sentences, tables)

@@ -1,4 +1,4 @@
-"""What stretch and preload do at a wrap angle: efficiency, friction felt, slack, position, stiffness; for one draw."""
+"""Efficiency, friction, slack, position error and stiffness of a bent cable, for one draw of the parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Values = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
-class Bent:
+class BentCable:
     """A cable bent to wrap angles; every function takes the values of one draw [internal units].
 
     Args:
@@ -45,7 +45,7 @@ class Bent:
         """Friction exponent of one rope [1]."""
         return self.model.cable.friction_exponent(values, self._angles(values))
 
-    def bend(self, values: Values) -> Float[Array, " bends"]:
+    def total_angle(self, values: Values) -> Float[Array, " bends"]:
         """Total wrap angle of the cable [rad]."""
         if self.contact is None:
             return self.wrap_angle
@@ -53,7 +53,7 @@ class Bent:
 
     def preloads(self, values: Values, references: Float[Array, " preloads"]) -> Float[Array, "preloads bends"]:
         """Preload [N] of the cable preloaded in several ways."""
-        bend = jnp.broadcast_to(self.bend(values), (len(references), len(self.wrap_angle)))
+        bend = jnp.broadcast_to(self.total_angle(values), (len(references), len(self.wrap_angle)))
         return self.elastic.preload_from(values, references[:, None], bend)[0]
 
     def preload(self, values: Values, preload: float | Array | None = None) -> tuple[Array, Array]:
@@ -61,7 +61,7 @@ class Bent:
         if preload is None and PRELOAD not in values:
             return jnp.zeros_like(self.wrap_angle), jnp.zeros_like(self.wrap_angle)
         reference = values[PRELOAD] if preload is None else jnp.asarray(preload)
-        return self.elastic.preload_from(values, reference, self.bend(values))
+        return self.elastic.preload_from(values, reference, self.total_angle(values))
 
     def output_force(
         self, values: Values, input_force: Float[Array, "*forces"], stroke: float = 1.0, preload: float | None = None
@@ -98,21 +98,25 @@ class Bent:
         """
         force = jnp.full_like(self.wrap_angle, input_force)
         at_rest, slack = self.preload(values, preload)
-        forward, back = (self._pulling_side(values, force, at_rest, stroke) for stroke in (1.0, -1.0))
+        forward, back = (self._pulling_tension(values, force, at_rest, stroke) for stroke in (1.0, -1.0))
         stretched = self.elastic.extension(values, forward) - self.elastic.extension(values, at_rest)
         lost = self.elastic.extension(values, back) - self.elastic.extension(values, forward)
         return stretched + slack, lost + slack
 
-    def _pulling_side(self, values: Values, force: Array, preload: Array, stroke: float) -> Array:
+    def _pulling_tension(self, values: Values, force: Array, preload: Array, stroke: float) -> Array:
         """Mean tension of the side that pulls [N]."""
         if self.model.cable.is_loop:
             return side_tensions(force, preload, self.exponent(values), jnp.asarray(stroke))[0]
-        return mean_tension(jnp.maximum(force, preload), stroke * self._while_stretched(values))
+        return mean_tension(jnp.maximum(force, preload), stroke * self._stretch_exponent(values))
 
-    def _while_stretched(self, values: Values) -> Array:
-        """Friction exponent of the rope that is stretched, or of the cable where nothing says what that is."""
+    def _stretch_exponent(self, values: Values) -> Array:
+        """Friction exponent of the stretched rope, or of the cable where the stretch has none of its own."""
         name = self.model.description.stretch.friction or STRETCH_FRICTION
-        return self.elastic.friction_exponent(values, self.bend(values)) if name in values else self.exponent(values)
+        return (
+            self.elastic.friction_exponent(values, self.total_angle(values))
+            if name in values
+            else self.exponent(values)
+        )
 
     def stiffness(self, values: Values, load: float, preload: float | None = None) -> Float[Array, " bends"]:
         r"""Stiffness seen at the load side with the motor locked, while the load moves against friction [N/mm].
@@ -121,7 +125,7 @@ class Bent:
         """
         force = jnp.full_like(self.wrap_angle, load)
         if not self.model.cable.is_loop:
-            exponent = self._while_stretched(values)
+            exponent = self._stretch_exponent(values)
             share = mean_tension(jnp.ones_like(exponent), exponent)
             return 1 / (share * self.elastic.compliance(values, share * force))
         exponent, at_rest = self.exponent(values), self.preload(values, preload)[0]
@@ -142,19 +146,19 @@ class Bent:
         needed = (input_force / 2 if self.model.cable.is_loop else 0.0) * mean_tension(
             jnp.ones_like(exponent), exponent
         )
-        return jnp.max(self._at_reference(values, needed))
+        return jnp.max(self._reference_preload(values, needed))
 
     def highest_preload(self, values: Values, friction: float) -> Float[Array, ""]:
         """Highest preload, at the reference angle, that is felt as no more than this force at any of these bends [N]."""
         sides = 2 if self.model.cable.is_loop else 1
         allowed = friction / (sides * jnp.maximum(self.exponent(values), 1e-12))
-        return jnp.min(self._at_reference(values, allowed))
+        return jnp.min(self._reference_preload(values, allowed))
 
-    def _at_reference(self, values: Values, preload: Float[Array, " bends"]) -> Float[Array, " bends"]:
+    def _reference_preload(self, values: Values, preload: Float[Array, " bends"]) -> Float[Array, " bends"]:
         """The preload at the reference angle that gives such preloads at these bends [N]; 0 where none is needed."""
         if not self.model.description.preload_follows_stretch:
             return preload
-        lengthened = values[LENGTHENING] * (self.bend(values) - self.elastic.reference_angle)
+        lengthened = values[LENGTHENING] * (self.total_angle(values) - self.elastic.reference_angle)
         return self.elastic.tension(values, self.elastic.extension(values, preload) - lengthened)
 
 
@@ -174,11 +178,11 @@ def bending_contact(model: Model) -> int:
     )
 
 
-def knows_stretch(model: Model) -> bool:
+def has_stretch(model: Model) -> bool:
     """Whether the model has a rope that stretches."""
     return STIFFNESS in {p.name for p in model.space.parameters}
 
 
-def knows_preload(model: Model) -> bool:
+def has_preload(model: Model) -> bool:
     """Whether the model has a preload."""
     return PRELOAD in {p.name for p in model.space.parameters}

@@ -1,4 +1,4 @@
-"""A fitted loop as a device sees it: what draws of it, each in a mounting of its own, say as torques at the joint."""
+"""Draws of a fitted loop, each in a new mounting, as torques at the joint of a device."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.physics.loop import free_motion_loss, slack_load
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import Bent, knows_preload, knows_stretch
+from bowdenfit.questions.bends.equations import BentCable, has_preload, has_stretch
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
@@ -25,8 +25,8 @@ DRAWS = 4000  # of a fit's, evenly picked; a quantile of 5 % is then known to 0.
 BENDS = 25  # wrap angles at which a range is looked at
 SCATTER, RADIUS, STIFFNESS, SPRING = "rope.mounting_scatter", "joint.pulley_radius", "rope.stiffness", "rope.spring"
 _PER_METRE = 1e-3  # N mm to N m, and N/mm times mm^2 to N m/rad
-_ROUNDING = 1e-6
-_MOUNTINGS, _SPRINGS = 31, 33  # of seeds
+_TOLERANCE = 1e-6
+_MOUNTING_STREAM, _SPRING_STREAM = 31, 33  # numbers of the random streams, beside the seed of the fit
 _ANGLE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d]\S*)", re.ASCII)
 
 
@@ -42,10 +42,10 @@ class LoopDraws:
         stiffness: K of the whole loop at the joint, its springs with it [N m/rad]; None where nothing tells it.
         without_mounting: `friction` of the coefficients alone, as if every mounting did the same [N m].
         scatter: Median of the scatter from mounting to mounting [1].
-        scatter_from_fit: Whether the measurements tell it.
+        scatter_from_fit: Whether the fit determines it.
         references: Preloads at the reference angle that the cable might be given [N].
-        felt: What moving it takes with each of those, where that is most, draws by preloads [N m].
-        slack_from: Torque of the motor from which a side goes slack, where that is least, of the same [N m].
+        friction_by_preload: Friction torque with each of those preloads, at the worst bend, draws by preloads [N m].
+        slack_torque: Motor torque from which a side goes slack, at the worst bend, draws by preloads [N m].
     """
 
     bends: np.ndarray
@@ -57,12 +57,12 @@ class LoopDraws:
     scatter: float
     scatter_from_fit: bool
     references: np.ndarray
-    felt: np.ndarray
-    slack_from: np.ndarray
+    friction_by_preload: np.ndarray
+    slack_torque: np.ndarray
 
 
 def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: np.ndarray) -> LoopDraws:
-    """What the draws of a fit say at wrap angles.
+    """Return draws of a loop at wrap angles.
 
     Args:
         fit: The fit.
@@ -74,46 +74,54 @@ def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: 
         UsageError: Nothing tells the preload of the loop.
         DescriptionError: The radius of the pulley or the scatter of mountings is known neither from the fit nor stated.
     """
-    drawn = fit.draws()
-    if not knows_preload(fit.model):
+    draws = fit.draws()
+    if not has_preload(fit.model):
         raise UsageError(
             "nothing measured on this cable says what its preload is, and friction follows from it; add a table of preload, or "
             "of the loop, to cable.toml."
         )
-    radius, (scatter, told) = _radius(fit, device), _scatter(fit, device)
-    references = _typical(fit, PRELOAD) * preloads
-    n = len(drawn.flat_z)
-    picked = np.unique(np.linspace(0, n - 1, min(n, DRAWS)).round().astype(int))
+    radius, (scatter, from_fit) = _pulley_radius(fit, device), _mounting_scatter(fit, device)
+    references = _typical_value(fit, PRELOAD) * preloads
+    n = len(draws.flat_z)
+    rows = np.unique(np.linspace(0, n - 1, min(n, DRAWS)).round().astype(int))
     mounting = (
-        fit.mounting()[picked] if RUN_SCATTER in drawn.values else scatter * _normal(fit, _MOUNTINGS, len(picked))
+        fit.mounting()[rows]
+        if RUN_SCATTER in draws.values
+        else scatter * _standard_normal(fit, _MOUNTING_STREAM, len(rows))
     )
     with jax.enable_x64(True):
-        bent = Bent(fit.model, elastic_answers(fit).contact, jnp.asarray(bends))
-        stretches = knows_stretch(fit.model)
+        bent = BentCable(fit.model, elastic_answers(fit).contact, jnp.asarray(bends))
+        stretches = has_stretch(fit.model)
 
         def implied(z_and_mounting: Array) -> dict[str, Array]:
             values = fit.model.space.constrain(z_and_mounting[:-1])
-            every = bent.preloads(values, jnp.concatenate([jnp.reshape(values[PRELOAD], 1), jnp.asarray(references)]))
-            alone, preload, others = bent.exponent(values), every[0], every[1:]
-            exponent = jnp.maximum(alone + z_and_mounting[-1], LEAST_EXPONENT)
-            found = {"exponent": exponent, "preload": preload, "without_mounting": free_motion_loss(preload, alone)}
-            found["felt"] = jnp.max(free_motion_loss(others, exponent), axis=1)
-            found["slack_from"] = jnp.min(slack_load(others, exponent), axis=1)
-            return found | ({"stiffness": bent.stiffness(values, 0.0)} if stretches else {})
+            preloads_at_bends = bent.preloads(
+                values, jnp.concatenate([jnp.reshape(values[PRELOAD], 1), jnp.asarray(references)])
+            )
+            nominal, preload, others = bent.exponent(values), preloads_at_bends[0], preloads_at_bends[1:]
+            exponent = jnp.maximum(nominal + z_and_mounting[-1], LEAST_EXPONENT)
+            loop = {
+                "exponent": exponent,
+                "preload": preload,
+                "without_mounting": free_motion_loss(preload, nominal),
+            }
+            loop["felt"] = jnp.max(free_motion_loss(others, exponent), axis=1)
+            loop["slack_from"] = jnp.min(slack_load(others, exponent), axis=1)
+            return loop | ({"stiffness": bent.stiffness(values, 0.0)} if stretches else {})
 
         program = for_each_draw(implied, fit.model.space.size + 1, run_once=True)
-        found = program(np.column_stack([drawn.flat_z[picked], mounting]))
+        loop = program(np.column_stack([draws.flat_z[rows], mounting]))
     arm = radius * _PER_METRE
-    stiffness = found["stiffness"] * radius**2 * _PER_METRE if stretches else None
-    shape = found["preload"].shape
+    stiffness = loop["stiffness"] * radius**2 * _PER_METRE if stretches else None
+    shape = loop["preload"].shape
     return LoopDraws(
-        bends, 2 * arm * found["preload"] * found["exponent"], arm * found["preload"], found["exponent"],
-        _stiffness(fit, stiffness, radius, device, shape), arm * found["without_mounting"], scatter, told, references,
-        arm * found["felt"], arm * found["slack_from"],
+        bends, 2 * arm * loop["preload"] * loop["exponent"], arm * loop["preload"], loop["exponent"],
+        _joint_stiffness(fit, stiffness, radius, device, shape), arm * loop["without_mounting"], scatter, from_fit, references,
+        arm * loop["felt"], arm * loop["slack_from"],
     )  # fmt: skip
 
 
-def _typical(fit: Record, name: str) -> float:
+def _typical_value(fit: Record, name: str) -> float:
     """Median of a parameter, or what it is fixed at, in its internal unit."""
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     if parameter.fixed is not None:
@@ -121,21 +129,21 @@ def _typical(fit: Record, name: str) -> float:
     return float(np.median(fit.draws().values[name]) / parameter.shown_scale)
 
 
-def _normal(fit: Record, number: int, n: int) -> np.ndarray:
+def _standard_normal(fit: Record, number: int, n: int) -> np.ndarray:
     return np.random.default_rng([fit.provenance.seed, number]).standard_normal(n)
 
 
-def _radius(fit: Record, device: Device | None) -> float:
+def _pulley_radius(fit: Record, device: Device | None) -> float:
     """Radius of the pulley at the joint [mm]: of cable.toml, else of device.toml."""
-    of_cable = fit.dataset.description.cable.output_pulley_radius
+    cable_radius = fit.dataset.description.cable.output_pulley_radius
     stated = device.known(RADIUS).get(RADIUS) if device is not None else None
-    if of_cable is None and stated is None:
+    if cable_radius is None and stated is None:
         raise asked_for("the torque at the joint", [RADIUS])
-    if of_cable is None and stated is not None:
+    if cable_radius is None and stated is not None:
         return stated.value * 1e3
-    assert of_cable is not None
-    radius = of_cable.to("length")
-    if stated is not None and abs(stated.value * 1e3 / radius - 1) > _ROUNDING:
+    assert cable_radius is not None
+    radius = cable_radius.to("length")
+    if stated is not None and abs(stated.value * 1e3 / radius - 1) > _TOLERANCE:
         raise DescriptionError(
             f"device.toml, {RADIUS}: {stated.value * 1e3:g} mm, but cable.toml of this fit has an output_pulley_radius of "
             f"{radius:g} mm; leave it out, or correct one of them."
@@ -143,10 +151,10 @@ def _radius(fit: Record, device: Device | None) -> float:
     return radius
 
 
-def _scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
+def _mounting_scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
     """Median scatter of the friction exponent from mounting to mounting, and whether the fit tells it."""
     if RUN_SCATTER in {p.name for p in fit.model.space.parameters}:
-        return _typical(fit, RUN_SCATTER), True
+        return _typical_value(fit, RUN_SCATTER), True
     if device is None or not device.states(SCATTER):
         raise asked_for(
             "this fit has one mounting of the cable and cannot tell how the next one will differ; what is safe in the next",
@@ -155,25 +163,25 @@ def _scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
     return device.known(SCATTER)[SCATTER].value, False
 
 
-def _stiffness(
-    fit: Record, of_fit: np.ndarray | None, radius: float, device: Device | None, shape: tuple[int, ...]
+def _joint_stiffness(
+    fit: Record, fitted: np.ndarray | None, radius: float, device: Device | None, shape: tuple[int, ...]
 ) -> np.ndarray | None:
     """Stiffness at the joint, draws by wrap angles [N m/rad]: of the fit, else of device.toml, with the springs in series."""
     stated = device.known(STIFFNESS, SPRING) if device is not None else {}
-    shaken = _normal(fit, _SPRINGS, shape[0])
-    if of_fit is None:
+    noise = _standard_normal(fit, _SPRING_STREAM, shape[0])
+    if fitted is None:
         if STIFFNESS not in stated:
             return None
         known = stated[STIFFNESS]
-        of_fit = np.repeat(np.maximum(known.value + known.sd * shaken, known.value / 100)[:, None], shape[1], axis=1)
+        fitted = np.repeat(np.maximum(known.value + known.sd * noise, known.value / 100)[:, None], shape[1], axis=1)
     elif STIFFNESS in stated:
         raise DescriptionError(
             f"device.toml, {STIFFNESS}: this fit tells it already, from its table of stretch under load; leave it out."
         )
     if SPRING not in stated:
-        return of_fit
-    spring = np.maximum(stated[SPRING].value + stated[SPRING].sd * shaken, stated[SPRING].value / 100)
-    return 1 / (1 / of_fit + 1 / (2 * spring[:, None] * (radius * 1e-3) ** 2))
+        return fitted
+    spring = np.maximum(stated[SPRING].value + stated[SPRING].sd * noise, stated[SPRING].value / 100)
+    return 1 / (1 / fitted + 1 / (2 * spring[:, None] * (radius * 1e-3) ** 2))
 
 
 def range_of_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[float, str]] | None) -> np.ndarray:
@@ -194,8 +202,8 @@ def range_of_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[flo
     measured = elastic_answers(fit).measured_bends
     if stated is None and not len(measured):
         raise UsageError("nothing was measured at a wrap angle of its own; name a range, as --wrap-angle 45deg:180deg.")
-    low, high = (float(measured[0]), float(measured[-1])) if stated is None else _read(stated)
-    if len(measured) and not measured[0] - _ROUNDING <= low <= high <= measured[-1] + _ROUNDING:
+    low, high = (float(measured[0]), float(measured[-1])) if stated is None else _read_range(stated)
+    if len(measured) and not measured[0] - _TOLERANCE <= low <= high <= measured[-1] + _TOLERANCE:
         ends = np.rad2deg([low, high, measured[0], measured[-1]])
         raise UsageError(
             f"--wrap-angle {ends[0]:.4g}deg:{ends[1]:.4g}deg leaves the wrap angles measured, {ends[2]:.4g} to {ends[3]:.4g} "
@@ -204,22 +212,22 @@ def range_of_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[flo
     return np.linspace(low, high, BENDS) if high > low else np.array([low])
 
 
-def _read(stated: str | tuple[tuple[float, str], tuple[float, str]]) -> tuple[float, float]:
-    parts = [_split(part) for part in stated.split(":")] if isinstance(stated, str) else list(stated)
-    written = "--wrap-angle: write a range as 45deg:180deg, the lower end first, or one angle as 90deg."
+def _read_range(stated: str | tuple[tuple[float, str], tuple[float, str]]) -> tuple[float, float]:
+    parts = [_split_number_and_unit(part) for part in stated.split(":")] if isinstance(stated, str) else list(stated)
+    usage = "--wrap-angle: write a range as 45deg:180deg, the lower end first, or one angle as 90deg."
     if len(parts) not in (1, 2):
-        raise UsageError(written)
+        raise UsageError(usage)
     try:
         ends = [value * conversion_factor(unit, "angle") for value, unit in parts]
     except DatasetError as error:
         raise UsageError(f"--wrap-angle: {error}.") from None
     if not np.all(np.isfinite(ends)) or ends[0] < 0 or ends[-1] < ends[0]:
-        raise UsageError(written)
+        raise UsageError(usage)
     return ends[0], ends[-1]
 
 
-def _split(part: str) -> tuple[float, str]:
-    found = _ANGLE.fullmatch(part.strip())
-    if found is None:
+def _split_number_and_unit(part: str) -> tuple[float, str]:
+    match = _ANGLE.fullmatch(part.strip())
+    if match is None:
         raise UsageError(f"--wrap-angle: {shown(part)} is not a number with its unit; write a range as 45deg:180deg.")
-    return float(found[1]), found[2]
+    return float(match[1]), match[2]

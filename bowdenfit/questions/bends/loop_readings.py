@@ -13,7 +13,7 @@ RECORDED = 2  # times the stroke of a block of a recording, which are many
 NEAR, MOST_NEAR = 0.6, 3  # share of a force within which readings are next to it, and how many to either side
 
 
-def readings_of_loop(fit: Record, bends: np.ndarray) -> np.ndarray:
+def loop_readings(fit: Record, bends: np.ndarray) -> np.ndarray:
     """Every reading and recorded block: wrap angle [rad], input and output force [N], stroke.
 
     The stroke is +1 forward and -1 back, `RECORDED` times that of a recording, and 0 where it is neither.
@@ -32,7 +32,7 @@ def readings_of_loop(fit: Record, bends: np.ndarray) -> np.ndarray:
     return np.concatenate(parts, axis=1)
 
 
-def measured_efficiency(points: np.ndarray, force: float) -> tuple[np.ndarray, np.ndarray]:
+def efficiency_between_readings(points: np.ndarray, force: float) -> tuple[np.ndarray, np.ndarray]:
     """Wrap angle [deg] and efficiency [1] wherever a loop was moved forward by less and by more than a force.
 
     Args:
@@ -40,19 +40,19 @@ def measured_efficiency(points: np.ndarray, force: float) -> tuple[np.ndarray, n
         force: Input force [N].
     """
     angle, force_in, force_out = points[:3, points[3] > 0]
-    at, efficiency = [], []
+    angles, efficiency = [], []
     for bend in np.unique(angle.round(9)):
         here = np.isclose(angle, bend)
-        sides = [_nearest(force_in[here], force_out[here], force, way) for way in (-1, 1)]
+        sides = [_mean_near(force_in[here], force_out[here], force, way) for way in (-1, 1)]
         if all(side is not None for side in sides):
             (low, out_low), (high, out_high) = sides  # type: ignore[misc]
             part = (force - low) / (high - low) if high > low else 0.0
-            at.append(np.rad2deg(bend))
+            angles.append(np.rad2deg(bend))
             efficiency.append((out_low + part * (out_high - out_low)) / force)
-    return np.array(at), np.array(efficiency)
+    return np.array(angles), np.array(efficiency)
 
 
-def _nearest(force_in: np.ndarray, force_out: np.ndarray, force: float, way: int) -> tuple[float, float] | None:
+def _mean_near(force_in: np.ndarray, force_out: np.ndarray, force: float, way: int) -> tuple[float, float] | None:
     """Mean input and output force of the readings next to a force, below or above; None where none is near."""
     beyond = way * (force_in - force)
     near = np.flatnonzero((beyond >= 0) & (beyond <= NEAR * force))

@@ -13,7 +13,7 @@ from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
-from bowdenfit.questions.bends.loop_readings import RECORDED, readings_of_loop
+from bowdenfit.questions.bends.loop_readings import RECORDED, loop_readings
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -64,18 +64,24 @@ def data(fit: Record) -> tuple[LoopCurve, ...] | None:
     import jax.numpy as jnp
 
     from bowdenfit.physics.loop import loop_band, slack_load
-    from bowdenfit.questions.bends.answer import elastic_answers, some_of
-    from bowdenfit.questions.bends.curves import POINTS, Values, loop_bends, of_draws, quantiles
+    from bowdenfit.questions.bends.answer import elastic_answers, pick_evenly
+    from bowdenfit.questions.bends.curves import (
+        POINTS,
+        Values,
+        evaluate_curves,
+        measured_loop_bends,
+        quantiles_of_draws,
+    )
 
-    bends = loop_bends(fit)
+    bends = measured_loop_bends(fit)
     if bends is None:
         return None
-    angle, force_in, force_out, stroke = readings_of_loop(fit, bends)
+    angle, force_in, force_out, stroke = loop_readings(fit, bends)
     if not len(angle):
         return None
-    angles = some_of(np.unique(np.round(angle, 9)), MOST)
+    angles = pick_evenly(np.unique(np.round(angle, 9)), MOST)
     read = [force_in[np.isclose(angle, bend)] for bend in angles]
-    forces, bent = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read]), elastic_answers(fit).bent(angles)
+    forces, bent = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read]), elastic_answers(fit).bend_to(angles)
 
     def curves(values: Values) -> dict[str, Any]:
         exponent, preload = bent.exponent(values), bent.preload(values)[0]
@@ -84,14 +90,14 @@ def data(fit: Record) -> tuple[LoopCurve, ...] | None:
         capstan = loop_band(force, jnp.zeros_like(exponent)[:, None], exponent[:, None])[0]
         return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent)}
 
-    draws, found = of_draws(fit, curves), []
+    draws, loops = evaluate_curves(fit, curves), []
     for i, bend in enumerate(angles):
-        forward, back, slack = (quantiles(draws[name][:, i]) for name in ("forward", "back", "slack"))
+        forward, back, slack = (quantiles_of_draws(draws[name][:, i]) for name in ("forward", "back", "slack"))
         here = np.isclose(angle, bend)
         points = force_in[here], force_out[here], stroke[here]
         capstan = np.median(draws["capstan"][:, i], axis=0)
-        found.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
-    return tuple(found)
+        loops.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
+    return tuple(loops)
 
 
 def caption(loops: tuple[LoopCurve, ...]) -> str:
@@ -180,10 +186,10 @@ def _slack(axes: Axes, loop: LoopCurve) -> None:
         )  # fmt: skip
     axes.axvline(load, color=PURPLE, linewidth=1.0, zorder=1.5, label="Return side goes slack")
     axes.set_xlim(low, high)
-    _branches(axes, loop, (load - low) / (high - low))
+    _name_branches(axes, loop, (load - low) / (high - low))
 
 
-def _branches(axes: Axes, loop: LoopCurve, place: float) -> None:
+def _name_branches(axes: Axes, loop: LoopCurve, place: float) -> None:
     """Both branches named along the line, at the end of it that is farther from the loop; not in a small panel."""
     if axes.get_position().width * axes.figure.get_size_inches()[0] < LEAST_NAMED:  # type: ignore[union-attr]
         return

@@ -57,15 +57,19 @@ def data(fit: Record) -> tuple[MotorForce, ...] | None:
     """The loop of each run; None where no force was measured against displacement."""
     from bowdenfit.kinds.displacement.table import DisplacementTable
     from bowdenfit.kinds.displacement.term import DisplacementTerm, readings, turns_by_depth
-    from bowdenfit.questions.bends.curves import Values, of_draws, quantiles
+    from bowdenfit.questions.bends.curves import Values, evaluate_curves, quantiles_of_draws
 
     table = fit.dataset.measurements.table(DisplacementTable)
     term = next((t for t in fit.model.terms if isinstance(t, DisplacementTerm)), None)
     if table is None or term is None:
         return None
-    path = _path(table)
+    path = _fine_path(table)
     both = [
-        {"turns": turns_by_depth(way.motion.turns), "angles": term.data["angles"], **readings(way, np.arange(len(way.run)))}
+        {
+            "turns": turns_by_depth(way.motion.turns),
+            "angles": term.data["angles"],
+            **readings(way, np.arange(len(way.run))),
+        }
         for way in (path, table)
     ]
 
@@ -73,18 +77,18 @@ def data(fit: Record) -> tuple[MotorForce, ...] | None:
         mounted = term.mounted(values, term.data)
         return {name: term.shown(values, way, mounted) for name, way in zip(("along", "read"), both, strict=True)}
 
-    draws, found = of_draws(fit, curves), []
-    drawn, fitted = draws["along"], np.median(draws["read"], axis=0)
+    draws, runs = evaluate_curves(fit, curves), []
+    along, fitted = draws["along"], np.median(draws["read"], axis=0)
     for run, name in enumerate(table.run_names):
         here, rows = path.run == run, table.run == run
         label = "" if len(table.run_names) == 1 else name
         points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows], fitted[rows]
-        curve = path.displacement[here], quantiles(drawn[:, here]), path.motion.stroke[here]
-        found.append(MotorForce(label, *curve, *points))
-    return tuple(found)
+        curve = path.displacement[here], quantiles_of_draws(along[:, here]), path.motion.stroke[here]
+        runs.append(MotorForce(label, *curve, *points))
+    return tuple(runs)
 
 
-def _path(table: DisplacementTable) -> DisplacementTable:
+def _fine_path(table: DisplacementTable) -> DisplacementTable:
     """The way that the motor took in each run, in steps finer than its readings."""
     from bowdenfit.kinds.displacement.table import in_order, sliding
 
@@ -103,7 +107,9 @@ def _path(table: DisplacementTable) -> DisplacementTable:
     motion = sliding(np.concatenate(stroke), displacement, of_run) if table.sliding else in_order(displacement, of_run)
     no_force, nowhere = np.zeros(len(of_run)), np.full(len(of_run), np.nan)
     every = np.ones(len(of_run), dtype=bool)
-    return replace(table, route=nowhere, force=no_force, displacement=displacement, motion=motion, run=of_run, used=every)
+    return replace(
+        table, route=nowhere, force=no_force, displacement=displacement, motion=motion, run=of_run, used=every
+    )
 
 
 def caption(runs: tuple[MotorForce, ...]) -> str:
@@ -139,13 +145,15 @@ def _loop(axes: Axes, run: MotorForce) -> None:
     """The fitted force stroke by stroke, each from the end of the one before."""
     name = (MEDIAN if len(run.force) > 1 else LEAST_SQUARES).lower()
     ends = [0, *(np.flatnonzero(np.diff(run.stroke)) + 1).tolist(), len(run.stroke)]
-    said = set[int]()
+    labelled = set[int]()
     for start, stop in pairwise(ends):
-        joined = start > 0 and abs(run.displacement[start] - run.displacement[start - 1]) < 0.5 * np.ptp(run.displacement)
+        joined = start > 0 and abs(run.displacement[start] - run.displacement[start - 1]) < 0.5 * np.ptp(
+            run.displacement
+        )
         way, part = int(run.stroke[start]), slice(start - joined, stop)
-        label = {} if way in said else {"label": f"{'Pull' if way > 0 else 'Return'}, {name}"}
+        label = {} if way in labelled else {"label": f"{'Pull' if way > 0 else 'Return'}, {name}"}
         draw_quantiles(axes, run.displacement[part], run.force[:, part], BLUE if way > 0 else VERMILLION, **label)
-        said.add(way)
+        labelled.add(way)
     name_band(axes, run.force)
     axes.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0.5)
 

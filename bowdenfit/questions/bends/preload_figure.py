@@ -50,32 +50,36 @@ def data(fit: Record) -> PreloadCurve | None:
     import jax.numpy as jnp
 
     from bowdenfit.kinds.tables import PreloadTable
-    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
-    from bowdenfit.questions.bends.equations import knows_preload
+    from bowdenfit.questions.bends.curves import POINTS, Values, evaluate_curves, quantiles_of_draws
+    from bowdenfit.questions.bends.equations import has_preload
 
-    if not fit.dataset.description.preload_follows_stretch or not knows_preload(fit.model):
+    if not fit.dataset.description.preload_follows_stretch or not has_preload(fit.model):
         return None
-    angles = np.linspace(*_bends(fit), POINTS)
+    angles = np.linspace(*_measured_range(fit), POINTS)
 
     def curves(values: Values) -> dict[str, Any]:
         preload, slack = fit.model.cable.elasticity.preload(values, jnp.asarray(angles))
         return {"preload": preload, "slack": slack}
 
-    draws, table = of_draws(fit, curves), fit.dataset.measurements.table(PreloadTable)
+    draws, table = evaluate_curves(fit, curves), fit.dataset.measurements.table(PreloadTable)
     points = (np.zeros(0), np.zeros(0)) if table is None else (np.rad2deg(table.wrap_angle), table.preload)
     probability = np.mean(draws["slack"] > 0, axis=0)
     return PreloadCurve(
-        np.rad2deg(angles), quantiles(draws["preload"]), quantiles(draws["slack"]), probability, *points
+        np.rad2deg(angles),
+        quantiles_of_draws(draws["preload"]),
+        quantiles_of_draws(draws["slack"]),
+        probability,
+        *points,
     )
 
 
-def _bends(fit: Record) -> tuple[float, float]:
+def _measured_range(fit: Record) -> tuple[float, float]:
     """Smallest and largest total wrap angle of any reading [rad]; from 0 where all are the same, to pi without one."""
     from bowdenfit.kinds import each_table
     from bowdenfit.kinds.kind import RopeKind
 
-    found = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if isinstance(kind, RopeKind)]
-    every = np.concatenate([np.zeros(0), *found])
+    angles = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if isinstance(kind, RopeKind)]
+    every = np.concatenate([np.zeros(0), *angles])
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
     return (low, high) if low < high else (0.0, high or np.pi)
 
@@ -150,11 +154,11 @@ def _shade_slack(axes: Axes, curve: PreloadCurve) -> None:
     most = f"Slack with more than {percent(RATHER)} probability" if len(curve.preload) > 1 else "Slack"
     regions = (((share >= PERHAPS) & (share <= RATHER), LIGHT, some), (share > RATHER, DARK, most))
     for here, color, label in regions if len(curve.preload) > 1 else regions[1:]:
-        for start, stop in stretches(here):
+        for start, stop in true_stretches(here):
             axes.axvspan(angle[start], angle[stop], facecolor=color, linewidth=0, zorder=0.4, label=label)
 
 
-def stretches(here: np.ndarray) -> list[tuple[int, int]]:
-    """First and last place of each stretch of true values, in order."""
-    steps = np.flatnonzero(np.diff(np.concatenate([[False], here, [False]]).astype(int)))
+def true_stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first and last index of each run of true values, in order."""
+    steps = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b) - 1) for a, b in steps.reshape(-1, 2)]

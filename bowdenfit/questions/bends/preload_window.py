@@ -12,7 +12,7 @@ TAUT = 0.95  # probability with which the recommended preload keeps both sides t
 
 
 @dataclass(frozen=True, repr=False)
-class PreloadAnswer(Display):
+class PreloadWindow(Display):
     """Which preloads will do.
 
     Args:
@@ -83,5 +83,7 @@ class PreloadAnswer(Display):
                 f"{significant(self.highest.q95)} N)."
             )
             if self.possible < TAUT:
-                parts.append(f"That leaves a preload that does both with a probability of only {percent(self.possible, 0)}.")
+                parts.append(
+                    f"That leaves a preload that does both with a probability of only {percent(self.possible, 0)}."
+                )
         return " ".join(parts)

@@ -23,7 +23,7 @@ from bowdenfit.plots.style import (
     in_paper_style,
     percent,
 )
-from bowdenfit.questions.bends.preload_figure import stretches
+from bowdenfit.questions.bends.preload_figure import true_stretches
 from bowdenfit.words import significant
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ ENOUGH = 0.95  # probability of staying taut from which on a preload is within t
 
 
 @dataclass(frozen=True)
-class PreloadWindow:
+class PreloadWindowCurves:
     """What a preload costs and what it buys.
 
     Args:
@@ -60,20 +60,27 @@ class PreloadWindow:
     input_force: float
 
 
-def data(fit: Record) -> PreloadWindow | None:
+def data(fit: Record) -> PreloadWindowCurves | None:
     """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
     import jax.numpy as jnp
 
     from bowdenfit.physics.loop import free_motion_loss
     from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, typical_preload
-    from bowdenfit.questions.bends.curves import QUANTILES, Values, of_draws, quantiles, range_of_bends, reference_angle
+    from bowdenfit.questions.bends.curves import (
+        QUANTILES,
+        Values,
+        describe_reference_angle,
+        evaluate_curves,
+        quantiles_of_draws,
+        range_of_bends,
+    )
 
     bends = range_of_bends(fit)
     if bends is None:
         return None
     elastic = elastic_answers(fit)
     bent, coarse = (
-        elastic.bent(np.linspace(*bends, COARSE)),
+        elastic.bend_to(np.linspace(*bends, COARSE)),
         np.linspace(0.0, max(2.5 * typical_preload(fit), 1.0), COARSE),
     )
 
@@ -81,12 +88,12 @@ def data(fit: Record) -> PreloadWindow | None:
         friction = free_motion_loss(bent.preloads(values, jnp.asarray(coarse)), bent.exponent(values))
         return {"friction": jnp.max(friction, axis=-1), "lowest": bent.lowest_preload(values, elastic.window_force)}
 
-    draws, (arm, unit) = of_draws(fit, curves), friction_arm(fit)
+    draws, (arm, unit) = evaluate_curves(fit, curves), friction_arm(fit)
     preloads, (low, high) = np.linspace(coarse[0], coarse[-1], FINE), np.rad2deg(bends)
-    return PreloadWindow(
+    return PreloadWindowCurves(
         preloads,
-        reference_angle(fit),
-        arm * np.stack([np.interp(preloads, coarse, line) for line in quantiles(draws["friction"])]),
+        describe_reference_angle(fit),
+        arm * np.stack([np.interp(preloads, coarse, line) for line in quantiles_of_draws(draws["friction"])]),
         unit,
         np.mean(draws["lowest"][:, None] <= preloads, axis=0),
         np.quantile(draws["lowest"], QUANTILES),
@@ -95,7 +102,7 @@ def data(fit: Record) -> PreloadWindow | None:
     )
 
 
-def caption(window: PreloadWindow) -> str:
+def caption(window: PreloadWindowCurves) -> str:
     """What is drawn, in plain words."""
     return (
         "What a preload costs and what it buys. Above: the friction that is felt in free motion at the bend where it is "
@@ -106,7 +113,7 @@ def caption(window: PreloadWindow) -> str:
 
 
 @in_paper_style
-def draw(window: PreloadWindow, width: float | None = None) -> Figure:
+def draw(window: PreloadWindowCurves, width: float | None = None) -> Figure:
     """Friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
     figure, (cost, gain) = panels([1.6, 1.3], 1, TITLE, (0, 0.16), width or MEDIUM, sharex=True)
     cost.set_title(_title(window))
@@ -127,7 +134,7 @@ def draw(window: PreloadWindow, width: float | None = None) -> Figure:
     return figure
 
 
-def _title(window: PreloadWindow) -> str:
+def _title(window: PreloadWindowCurves) -> str:
     """The bends and the input force that the window is for."""
     low, high = window.bends
     bends = f"{low:.4g} deg" if low == high else f"{low:.4g} deg to {high:.4g} deg"
@@ -135,14 +142,14 @@ def _title(window: PreloadWindow) -> str:
     return f"Bends {bends}, {loaded}"
 
 
-def _name(window: PreloadWindow) -> str:
+def _name(window: PreloadWindowCurves) -> str:
     return f"Friction, {(MEDIAN if len(window.friction) > 1 else LEAST_SQUARES).lower()}"
 
 
-def _shade_window(axes: Axes, window: PreloadWindow) -> None:
+def _shade_window(axes: Axes, window: PreloadWindowCurves) -> None:
     """The preloads that are enough, or the words that none shown is."""
     fine = np.linspace(window.preload.min(), window.preload.max(), 2001)
-    regions = stretches(np.interp(fine, window.preload, window.taut_probability) >= ENOUGH)
+    regions = true_stretches(np.interp(fine, window.preload, window.taut_probability) >= ENOUGH)
     label = f"Taut with at least {percent(ENOUGH)} probability" if len(window.friction) > 1 else "Taut"
     for start, stop in regions:
         axes.axvspan(fine[start], fine[stop], facecolor=GREEN, alpha=0.16, linewidth=0, zorder=0.4, label=label)
@@ -150,7 +157,7 @@ def _shade_window(axes: Axes, window: PreloadWindow) -> None:
         axes.plot([], [], " ", label=f"No preload shown is taut with {percent(ENOUGH)}")
 
 
-def _mark_lowest(axes: Axes, window: PreloadWindow) -> None:
+def _mark_lowest(axes: Axes, window: PreloadWindowCurves) -> None:
     """The lowest preload that is enough with its interval, or in words where it is off the axis."""
     low, high = axes.get_xlim()
     lowest, which = float(middle(window.lowest)), MEDIAN if len(window.friction) > 1 else LEAST_SQUARES

@@ -1,4 +1,4 @@
-"""A device as its file describes it, and as a ring-down tells the damping of its rope."""
+"""Device description, with the damping of its rope taken from a ring-down."""
 
 from pathlib import Path
 
@@ -11,15 +11,15 @@ from bowdenfit.results.record import Record
 from bowdenfit.results.store import load
 from bowdenfit.words import listed
 
-DAMPING, BESIDE, RINGDOWN = "rope.damping", "joint.damping", "rope.ringdown"
+DAMPING, JOINT_DAMPING, RINGDOWN = "rope.damping", "joint.damping", "rope.ringdown"
 _INERTIA, _DRAWS = "joint.inertia", 4000
 
 
-def device_for(fit: Record, path: Path) -> Device:
-    """The device of a file; what it does not say of the rope is taken from a ring-down, of the fit itself or named there.
+def device_with_ring_down(fit: Record, path: Path) -> Device:
+    """Read a device file; take the damping of the rope from a ring-down of the fit or of results named in the file.
 
-    The bar that is released swings against rope and joint, so that what it tells is the sum of both dampings: where the
-    damping of the joint is known, it is taken from each draw.
+    The released joint is damped by rope and joint together, so that a ring-down determines the sum of both: the known
+    damping of the joint is subtracted from each draw.
 
     Args:
         fit: The fit of the cable.
@@ -31,46 +31,49 @@ def device_for(fit: Record, path: Path) -> Device:
     """
     device = read_device(path)
     folder = device.rope.ringdown
-    own = fit.dataset.measurements.table(RingDownTable) is not None
-    if folder is None and not own:
+    has_ring_down = fit.dataset.measurements.table(RingDownTable) is not None
+    if folder is None and not has_ring_down:
         return device
-    where = path.parent / folder if folder is not None else None
-    said = f"{RINGDOWN} names" if where else "the fit itself has"
+    results = path.parent / folder if folder is not None else None
+    source = f"{RINGDOWN} names" if results else "the fit itself has"
     if device.states(DAMPING):
         raise DescriptionError(
-            f"device.toml, {DAMPING}: {said} a ring-down, which tells it already; leave one of the two out."
+            f"device.toml, {DAMPING}: {source} a ring-down, which tells it already; leave one of the two out."
         )
-    found = fit if where is None else load(where)
-    if found.dataset.measurements.table(RingDownTable) is None:
+    ring_down = fit if results is None else load(results)
+    if ring_down.dataset.measurements.table(RingDownTable) is None:
         raise DescriptionError(
-            f"device.toml, {RINGDOWN}: {found.name} was fitted without a table ringdown; name the results of one that has it, "
-            'as [tables] ringdown = { file = "ringdown.csv" }.'
+            f"device.toml, {RINGDOWN}: {ring_down.name} was fitted without a table ringdown; name the results of "
+            'a fit that has one, as [tables] ringdown = { file = "ringdown.csv" }.'
         )
-    if not found.converged:
+    if not ring_down.converged:
         raise DescriptionError(
-            f"device.toml, {RINGDOWN}: the fit of {found.name} is not to be trusted ({listed(found.reasons)}); sample longer."
+            f"device.toml, {RINGDOWN}: the fit of {ring_down.name} is not to be trusted "
+            f"({listed(ring_down.reasons)}); sample longer."
         )
-    return device.told(_told(found, device))
+    return device.told(_known_from_ring_down(ring_down, device))
 
 
-def _told(ring_down: Record, device: Device) -> dict[str, Known]:
+def _known_from_ring_down(ring_down: Record, device: Device) -> dict[str, Known]:
     """Damping of the rope, and the inertia of the joint where the device does not say it."""
-    beside = device.needed("the damping of the rope, which a ring-down tells together with that of the joint,", BESIDE)[BESIDE]
-    total = _picked(ring_down, "rope_damping")
-    middle = float(np.median(total)) - beside.value
+    joint = device.needed(
+        "the damping of the rope, which a ring-down tells together with that of the joint,", JOINT_DAMPING
+    )[JOINT_DAMPING]
+    total = _some_draws(ring_down, "rope_damping")
+    middle = float(np.median(total)) - joint.value
     if middle <= 0:
         raise DescriptionError(
-            f"device.toml, {BESIDE}: {beside.value:g} N*m*s/rad is more than the {np.median(total):.3g} N*m*s/rad that the "
-            "ring-down tells of rope and joint together; correct it, or measure it with the rope taken off."
+            f"device.toml, {JOINT_DAMPING}: {joint.value:g} N*m*s/rad is more than the {np.median(total):.3g} N*m*s/rad "
+            "that the ring-down gives for rope and joint together; correct it, or measure it with the rope taken off."
         )
-    told = {DAMPING: Known(middle, float(total.std()), tuple(total.tolist()), BESIDE)}
+    known = {DAMPING: Known(middle, float(total.std()), tuple(total.tolist()), JOINT_DAMPING)}
     if not device.states(_INERTIA) and "ring_inertia" in ring_down.draws().values:
-        inertia = _picked(ring_down, "ring_inertia")
-        told[_INERTIA] = Known(float(np.median(inertia)), float(inertia.std()), tuple(inertia.tolist()))
-    return told
+        inertia = _some_draws(ring_down, "ring_inertia")
+        known[_INERTIA] = Known(float(np.median(inertia)), float(inertia.std()), tuple(inertia.tolist()))
+    return known
 
 
-def _picked(found: Record, name: str) -> np.ndarray:
+def _some_draws(fit: Record, name: str) -> np.ndarray:
     """Draws of a parameter, evenly picked."""
-    draws = np.ravel(found.draws().values[name])
+    draws = np.ravel(fit.draws().values[name])
     return draws[np.linspace(0, len(draws) - 1, min(len(draws), _DRAWS)).round().astype(int)]

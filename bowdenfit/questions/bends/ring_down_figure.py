@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "The joint, released"
+HEADING = "Ring-down of the joint"
 MOST, MOST_COLUMNS = 6, 3
 _POINTS = 400  # of the curve of a run
 
@@ -51,26 +51,26 @@ class RingDown:
 def data(fit: Record) -> tuple[RingDown, ...] | None:
     """Every run; None where no joint was released."""
     from bowdenfit.kinds.ringdown.kind import RingDownTable
-    from bowdenfit.questions.bends.curves import Values, of_draws, quantiles
+    from bowdenfit.questions.bends.curves import Values, evaluate_curves, quantiles_of_draws
 
     table = fit.dataset.measurements.table(RingDownTable)
     term = next((t for t in fit.model.terms if t.name == "ringdown"), None)
     if table is None or term is None:
         return None
-    runs, each = range(len(table.added)), [table.time[table.run == run] for run in range(len(table.added))]
-    fine = [np.linspace(time[0], time[-1], _POINTS) for time in each]
+    runs, times = range(len(table.added)), [table.time[table.run == run] for run in range(len(table.added))]
+    fine = [np.linspace(time[0], time[-1], _POINTS) for time in times]
     along = term.data | {"time": np.concatenate(fine), "run": np.repeat(np.arange(len(fine)), _POINTS)}
 
     def curves(values: Values) -> dict[str, Any]:
         return {"along": term.expected(values, along), "read": term.expected(values, term.data)}
 
-    draws = of_draws(fit, curves)
+    draws = evaluate_curves(fit, curves)
     scale, quantity, unit = (1.0, "Torque", "N m") if table.is_torque else (np.rad2deg(1.0), "Angle", "deg")
     fitted = np.median(draws["read"], axis=0)
     return tuple(
         RingDown(
-            _label(table, run), quantity, unit, fine[run], scale * quantiles(draws["along"][:, along["run"] == run]),
-            each[run], scale * table.reading[table.run == run], scale * fitted[table.run == run],
+            _label(table, run), quantity, unit, fine[run], scale * quantiles_of_draws(draws["along"][:, along["run"] == run]),
+            times[run], scale * table.reading[table.run == run], scale * fitted[table.run == run],
         )
         for run in runs
     )  # fmt: skip

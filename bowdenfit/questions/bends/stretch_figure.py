@@ -55,7 +55,7 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
     import jax.numpy as jnp
 
     from bowdenfit.kinds.tables import StretchTable
-    from bowdenfit.questions.bends.curves import POINTS, Values, of_draws, quantiles
+    from bowdenfit.questions.bends.curves import POINTS, Values, evaluate_curves, quantiles_of_draws
 
     table = fit.dataset.measurements.table(StretchTable)
     if table is None:
@@ -70,15 +70,15 @@ def data(fit: Record) -> tuple[StretchCurve, ...] | None:
         stretched = {"loading": load, "unloading": peak}
         return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
 
-    both = {way: quantiles(draws) for way, draws in of_draws(fit, curves).items()}
-    found = []
+    both = {way: quantiles_of_draws(draws) for way, draws in evaluate_curves(fit, curves).items()}
+    curves_by_angle = []
     for i, angle in enumerate(angles):
         here = table.wrap_angle == angle
         down = table.unloading[here]
         back = both["unloading"][:, i] if down.any() else None
         points = table.load[here], table.stretch[here], down
-        found.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
-    return tuple(found)
+        curves_by_angle.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
+    return tuple(curves_by_angle)
 
 
 def caption(stretch: tuple[StretchCurve, ...]) -> str:
@@ -107,7 +107,7 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
     rows = _explain(axes, shown)
     for i, curve in enumerate(shown):
         _curve(axes, curve, _color(i, len(shown)), MARKERS[i])
-        _marks(strip, curve, _off(curve), _color(i, len(shown)), MARKERS[i])
+        _marks(strip, curve, _residuals(curve), _color(i, len(shown)), MARKERS[i])
     made.finish_strips()
     made.label("Load (N)", "Stretch (mm)", "mm")
     note_shown_count(axes, len(shown), len(every))
@@ -115,7 +115,7 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
     return made.figure
 
 
-def _off(curve: StretchCurve) -> np.ndarray:
+def _residuals(curve: StretchCurve) -> np.ndarray:
     """Readings less the branch on which they were read [mm]."""
     back = curve.loading if curve.unloading is None else curve.unloading
     up, down = (np.interp(curve.points_load, curve.load, middle(line)) for line in (curve.loading, back))

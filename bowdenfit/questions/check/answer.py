@@ -1,4 +1,4 @@
-"""Checks of a fit against its own readings: outliers, readings that decide by themselves, and weight of the priors."""
+"""Checks of a fit against its own readings: outliers, influential readings, and sensitivity to the priors."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,13 +10,14 @@ from bowdenfit.display import Display, Rows, Several
 from bowdenfit.inference.prior_sensitivity import PriorConflict, Sensitivity, find_prior_conflicts, rescale_prior
 from bowdenfit.kinds.places import places_of
 from bowdenfit.kinds.term import Term
-from bowdenfit.questions.check.evidence import Evidence, Findings, TableDraws, TableWithoutEach, work_out
-from bowdenfit.questions.check.suspects import refit_suspects
+from bowdenfit.questions.check.evidence import CheckFindings, CheckInputs, TableDraws, TableLoo, compute_findings
+from bowdenfit.questions.check.suspects import refit_influential_outliers
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Record, cached_per_fit
 
-_FEW_LEFT = 4  # readings beyond the coefficients, up to which their scatter is hardly known
-_DRAWS = 5000  # that sensitivity to the priors is worked out from
+_FEW_SPARE = 4  # readings beyond the number of coefficients, up to which the noise is called weakly identified
+_COLUMNS = {"p_value": "chance", "influential": "decisive"}  # names of columns that differ from those of attributes
+_DRAWS = 5000  # draws for the sensitivity to the priors: more are slower, and more precise
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,38 +25,40 @@ class Checks(Display):
     """All checks of a fit.
 
     Args:
-        tables: By table; held forces, which only bound the friction, are not among them.
-        sensitivities: Of friction coefficients and design answers to priors and readings.
+        tables: Checks of each table; held forces, which only bound the friction, are left out.
+        sensitivities: How friction coefficients and design answers depend on priors and readings.
         prior_conflicts: Parameters that the readings put where their priors hardly allow them.
-        told_by: Noise scales that few readings tell: how many readings, and how many coefficients they have to tell too.
+        weakly_identified_noise: Noise scales that few readings determine: by name, the number of readings, and that of the
+            coefficients which the same readings must determine.
     """
 
     tables: tuple[TableChecks, ...]
     sensitivities: tuple[Sensitivity, ...]
     prior_conflicts: tuple[PriorConflict, ...] = ()
-    told_by: dict[str, tuple[int, int]] = field(default_factory=dict)
+    weakly_identified_noise: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     false_alarm: ClassVar = FALSE_ALARM
     JSON: ClassVar = ("false_alarm", "tables", "readings", "sensitivities", ("far_out", "prior_conflicts"))
 
     def _table(self) -> Rows:
-        return [vars(reading) for reading in self.readings], {reading.label: reading.unit for reading in self.readings}
+        rows = [{_COLUMNS.get(name, name): value for name, value in vars(reading).items()} for reading in self.readings]
+        return rows, {reading.label: reading.unit for reading in self.readings}
 
     @cached_property
     def readings(self) -> Several[CheckedReading]:
         """Every reading of every table."""
-        among = sum(len(table.labels) for table in self.tables)
-        return Several(reading for table in self.tables for reading in table.readings(among))
+        n_readings = sum(len(table.labels) for table in self.tables)
+        return Several(reading for table in self.tables for reading in table.readings(n_readings))
 
     @property
     def outliers(self) -> Several[CheckedReading]:
-        """Readings so far out that chance does as much in one healthy fit of a hundred, the farthest first."""
-        return Several(sorted((r for r in self.readings if r.outlier), key=lambda r: r.chance))
+        """Outliers, the farthest first: so far out that a healthy fit has one in a hundred fits."""
+        return Several(sorted((r for r in self.readings if r.outlier), key=lambda r: r.p_value))
 
     @property
-    def decisive(self) -> Several[CheckedReading]:
-        """Readings without which the fit would be a markedly different one, the most decisive first."""
-        return Several(sorted((r for r in self.readings if r.decisive), key=lambda r: -r.pareto_k))
+    def influential(self) -> Several[CheckedReading]:
+        """Readings without which the fit would change markedly, the most influential first."""
+        return Several(sorted((r for r in self.readings if r.influential), key=lambda r: -r.pareto_k))
 
     @property
     def conflicts(self) -> Several[Sensitivity]:
@@ -68,38 +71,40 @@ def checks_of(fit: Record) -> Checks | None:
     """All checks of a fit; None without draws."""
     if fit.sampled is None:
         return None
-    found = checks_findings(fit)
-    tables = refit_suspects(fit, [_table(fit, *each) for each in zip(_tables(fit), found.tables, strict=True)])
+    findings = check_findings(fit)
+    tables = refit_influential_outliers(
+        fit, [_checked_table(fit, *each) for each in zip(_checked_terms(fit), findings.tables, strict=True)]
+    )
     parameters = {p.name: p for p in fit.model.space.free}
     z = {name: fit.posterior.z[..., i] for name, i in fit.model.space.index.items()}
-    return Checks(tables, found.sensitivities, find_prior_conflicts(z, parameters), _told_by_few(fit))
+    return Checks(tables, findings.sensitivities, find_prior_conflicts(z, parameters), _weakly_identified_noise(fit))
 
 
 @cached_per_fit
-def checks_findings(fit: Record) -> Findings:
-    """What takes time of the checks of a fit with draws; `work_out` of `evidence_of` gives the same in another process."""
-    return work_out(evidence_of(fit))
+def check_findings(fit: Record) -> CheckFindings:
+    """Return the part of the checks that takes time: leave-one-out predictions and prior sensitivities."""
+    return compute_findings(check_inputs(fit))
 
 
-def evidence_of(fit: Record) -> Evidence:
-    """What checks of a fit with draws are worked out from."""
-    terms, posterior, space = _tables(fit), fit.posterior, fit.model.space
-    every = max(1, posterior.z[..., 0].size // _DRAWS)
-    asked = {p.name: posterior.values[p.name] for p in space.free if p.role == "friction"} | posterior.optimum
+def check_inputs(fit: Record) -> CheckInputs:
+    """Collect the arrays that the checks of a fit with draws are computed from."""
+    terms, posterior, space = _checked_terms(fit), fit.posterior, fit.model.space
+    stride = max(1, posterior.z[..., 0].size // _DRAWS)
+    quantities = {p.name: posterior.values[p.name] for p in space.free if p.role == "friction"} | posterior.optimum
     log_likelihood = sum((np.sum(part, axis=-1) for part in posterior.log_likelihood.values()), np.zeros(()))
-    return Evidence(
+    return CheckInputs(
         [_draws_of(fit, term) for term in terms],
         posterior.n_effective,
         1 - FALSE_ALARM / max(len(terms), 1),
         fit.provenance.seed,
-        {name: draws[:, ::every] for name, draws in asked.items()},
-        {p.name: posterior.z[:, ::every, i] for i, p in enumerate(space.free)},
-        log_likelihood[:, ::every],
-        {p.name: rescale_prior(p.prior, posterior.values[p.name][:, ::every] / p.shown_scale) for p in space.free},
+        {name: draws[:, ::stride] for name, draws in quantities.items()},
+        {p.name: posterior.z[:, ::stride, i] for i, p in enumerate(space.free)},
+        log_likelihood[:, ::stride],
+        {p.name: rescale_prior(p.prior, posterior.values[p.name][:, ::stride] / p.shown_scale) for p in space.free},
     )
 
 
-def _tables(fit: Record) -> list[Term]:
+def _checked_terms(fit: Record) -> list[Term]:
     """Terms whose readings are checked."""
     return [t for t in fit.model.terms if t.labels and t.residual_blocks[0][1] > 0]
 
@@ -110,27 +115,27 @@ def _draws_of(fit: Record, term: Term) -> TableDraws:
     return TableDraws(log_likelihood, replicated, *readings_of(term))
 
 
-def _told_by_few(fit: Record) -> dict[str, tuple[int, int]]:
-    """Noise scales of which hardly more readings tell than there are coefficients."""
+def _weakly_identified_noise(fit: Record) -> dict[str, tuple[int, int]]:
+    """Noise scales with hardly more readings than coefficients: numbers of readings and coefficients, by name."""
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
     readings: dict[str, int] = {}
     for term in fit.model.terms:
         readings[term.noise] = readings.get(term.noise, 0) + term.residual_blocks[0][1]
     noise = [p.name for p in fit.model.space.free if p.role == "noise"]
-    return {n: (readings[n], coefficients) for n in noise if 0 < readings.get(n, 0) <= coefficients + _FEW_LEFT}
+    return {n: (readings[n], coefficients) for n in noise if 0 < readings.get(n, 0) <= coefficients + _FEW_SPARE}
 
 
-def _table(fit: Record, term: Term, found: TableWithoutEach) -> TableChecks:
+def _checked_table(fit: Record, term: Term, loo: TableLoo) -> TableChecks:
     reading, at_most = readings_of(term)
-    places = places_of(fit.dataset.description, fit.dataset.measurements, term)
+    positions = places_of(fit.dataset.description, fit.dataset.measurements, term)
     return TableChecks(
-        term.name, term.unit, term.labels, reading, at_most, found.predicted, places, found.placed, found.uniform,
+        term.name, term.unit, term.labels, reading, at_most, loo.predicted, positions, loo.pit, loo.uniformity,
         np.zeros(len(reading), dtype=bool),
     )  # fmt: skip
 
 
 def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
-    """Readings of a table, with the limit in place of those that are only known to lie below it, and which those are."""
+    """Return the readings of a table, upper limits where only these are known, and a mask of such limits."""
     reading, limit = term.observed().copy(), term.data.get("limit", np.zeros(0))
     at_most = np.isnan(reading)
     reading[at_most] = np.rad2deg(limit)

@@ -6,23 +6,23 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.fit_command import FitCommand
 from bowdenfit.kinds.recordings.kind import recordings_text
-from bowdenfit.questions.check.file_words import command_words
-from bowdenfit.questions.check.row_words import account_words
+from bowdenfit.questions.check.file_words import describe_commands
+from bowdenfit.questions.check.row_words import describe_row_account
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import filled, narrow_table
 
-_NAMED = 8  # channels whose first and last sample are said
-_LISTED = 100  # channels that are listed
-_LONGEST = 60  # characters of a name or unit
+_MAX_NAMED = 8  # channels whose first and last sample are said
+_MAX_LISTED = 100  # channels that are listed
+_MAX_LENGTH = 60  # characters of a name or unit
 _HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
 
 
-def channels_text(
+def describe_recording_file(
     file: ChannelFile,
-    why: str,
+    reason: str,
     command: FitCommand,
     recordings: Recordings | None = None,
-    why_not: str = "",
+    obstacle: str = "",
     usable: bool = True,
 ) -> str:
     """The channels of a file, one a line, and what the file is as a recording.
@@ -32,43 +32,43 @@ def channels_text(
         why: Why it is taken for a recording, as a clause.
         command: What fits it.
         recordings: The file as a recording, where its channels say which is which.
-        why_not: What keeps it from being one, in a sentence.
+        obstacle: What keeps it from being one, in a sentence.
         usable: Whether the command can fit it as it stands.
     """
-    what = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
+    description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
     n = len(file.channels)
-    title = f"{file.path.name}: {what}, because {why} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
-    rows = [_row(channel) for channel in file.channels[:_LISTED]]
+    title = f"{file.path.name}: {description}, because {reason} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
+    rows = [_channel_row(channel) for channel in file.channels[:_MAX_LISTED]]
     keep = [i for i, _ in enumerate(_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
     listing = narrow_table(
         [_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows], left=("channel", "unit", "clock")
     )
-    more = [f"... and {n - _LISTED} more channels."] if n > _LISTED else []
-    account = account_words(file.account) if file.account else []
+    more = [f"... and {n - _MAX_LISTED} more channels."] if n > _MAX_LISTED else []
+    account = describe_row_account(file.account) if file.account else []
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    lines = [filled(title), "", listing, *more, "", *_ends(file), *account, *notes]
+    lines = [filled(title), "", listing, *more, "", *_first_and_last_samples(file), *account, *notes]
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [
             filled(f"Note: {remark}") for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)
         ]
-    elif why_not:
-        lines += ["", *map(filled, f"As a recording it cannot be used yet: {why_not}".splitlines())]
+    elif obstacle:
+        lines += ["", *map(filled, f"As a recording it cannot be used yet: {obstacle}".splitlines())]
     several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
-    return "\n".join([*lines, "", *command_words([command], usable), several]) + "\n"
+    return "\n".join([*lines, "", *describe_commands([command], usable), several]) + "\n"
 
 
-def _ends(file: ChannelFile) -> list[str]:
+def _first_and_last_samples(file: ChannelFile) -> list[str]:
     """The first and the last sample of every channel."""
-    said = []
+    lines = []
     for which, i in (("First", 0), ("Last", -1)):
-        values = [f"{_in_short(channel.name)} {channel.values[i]:.5g}" for channel in file.channels[:_NAMED]]
-        more = [f"{len(file.channels) - _NAMED} more"] if len(file.channels) > _NAMED else []
-        said.append(filled(f"{which} sample{'s' if more else ''}: {', '.join([*values, *more])}."))
-    return said
+        values = [f"{_shorten(channel.name)} {channel.values[i]:.5g}" for channel in file.channels[:_MAX_NAMED]]
+        more = [f"{len(file.channels) - _MAX_NAMED} more"] if len(file.channels) > _MAX_NAMED else []
+        lines.append(filled(f"{which} sample{'s' if more else ''}: {', '.join([*values, *more])}."))
+    return lines
 
 
-def _row(channel: Channel) -> tuple[str, ...]:
+def _channel_row(channel: Channel) -> tuple[str, ...]:
     finite = channel.values[np.isfinite(channel.values)]
     missing = len(channel.values) - len(finite)
     samples = f"{len(channel.values)}" + (f" ({missing} missing)" if missing else "")
@@ -77,9 +77,18 @@ def _row(channel: Channel) -> tuple[str, ...]:
     length = ""
     if channel.time is not None and len(channel.time) > 1:
         length = f"{np.nanmax(channel.time) - np.nanmin(channel.time):.4g} s"
-    return _in_short(channel.name), _in_short(channel.unit) or "?", samples, rate, length, low, high, _in_short(channel.clock)
+    return (
+        _shorten(channel.name),
+        _shorten(channel.unit) or "?",
+        samples,
+        rate,
+        length,
+        low,
+        high,
+        _shorten(channel.clock),
+    )
 
 
-def _in_short(text: str) -> str:
+def _shorten(text: str) -> str:
     """A text without the middle, where it is long."""
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]}...{text[-_LONGEST // 2 + 3 :]}"
+    return text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH // 2]}...{text[-_MAX_LENGTH // 2 + 3 :]}"

@@ -19,14 +19,14 @@ from bowdenfit.plots.style import (
     WIDE,
     in_paper_style,
 )
-from bowdenfit.words import counted
+from bowdenfit.words import counted, percent
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.answer import Checks, TableChecks
     from bowdenfit.results.record import Record
 
-HEADING = "Every reading against its prediction from all others"
+HEADING = "Leave-one-out check: every reading against its prediction from all others"
 ROW, LEAST_WIDTH = 1.35, 1.0  # in, of a panel
 MOST_NAMED = 3  # outliers of a panel that are named
 BACK = "Read on the way back"
@@ -46,7 +46,7 @@ class CheckedTable:
         numbers: Where the readings were taken, by axis label: the first two that vary.
         group: Contact or the like of each reading; empty where all are of one kind.
         back: Whether each was taken on the way back, or while unloading.
-        decisive: Whether the fit leans on it.
+        decisive: Mask of influential readings.
         outlier: Whether it is an outlier.
         labels: Each in words.
         at: Places in the predictions at which their distribution was looked at; empty of few readings.
@@ -70,51 +70,61 @@ class CheckedTable:
 
 
 def data(fit: Record) -> tuple[CheckedTable, ...] | None:
-    """Every table; None without draws."""
+    """Return the readings of every table; None without draws, or of a single reading, whose scatter shows nothing."""
     from bowdenfit.questions.check.answer import checks_of
 
-    found = checks_of(fit)
-    return (checked_tables(found) or None) if found is not None else None
+    checks = checks_of(fit)
+    return checked_tables(checks) if checks is not None and len(checks.readings) > 1 else None
 
 
-def checked_tables(found: Checks) -> tuple[CheckedTable, ...]:
+def checked_tables(checks: Checks) -> tuple[CheckedTable, ...]:
     """The readings of each table as they are shown."""
-    return tuple(_checked(t, [r.outlier for r in found.readings if r.table == t.table]) for t in found.tables)
+    return tuple(_checked(t, [r.outlier for r in checks.readings if r.table == t.table]) for t in checks.tables)
 
 
 def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
     from bowdenfit.kinds import readings_called
 
-    found, off, low, high = table.uniformity, *[np.zeros(0)] * 3
-    if found is not None:
-        off, low, high = (part - found.at for part in (found.share, found.low, found.high))
+    uniformity, off, low, high = table.uniformity, *[np.zeros(0)] * 3
+    if uniformity is not None:
+        off, low, high = (part - uniformity.at for part in (uniformity.share, uniformity.low, uniformity.high))
     return CheckedTable(
         readings_called(table.table).words,
         table.z_score,
-        dict(list(table.places.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
-        table.places.group,
-        table.places.back,
-        table.decisive,
+        dict(list(table.positions.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
+        table.positions.group,
+        table.positions.back,
+        table.influential,
         np.array(outlier),
         table.labels,
-        found.at if found else off,
+        uniformity.at if uniformity else off,
         off,
         low,
         high,
-        found.probability if found else float("nan"),
+        uniformity.probability if uniformity else float("nan"),
     )
 
 
 def caption(tables: tuple[CheckedTable, ...]) -> str:
     """What is drawn, in plain words."""
     n = sum(len(table.labels) for table in tables)
-    return (
-        f"Whether the scatter of the readings is as predicted, a row for each of {counted(len(tables), 'table')}. Left: "
-        "how often readings lie below a given place in their predictions, less how often they should; the line should "
-        "stay in the band, which has no less than the stated probability to hold all of it. Right: how far each reading "
-        "is off its prediction from all the others, in standard deviations, against where it was taken; there should be "
-        f"no trend. n = {counted(n, 'reading')}."
+    probabilities = [table.probability for table in tables if len(table.at)]
+    distribution = (
+        "First panel of a row: empirical distribution (ECDF) of where the readings lie in their predictions, minus the uniform "
+        "one that is expected; if the model is right, the whole line stays in the band with at least "
+        f"{percent(min(probabilities))} probability. Other panels: "
+        if probabilities
+        else "Each panel: "
     )
+    return (
+        f"Leave-one-out check: whether the readings scatter as predicted, {_rows_in_words(len(tables))}. {distribution}"
+        "deviation of each reading from its prediction by all the others, in standard deviations, against where it was taken; "
+        f"there should be no trend. n = {counted(n, 'reading')}."
+    )
+
+
+def _rows_in_words(n_tables: int) -> str:
+    return "one table" if n_tables == 1 else f"a row for each of {n_tables} tables"
 
 
 @in_paper_style
@@ -141,11 +151,11 @@ def _distribution(axes: Axes, table: CheckedTable) -> None:
     """Share of readings up to a place in their predictions, less what it should be."""
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     axes.set_xlim(0.0, 1.0)
-    axes.set(xlabel="Predicted probability p", ylabel="Share below p, less p")
+    axes.set(xlabel="Predicted probability p", ylabel="ECDF of the readings − p")
     at = np.concatenate([[0.0], table.at, [1.0]])
     low, off, high = (np.concatenate([[0.0], part, [0.0]]) for part in (table.low, table.off, table.high))
-    axes.fill_between(at, low, high, step="post", color=LIGHT, linewidth=0, label="Where it stays if all is right")
-    axes.plot(at, off, drawstyle="steps-post", color=BLUE, label="Distribution of the readings")
+    axes.fill_between(at, low, high, step="post", color=LIGHT, linewidth=0, label="Band if the model is right")
+    axes.plot(at, off, drawstyle="steps-post", color=BLUE, label="Distribution of the readings (ECDF)")
 
 
 def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray) -> None:
@@ -156,22 +166,22 @@ def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     groups = list(dict.fromkeys(table.group))
     for i, group in enumerate(groups):
-        mine = np.array([g == group for g in table.group])
+        in_group = np.array([g == group for g in table.group])
         color, marker = (SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) if len(groups) > 1 else (BLACK, "o")
         name = group.replace("_", " ") if group else "Reading"
         for back in (False, True):
-            here = mine & (table.back == back)
+            here = in_group & (table.back == back)
             if here.any():
                 words = BACK if back else name
                 fill = "white" if back else color
                 axes.plot(
                     numbers[here], z[here], marker, color=color, markerfacecolor=fill, markersize=3.6, label=words
                 )
-    lean = table.decisive & np.isfinite(z)
-    if lean.any():
+    influential = table.decisive & np.isfinite(z)
+    if influential.any():
         axes.plot(
-            numbers[lean], z[lean], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5, markeredgewidth=0.9,
-            label="The fit leans on it",
+            numbers[influential], z[influential], "o", color=VERMILLION, markerfacecolor="none", markersize=7.5,
+            markeredgewidth=0.9, label="Influential: the fit would change without it",
         )  # fmt: skip
     if np.all(numbers == np.round(numbers)):  # as of runs and groups, between which there is nothing
         axes.locator_params(axis="x", integer=True)

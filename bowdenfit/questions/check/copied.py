@@ -4,12 +4,12 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import each_table
 
 
-def copied_readings(dataset: Dataset) -> tuple[str, ...]:
-    """What was pasted twice or saved as another run, in sentences; none where chance may make readings as much alike."""
-    told = [sentence for kind, table in each_table(dataset.measurements) for sentence in kind.copied_readings(table)]
+def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
+    """Describe readings that were pasted twice or saved as another run; none where equal readings may be chance."""
+    copies = [sentence for kind, table in each_table(dataset.measurements) for sentence in kind.copied_readings(table)]
     return tuple(
         f"{sentence[0].upper()}{sentence[1:]}. Measurements do not repeat themselves so exactly; the usual cause is a table "
         "that was pasted or exported twice, or a run that was copied and not measured. Copies count as measurements, so that "
         "intervals are too narrow: leave them out, or put in what was measured."
-        for sentence in told
+        for sentence in copies
     )

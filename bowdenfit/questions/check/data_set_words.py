@@ -1,4 +1,4 @@
-"""What `bowdenfit check` says: what was understood, and what the measurements will not be able to tell."""
+"""What `bowdenfit check` says: what was understood, and what the measurements cannot determine."""
 
 import numpy as np
 
@@ -8,34 +8,38 @@ from bowdenfit.kinds import each_table
 from bowdenfit.kinds.descriptions import measured_groups
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.tables import Measurements, StretchTable
-from bowdenfit.questions.check.copied import copied_readings
-from bowdenfit.questions.check.row_words import row_words
+from bowdenfit.questions.check.copied import describe_copied_readings
+from bowdenfit.questions.check.row_words import describe_rows
 from bowdenfit.words import counted, filled, kept_narrow, listed
 
 
-def check_text(dataset: Dataset) -> str:
-    """What was understood of a data set."""
+def describe_data_set(dataset: Dataset) -> str:
+    """Describe what was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
     warnings = [filled(f"Warning: {warning}") for warning in warnings_of(dataset)]
-    found = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
-    lines = [description.name, "=" * len(description.name), f"Everything could be read. {found}", ""]
+    state = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
+    lines = [description.name, "=" * len(description.name), f"Everything could be read. {state}", ""]
     if description.route:
         route = description.route
         choices = f"; {len(route.choices)} lengths can be bought" if route.choices else ""
-        said = f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
-        lines.append(kept_narrow(said))
+        line = f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
+        lines.append(kept_narrow(line))
     else:
         lines.append("Route: none, so there is no length to choose.")
     lines += ["", "Contacts:"]
     lines += [
         kept_narrow(
-            f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}{_angle_source(c, description)}", "  "
+            f"{c.name}: {c.friction}, {f'{c.special_law} law, ' if c.special_law else ''}"
+            f"{_describe_angle_source(c, description)}",
+            "  ",
         )
         for c in description.contact
     ]
     lines += ["", "Friction coefficients:"]
-    settings = {name: _setting(description.friction.get(name)) for name in description.coefficients}
-    lines += [kept_narrow(f"{name}: {setting}{_each(dataset, name)}", "  ") for name, setting in settings.items()]
+    settings = {name: _describe_setting(description.friction.get(name)) for name in description.coefficients}
+    lines += [
+        kept_narrow(f"{name}: {setting}{_groups_note(dataset, name)}", "  ") for name, setting in settings.items()
+    ]
     lines += ["", "Measurements:"]
     sections: list[str] = []
     for kind, table in each_table(measurements):
@@ -48,13 +52,17 @@ def check_text(dataset: Dataset) -> str:
         lines.append(kept_narrow(f"note: {description.cable.sharp_bend}", "  "))
     lines += sections
     lines += [kept_narrow(f"note: {remark}", "  ") for remark in measurements.remarks]
-    lines += ["", "Rows of the files:", *(f"  {line}" for words in row_words(dataset) for line in words.splitlines())]
+    lines += [
+        "",
+        "Rows of the files:",
+        *(f"  {line}" for words in describe_rows(dataset) for line in words.splitlines()),
+    ]
     lines += ["", *warnings] if warnings else []
     return "\n".join(lines) + "\n"
 
 
-def _each(dataset: Dataset, coefficient: str) -> str:
-    """Of which groups there is one each; empty where all readings share it."""
+def _groups_note(dataset: Dataset, coefficient: str) -> str:
+    """Name the groups that have a coefficient each; empty where all readings share it."""
     contacts = [c for c in dataset.description.contact if c.friction == coefficient]
     if not (dataset.description.by_group and contacts[0].by_group):
         return ""
@@ -62,15 +70,15 @@ def _each(dataset: Dataset, coefficient: str) -> str:
 
 
 def warnings_of(dataset: Dataset) -> list[str]:
-    """What the measurements will not be able to tell, as far as counting shows."""
+    """Return warnings about what the measurements cannot determine, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = list(copied_readings(dataset))
+    warnings = list(describe_copied_readings(dataset))
     free = [
         n
         for n in description.coefficients
         if not (n in description.friction and description.friction[n].fixed is not None)
     ]
-    conditions = _conditions(measurements)
+    conditions = _count_conditions(measurements)
     shared = description.stretch.friction is not None and measurements.table(StretchTable) is not None
     if not conditions and not shared:
         warnings.append(
@@ -91,17 +99,19 @@ def warnings_of(dataset: Dataset) -> list[str]:
     return warnings
 
 
-def _conditions(measurements: Measurements) -> int:
+def _count_conditions(measurements: Measurements) -> int:
     """Number of different wrap-angle conditions under which force was measured."""
     rows = []
     for kind, table in each_table(measurements):
         if isinstance(kind, FrictionKind):
-            at = kind.conditions(table)
-            rows += [tuple(np.nan_to_num(row, nan=-1.0)) for row in np.column_stack([at.route, at.own.angle])]
+            conditions = kind.conditions(table)
+            rows += [
+                tuple(np.nan_to_num(row, nan=-1.0)) for row in np.column_stack([conditions.route, conditions.own.angle])
+            ]
     return len(set(rows))
 
 
-def _angle_source(contact: Contact, description: Description) -> str:
+def _describe_angle_source(contact: Contact, description: Description) -> str:
     source = contact.wrap_angle
     if source.constant is not None:
         sd = f" ± {source.sd:g}" if source.sd else ""
@@ -117,7 +127,7 @@ def _angle_source(contact: Contact, description: Description) -> str:
     return f"wrap angle measured in every row, column {source.column!r}; predictions use {nominal}"
 
 
-def _setting(setting: FrictionSetting | None) -> str:
+def _describe_setting(setting: FrictionSetting | None) -> str:
     if setting is None:
         return "free, default prior"
     if setting.fixed is not None:

@@ -1,4 +1,4 @@
-"""What checks of a fit need of its draws, as plain arrays, and what follows: worked out without JAX, in another process too."""
+"""Leave-one-out predictions and prior sensitivities from plain arrays of draws, without JAX."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from bowdenfit.inference.predictive_checks import (
 )
 from bowdenfit.inference.prior_sensitivity import RescaledPrior, Sensitivity, compute_sensitivities
 
-_LEAST_READINGS = 8  # of a table, below which its distribution cannot be judged
-_STREAM = 5  # of the fit's random numbers
+_MIN_READINGS = 8  # readings of a table from which on the uniformity of their PIT is tested; fewer have no power
+_STREAM = 5  # number of this stream of random numbers, beside the seed of the fit
 
 
 @dataclass(frozen=True)
 class TableDraws:
-    """Readings of one table, with what the draws say of them.
+    """Draws for the readings of one table.
 
     Args:
         log_likelihood: Of every reading at every draw, (draw, reading).
@@ -35,18 +35,18 @@ class TableDraws:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """What checks are worked out from.
+class CheckInputs:
+    """Arrays that the checks of a fit are computed from.
 
     Args:
         tables: By table.
         n_effective: Effective number of the draws.
         probability: That the distribution of healthy readings of a table stays in its band.
         seed: Seed of the fit.
-        quantities: Draws that sensitivities are asked of, by name, (chain, draw).
-        z: Those of each parameter in z.
-        total: Log likelihood of all readings.
-        priors: Of each parameter.
+        quantities: Draws of the quantities whose sensitivity is computed, by name, (chain, draw).
+        z: Draws of each parameter in z, by name, (chain, draw).
+        total: Log likelihood of all readings, (chain, draw).
+        priors: Effect of other scales of each prior, by name.
     """
 
     tables: Sequence[TableDraws]
@@ -60,47 +60,47 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class TableWithoutEach:
-    """Readings of one table, each predicted from everything else.
+class TableLoo:
+    """Leave-one-out predictions of the readings of one table.
 
     Args:
         predicted: The predictions.
-        placed: Where each reading lies in its own, uniform between 0 and 1 if all is right.
-        uniform: Whether these are uniform; None of few readings.
+        pit: Probability integral transform of each reading, uniform between 0 and 1 if the model is right.
+        uniformity: Test of the uniformity of `pit`; None for few readings.
     """
 
     predicted: LooPredictive
-    placed: np.ndarray
-    uniform: Uniformity | None
+    pit: np.ndarray
+    uniformity: Uniformity | None
 
 
 @dataclass(frozen=True)
-class Findings:
-    """What was worked out.
+class CheckFindings:
+    """Leave-one-out predictions of every table, and prior sensitivities.
 
     Args:
-        tables: By table.
-        sensitivities: Of quantities that vary.
+        tables: Predictions by table.
+        sensitivities: Prior sensitivities of the quantities that vary.
     """
 
-    tables: tuple[TableWithoutEach, ...]
+    tables: tuple[TableLoo, ...]
     sensitivities: tuple[Sensitivity, ...]
 
 
-def work_out(evidence: Evidence) -> Findings:
-    """Predictions of readings without themselves, and weight of the priors."""
-    generator = np.random.default_rng([evidence.seed, _STREAM])
-    tables = tuple(_without_each(table, evidence, generator) for table in evidence.tables)
+def compute_findings(inputs: CheckInputs) -> CheckFindings:
+    """Compute leave-one-out predictions of every table, and prior sensitivities."""
+    generator = np.random.default_rng([inputs.seed, _STREAM])
+    tables = tuple(_leave_one_out(table, inputs, generator) for table in inputs.tables)
     varying = {
-        name: draws for name, draws in evidence.quantities.items() if np.ptp(draws) > 0
+        name: draws for name, draws in inputs.quantities.items() if np.ptp(draws) > 0
     }  # or an end in all of them
-    found = compute_sensitivities(varying, evidence.z, evidence.total, evidence.priors) if varying else ()
-    return Findings(tables, found)
+    prior_sensitivities = compute_sensitivities(varying, inputs.z, inputs.total, inputs.priors) if varying else ()
+    return CheckFindings(tables, prior_sensitivities)
 
 
-def _without_each(table: TableDraws, evidence: Evidence, generator: np.random.Generator) -> TableWithoutEach:
-    drawn, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
-    predicted = predict_left_out(*drawn, *readings, evidence.n_effective)
-    placed = draw_randomized_pit(predicted, generator)
-    judged = len(table.reading) >= _LEAST_READINGS
-    return TableWithoutEach(predicted, placed, check_uniformity(placed, evidence.probability) if judged else None)
+def _leave_one_out(table: TableDraws, inputs: CheckInputs, generator: np.random.Generator) -> TableLoo:
+    draws, readings = (table.log_likelihood, table.replicated), (table.reading, table.at_most)
+    predicted = predict_left_out(*draws, *readings, inputs.n_effective)
+    pit = draw_randomized_pit(predicted, generator)
+    enough = len(table.reading) >= _MIN_READINGS
+    return TableLoo(predicted, pit, check_uniformity(pit, inputs.probability) if enough else None)

@@ -10,18 +10,18 @@ from bowdenfit.files.matching import Quantity, candidates
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.file_kind import FileKind, columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, columns_of
-from bowdenfit.questions.check.row_words import account_words, first_and_last
+from bowdenfit.questions.check.row_words import describe_first_and_last_rows, describe_row_account
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
 
 _LEFT = ("column", "unit", "read as")
 
 
-def table_text(
+def describe_table_file(
     raw: RawTable,
-    found: FileKind,
+    file: FileKind,
     commands: Sequence[FitCommand],
     data: Dataset | None,
-    why_not: str,
+    obstacle: str,
     named: Mapping[str, str],
     usable: bool = True,
 ) -> str:
@@ -32,25 +32,25 @@ def table_text(
         found: What it is taken for.
         commands: What fits it; two where it could be either.
         data: The data set that it makes; None if it makes none yet.
-        why_not: What keeps it from that, in a sentence.
+        obstacle: What keeps it from that, in a sentence.
         named: Quantities whose columns the user has named, by heading.
         usable: Whether the command can fit it as it stands.
     """
-    title = f"{raw.file}: {_what(raw, data)}, because {found.why}."
-    if found.other:
-        title = f"{raw.file}: a table of readings or a recording; {found.why}."
-    lines = [filled(title), "", _columns(raw, columns_of_kind(found.kind), named)]
+    title = f"{raw.file}: {_kind_in_words(raw, data)}, because {file.why}."
+    if file.other:
+        title = f"{raw.file}: a table of readings or a recording; {file.why}."
+    lines = [filled(title), "", _column_table(raw, columns_of_kind(file.kind), named)]
     if data is not None:
-        lines += ["", *first_and_last(data)]
-    lines += ["", *account_words(raw.lines)]
+        lines += ["", *describe_first_and_last_rows(data)]
+    lines += ["", *describe_row_account(raw.lines)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
-    if why_not:
-        lines += ["", *map(filled, f"As it stands it cannot be fitted: {why_not}".splitlines())]
-    return "\n".join([*lines, "", *command_words(commands, usable)]) + "\n"
+    if obstacle:
+        lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
+    return "\n".join([*lines, "", *describe_commands(commands, usable)]) + "\n"
 
 
-def command_words(commands: Sequence[FitCommand], usable: bool = True) -> list[str]:
+def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> list[str]:
     """The command on a line of its own, so that it can be pasted, and what it takes for granted.
 
     Args:
@@ -59,13 +59,13 @@ def command_words(commands: Sequence[FitCommand], usable: bool = True) -> list[s
     """
     lines, when = list[str](), "" if usable else " once that is mended"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
-        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", on_lines(command.text)]
+        lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command.text)]
         granted = listed([f"that {each}" for each in command.provided])
         lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
     return lines
 
 
-def on_lines(command: str) -> str:
+def wrap_command(command: str) -> str:
     """A command that can be pasted, in lines that fit into a terminal where its options let it."""
     lines = ["  "]
     for i, part in enumerate(re.split(r" (?=--)", command)):
@@ -77,20 +77,20 @@ def on_lines(command: str) -> str:
     return "\n".join(lines)
 
 
-def _what(raw: RawTable, data: Dataset | None) -> str:
-    for kind, found in each_table(data.measurements) if data else ():
-        return kind.describe_single_file(found)
+def _kind_in_words(raw: RawTable, data: Dataset | None) -> str:
+    for kind, table in each_table(data.measurements) if data else ():
+        return kind.describe_single_file(table)
     return f"a table of {counted(len(raw.rows), 'row')}"
 
 
-def _columns(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
+def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
     """Every column: its unit, what it is read as, and its range."""
     can_be = candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
     read_as = dict(named)
     for quantity, columns in can_be.items():
-        for each in columns:
-            read_as[raw.header[each.position]] = quantity if len(columns) == 1 else f"{quantity}?"
-    numbers = {each.name: each for each in columns_of(raw)}
+        for candidate in columns:
+            read_as[raw.header[candidate.position]] = quantity if len(columns) == 1 else f"{quantity}?"
+    numbers = {candidate.name: candidate for candidate in columns_of(raw)}
     rows = []
     for heading, below in zip(raw.header, raw.units, strict=True):
         if heading:

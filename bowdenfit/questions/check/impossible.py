@@ -10,54 +10,59 @@ from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
 from bowdenfit.words import few, percent
 
-_SDS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
+_MAX_DEVIATIONS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
 _LEAST, _MOST = 0.015, 1.0  # coefficients outside which a mistake is likelier than such a rope
 
 
-def impossible_efficiencies(fit: Record) -> str:
-    """Efficiencies above what the fit can make of them and above 1, beyond noise, in a sentence; empty where there are none."""
-    found = []
+def describe_impossible_efficiencies(fit: Record) -> str:
+    """Describe efficiencies above 1 and above the prediction, beyond noise; empty where there are none."""
+    impossible = []
     for term in fit.model.terms:
         called = readings_called(term.name)
         if not called.are_efficiencies:
             continue
         measured, predicted = term.observed(), _predicted(fit, term)
         above = np.log(measured / np.maximum(predicted, 1.0))  # offsets and gains of the cells may show more than 1
-        beyond = np.flatnonzero(above > GAIN_ERROR + _SDS * _noise(fit, term))
-        found += [f"{called.one.format(term.labels[i])} {percent(measured[i])}" for i in beyond]
-    if not found:
+        beyond = np.flatnonzero(above > GAIN_ERROR + _MAX_DEVIATIONS * _noise(fit, term))
+        impossible += [f"{called.one.format(term.labels[i])} {percent(measured[i])}" for i in beyond]
+    if not impossible:
         return ""
     return (
-        f"No rope passes on more force than goes in, but these readings say so beyond their noise: {few(found)}. "
+        f"No rope passes on more force than goes in, but these readings say so beyond their noise: {few(impossible)}. "
         "The usual causes are swapped columns or channels, pull and return exchanged, a unit, or a channel that is no "
         "force: look at these with `bowdenfit check`."
     )
 
 
-def implausible_friction(fit: Record) -> str:
-    """Coefficients beyond what ropes in sheaths have, in a sentence; empty where there are none.
+def describe_implausible_friction(fit: Record) -> str:
+    """Describe coefficients outside the range of ropes in sheaths; empty where there are none.
 
     A coefficient of which something is stated is believed. What is too large counts by its estimate, what is too small by the
     upper end of its 90 % interval, because a contact may rub too little to be seen.
     """
-    found, usual = [], PriorDefaults().friction
+    implausible, default = [], PriorDefaults().friction
     for p in fit.model.space.free:
-        nothing_said = p.prior == LogNormal(usual.median, usual.log_sd) and p.name not in fit.dataset.description.friction
-        if p.role != "friction" or not nothing_said:
+        has_default_prior = (
+            p.prior == LogNormal(default.median, default.log_sd) and p.name not in fit.dataset.description.friction
+        )
+        if p.role != "friction" or not has_default_prior:
             continue
         if fit.sampled is None:
             estimate = fit.least_squares.estimates[p.name]
-            value, upper = estimate.value, estimate.value + estimate.reach if np.isnan(estimate.upper) else estimate.upper
+            value, upper = (
+                estimate.value,
+                estimate.value + estimate.reach if np.isnan(estimate.upper) else estimate.upper,
+            )
         else:
             value, upper = fit.parameter(p.name).median, fit.parameter(p.name).q95
         if value > _MOST or upper < _LEAST:
-            found.append(f"{p.name} = {value:.2g}")
-    if not found:
+            implausible.append(f"{p.name} = {value:.2g}")
+    if not implausible:
         return ""
     return (
-        f"Ropes in sheaths have coefficients of {_LEAST:g} to {_MOST:g}, and these readings say {', '.join(found)}. The "
+        f"Ropes in sheaths have coefficients of {_LEAST:g} to {_MOST:g}, and these readings say {', '.join(implausible)}. The "
         "usual causes are the unit of the wrap angles (rad for deg), a contact that was left out, and a slipped decimal point "
-        'in a reading; if it is right, say so: [friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }.'
+        "in a reading; if it is right, say so: [friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }."
     )
 
 

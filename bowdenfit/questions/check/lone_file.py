@@ -24,8 +24,8 @@ from bowdenfit.kinds.fit_command import (
     recording_command,
     table_command,
 )
-from bowdenfit.questions.check.channels_words import channels_text
-from bowdenfit.questions.check.file_words import table_text
+from bowdenfit.questions.check.channels_words import describe_recording_file
+from bowdenfit.questions.check.file_words import describe_table_file
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.recording import Recordings
@@ -34,7 +34,7 @@ _CHOICES = ("noise", "friction", "geometry", "undetected")
 _ANY_ANGLE = (180.0, "deg")  # what the command says as well
 
 
-def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) -> tuple[str, bool]:
+def describe_single_file(path: Path, reading: Reading, check: Callable[..., Dataset]) -> tuple[str, bool]:
     """What a file alone is, and the command that fits it; and whether that can, or the file is to be mended first.
 
     Args:
@@ -46,29 +46,33 @@ def lone_file_text(path: Path, reading: Reading, check: Callable[..., Dataset]) 
         BowdenfitError: The file cannot be read, or not with these keywords.
     """
     channels, named = reading.get("channels", ()), parse_sources(reading.get("columns", ()), "--column")
-    found = file_kind(path, bool(channels), tuple(named))
-    if KINDS[found.kind].takes_channels and not found.other:
-        return _recording_text(path, found, channels)
+    file = file_kind(path, bool(channels), tuple(named))
+    if KINDS[file.kind].takes_channels and not file.other:
+        return _describe_recording(path, file, channels)
     raw = read_table(path)
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
-    if found.other:
-        return table_text(raw, found, either(path, raw, found), None, "", headings), True
-    command = table_command(path, raw, found.kind, named)
-    own = has_own_angles(path, found.kind, tuple(named), stated=False)
-    asked = any(reading.values()) and not command.names_more
-    angle = None if own or "wrap_angle=" in command.text else _ANY_ANGLE
-    data, why_not = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), check, asked)
-    still = why_not
-    if why_not and command.names_more:
+    if file.other:
+        return describe_table_file(raw, file, either(path, raw, file), None, "", headings), True
+    command = table_command(path, raw, file.kind, named)
+    has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
+    strict = any(reading.values()) and not command.names_more
+    angle = None if has_angles or "wrap_angle=" in command.text else _ANY_ANGLE
+    data, obstacle = _try_as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), check, strict)
+    remaining = obstacle
+    if obstacle and command.names_more:
         words = shlex.split(command.text)
         columns = tuple(word for option, word in pairwise(words) if option == "--column")
-        _, still = _as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), check, False)
-        why_not += f"\n{still}" if still not in why_not else ""
-    return table_text(raw, found, [_with_settings(command, reading)], data, why_not, headings, not still), not why_not
+        _, remaining = _try_as_data_set(
+            path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), check, False
+        )
+        obstacle += f"\n{remaining}" if remaining not in obstacle else ""
+    return describe_table_file(
+        raw, file, [_with_settings(command, reading)], data, obstacle, headings, not remaining
+    ), not obstacle
 
 
-def _as_data_set(
-    path: Path, reading: Reading, check: Callable[..., Dataset], asked: bool
+def _try_as_data_set(
+    path: Path, reading: Reading, check: Callable[..., Dataset], strict: bool
 ) -> tuple[Dataset | None, str]:
     """The data set that a table makes at any wrap angle, or why it makes none as it stands.
 
@@ -78,7 +82,7 @@ def _as_data_set(
     try:
         return check(path, **reading), ""
     except BowdenfitError as error:
-        if asked:
+        if strict:
             raise
         return None, str(error)
 
@@ -90,16 +94,18 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
     return replace(command, text=" ".join([command.text, *stated]))
 
 
-def _recording_text(path: Path, found: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
-    file, recordings, why_not = channels_of(path, channels)
-    command = _command(path, file, channels)
-    usable = not why_not or (not channels and "--channel" in command.text)
-    return channels_text(file, found.why, command, recordings, why_not, usable), not why_not
+def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
+    file, recordings, obstacle = channels_of(path, channels)
+    command = _recording_command(path, file, channels)
+    usable = not obstacle or (not channels and "--channel" in command.text)
+    return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
 
 
-def _command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:
+def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:
     signals = [each for each in file.channels if not is_clock(each)]
-    headed = [HeadedColumn(each.name, each.unit, float(each.values[each.values == each.values].mean())) for each in signals]
+    headed = [
+        HeadedColumn(each.name, each.unit, float(each.values[each.values == each.values].mean())) for each in signals
+    ]
     return recording_command(path, headed, any(each.time is not None for each in signals), parse_channels(channels))
 
 

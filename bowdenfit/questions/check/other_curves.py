@@ -12,8 +12,8 @@ from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import build_model
 
 
-def follows(dataset: Dataset, number: int, family: str) -> bool:
-    """Whether it does.
+def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
+    """Return whether curves of another family follow the angles of a contact.
 
     Args:
         dataset: The data set.
@@ -28,6 +28,8 @@ def follows(dataset: Dataset, number: int, family: str) -> bool:
     table = dataset.measurements.table(AngleTable)
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
-        found = fit_least_squares(posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False)
-    mine = [each for each in found.departures if each.group == angle.column]
-    return bool(mine) and all(each.p_value >= FALSE_ALARM for each in mine)
+        fit = fit_least_squares(
+            posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False
+        )
+    departures = [each for each in fit.departures if each.group == angle.column]
+    return bool(departures) and all(each.p_value >= FALSE_ALARM for each in departures)

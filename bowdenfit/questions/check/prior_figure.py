@@ -1,4 +1,4 @@
-"""What the priors alone hold possible, beside what was measured."""
+"""Prior predictive check: readings that the priors alone allow beside the measured ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
 
-HEADING = "What the priors hold possible"
+HEADING = "Prior predictive check: readings that the priors allow"
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
 WIDEST = "99 % interval by the priors"
 WITHIN, WIDE_RANGE = (
@@ -38,13 +38,13 @@ SHIFT = 0.006  # of the axis, between contacts whose readings would hide each ot
 def caption(data: PriorPredictive) -> str:
     """What is drawn, in plain words."""
     n = sum(len(table.reading) for table in data.tables)
-    said = (
-        "What readings the priors alone hold possible, before anything is fitted, beside the measured ones: thick lines hold "
-        "90 %, thin ones 99 %. Readings outside these have a color of their own; the usual cause is a unit."
+    text = (
+        "Readings that the priors alone allow, before anything is fitted, beside the measured ones: thick lines contain "
+        "90 %, thin ones 99 %. Readings outside these have a color of their own; the usual cause is a wrong unit."
     )
     if data.efficiency is not None:
-        said += " Efficiency of the cable: median, and the same intervals as bands."
-    return f"{said} n = {counted(n, 'reading')}."
+        text += " Efficiency of the cable: median, and the same intervals as bands."
+    return f"{text} n = {counted(n, 'reading')}."
 
 
 @in_paper_style
@@ -68,14 +68,14 @@ def _readings(axes: Axes, table: PriorTable) -> None:
     span = float(np.ptp(table.numbers)) or 1.0
     groups = list(dict.fromkeys(table.group))
     for i, group in enumerate(groups):
-        mine = np.array([g == group for g in table.group])
+        in_group = np.array([g == group for g in table.group])
         shift = SHIFT * span * (i - (len(groups) - 1) / 2)
-        at, low, lower, upper, high = _intervals(table.numbers[mine], table.quantiles[:, mine], WITHIN * span)
+        at, low, lower, upper, high = _intervals(table.numbers[in_group], table.quantiles[:, in_group], WITHIN * span)
         axes.vlines(at + shift, low, high, color=BLUE, linewidth=0.8, alpha=0.7, label=WIDEST)
         axes.vlines(at + shift, lower, upper, color=BLUE, linewidth=3.2, alpha=0.35, label=WIDE_INTERVAL)
         name = group.replace("_", " ") or "Measured"
         marker = _GROUP_MARKERS[i % len(_GROUP_MARKERS)] if len(groups) > 1 else "o"
-        x, reading, out = table.numbers[mine] + shift, table.reading[mine], table.outside[mine]
+        x, reading, out = table.numbers[in_group] + shift, table.reading[in_group], table.outside[in_group]
         axes.plot(x[~out], reading[~out], marker, color=BLACK, markersize=3.4, zorder=3, label=name)
         if (out & np.isfinite(reading)).any():
             axes.plot(

@@ -1,4 +1,4 @@
-"""What the priors alone hold possible, beside what was measured: the check to make before a fit."""
+"""Prior predictive check: readings that the priors alone allow beside those that were measured, before any fit."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +24,7 @@ _DRAWS = 4096
 
 @dataclass(frozen=True)
 class PriorTable:
-    """Readings of one table beside what the priors alone hold possible.
+    """Readings of one table beside their prior predictive quantiles.
 
     Args:
         name: What they are, in words.
@@ -51,7 +51,7 @@ class PriorTable:
 
 @dataclass(frozen=True)
 class PriorPredictive:
-    """What the priors alone hold possible.
+    """Prior predictive readings and efficiencies of a cable.
 
     Args:
         name: Name of the cable.
@@ -69,7 +69,7 @@ class PriorPredictive:
 
 
 def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:
-    """Readings and efficiencies that the priors of a data set hold possible, without a fit.
+    """Draw readings and efficiencies from the priors of a data set, without a fit.
 
     Needs 64-bit floats: `jax.enable_x64(True)`.
 
@@ -78,15 +78,15 @@ def prior_predictive(dataset: Dataset, seed: int = 0) -> PriorPredictive:
         seed: Seed of the draws from the priors.
     """
     model = build_model(dataset)
-    drawn = _drawn(model, np.random.default_rng(seed).standard_normal((_DRAWS, model.space.size)), seed)
-    tables = tuple(_table(dataset, term, drawn["readings"][term.name]) for term in model.terms if term.labels)
+    draws = _draw_from_priors(model, np.random.default_rng(seed).standard_normal((_DRAWS, model.space.size)), seed)
+    tables = tuple(_prior_table(dataset, term, draws["readings"][term.name]) for term in model.terms if term.labels)
     name, route = dataset.description.name, dataset.description.route
     if route is None:
         return PriorPredictive(name, tables)
-    return PriorPredictive(name, tables, route.label, route_grid(model), 100 * _quantiles(drawn["efficiency"]))
+    return PriorPredictive(name, tables, route.label, route_grid(model), 100 * _quantiles(draws["efficiency"]))
 
 
-def _drawn(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
+def _draw_from_priors(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
     """Readings of every table, and efficiencies along the route, of every draw (rows)."""
     key, data = jax.random.key(seed), LogDensity(model).data
     route = None if model.description.route is None else jnp.asarray(route_grid(model))
@@ -108,15 +108,15 @@ def _quantiles(draws: np.ndarray) -> np.ndarray:
     return np.nanquantile(np.where(np.isfinite(draws), draws, np.nan), QUANTILES, axis=0)
 
 
-def _table(dataset: Dataset, term: Term, drawn: np.ndarray) -> PriorTable:
+def _prior_table(dataset: Dataset, term: Term, draws: np.ndarray) -> PriorTable:
     """One table's readings beside their quantiles; a reading that is only a bound is outside where it is too low for them."""
-    called = readings_called(term.name)
-    scale, (reading, at_most) = called.shown_scale, readings_of(term)
-    quantiles, reading = scale * _quantiles(drawn), scale * reading
+    naming = readings_called(term.name)
+    scale, (reading, at_most) = naming.shown_scale, readings_of(term)
+    quantiles, reading = scale * _quantiles(draws), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
-    places = places_of(dataset.description, dataset.measurements, term)
-    place, numbers = next(iter(places.numbers.items()))
+    positions = places_of(dataset.description, dataset.measurements, term)
+    label, numbers = next(iter(positions.numbers.items()))
     return PriorTable(
-        called.words, called.axis, numbers, place, places.group,
+        naming.words, naming.axis, numbers, label, positions.group,
         term.labels, np.where(at_most, np.nan, reading), quantiles, outside,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.questions.check.data_set_words import check_text, warnings_of
+from bowdenfit.questions.check.data_set_words import describe_data_set, warnings_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -16,4 +16,4 @@ class Report(Dataset):
         return warnings_of(self)
 
     def __str__(self) -> str:
-        return check_text(self).strip()
+        return describe_data_set(self).strip()

@@ -6,13 +6,13 @@ from bowdenfit.kinds import each_table
 from bowdenfit.words import filled, kept_narrow
 
 
-def row_words(dataset: Dataset) -> list[str]:
-    """Of every file of a data set."""
-    accounts = [line for account in dataset.accounts for line in account_words(account, account.file)]
-    return [*first_and_last(dataset), *accounts]
+def describe_rows(dataset: Dataset) -> list[str]:
+    """Describe which rows of every file of a data set were read."""
+    accounts = [line for account in dataset.accounts for line in describe_row_account(account, account.file)]
+    return [*describe_first_and_last_rows(dataset), *accounts]
 
 
-def account_words(account: RowAccount, file: str = "") -> list[str]:
+def describe_row_account(account: RowAccount, file: str = "") -> list[str]:
     """How many rows were read, and every row that was not, with the reason; what stands beside them too.
 
     Args:
@@ -27,15 +27,15 @@ def account_words(account: RowAccount, file: str = "") -> list[str]:
     return [*map(kept_narrow, lines), *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
 
 
-def first_and_last(data: Dataset) -> list[str]:
+def describe_first_and_last_rows(data: Dataset) -> list[str]:
     """The first and the last row of each table as understood."""
     lines = []
-    for kind, found in each_table(data.measurements):
-        page = kind.file_rows(found, data.description)
+    for kind, table in each_table(data.measurements):
+        page = kind.file_rows(table, data.description)
         if page is None:
             continue
         heads, rows = page
         for which, i in (("First", 0), ("Last", -1)):
             cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
-            lines.append(filled(f"{which} row, {found.origin.place(i)}: {cells}."))
+            lines.append(filled(f"{which} row, {table.origin.place(i)}: {cells}."))
     return lines

@@ -1,4 +1,4 @@
-"""Readings of one table, each beside what everything else says of it."""
+"""Readings of one table beside their leave-one-out predictions."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,8 +10,10 @@ from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
 from bowdenfit.kinds.places import Places
 
-_LEAST_FREEDOM = 5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
-FALSE_ALARM = 0.01  # chance that a healthy fit is said to have an outlier; the same for the other kinds of alarm
+_MIN_DEGREES_OF_FREEDOM = (
+    5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
+)
+FALSE_ALARM = 0.01  # probability that a healthy fit is said to have an outlier; the same for the other kinds of alarm
 
 
 @dataclass(frozen=True, repr=False)
@@ -25,11 +27,11 @@ class CheckedReading(Part):
         expected, sd, q05, q95: Median, standard deviation and interval of the prediction.
         z: Deviation from it in standard deviations; NaN of a bound.
         probability: Where the reading lies in it, uniform between 0 and 1 if all is right.
-        chance: Probability of a deviation as large.
-        pareto_k: How far the fit leans on the reading.
+        p_value: Probability of a deviation as large.
+        pareto_k: Pareto k of the leave-one-out weights; above 0.7 the reading is influential.
         inside: Whether it was taken inside the range in which the curves hold.
-        outlier: Whether it is so far out that chance does as much in one healthy fit of a hundred.
-        decisive: Whether the fit would be a markedly different one without it.
+        outlier: Whether it is so far out that only one healthy fit in a hundred has such a reading.
+        influential: Whether the fit would change markedly without it.
     """
 
     table: str
@@ -43,15 +45,15 @@ class CheckedReading(Part):
     q95: float
     z: float
     probability: float
-    chance: float
+    p_value: float
     pareto_k: float
     inside: bool
     outlier: bool
-    decisive: bool
+    influential: bool
 
     JSON: ClassVar = (
-        "table", "label", "unit", "at_most?", "measured?", "expected", "sd", "q05", "q95", "z", "probability", "chance",
-        "pareto_k", "inside", "outlier", "decisive",
+        "table", "label", "unit", "at_most?", "measured?", "expected", "sd", "q05", "q95", "z", "probability",
+        ("chance", "p_value"), "pareto_k", "inside", "outlier", ("decisive", "influential"),
     )  # fmt: skip
 
     @property
@@ -76,8 +78,8 @@ class TableChecks(Part):
         reading: The readings; the bound of those that are only known to be at most so.
         at_most: Whether a reading is such a bound.
         predicted: Each reading's prediction without itself.
-        places: Where each was taken.
-        probability: Where each lies in its prediction, uniform between 0 and 1 if all is right.
+        positions: Where each was taken.
+        pit: Where each lies in its prediction (probability integral transform), uniform if the model is right.
         uniformity: Whether these are uniform; None of few readings.
         refitted: Which readings a fit without them predicts.
     """
@@ -88,12 +90,19 @@ class TableChecks(Part):
     reading: np.ndarray
     at_most: np.ndarray
     predicted: LooPredictive
-    places: Places
-    probability: np.ndarray
+    positions: Places
+    pit: np.ndarray
     uniformity: Uniformity | None
     refitted: np.ndarray
 
-    JSON: ClassVar = ("table", ("readings", "measured"), "in_interval", "bounds", "uniform", "fault")
+    JSON: ClassVar = (
+        "table",
+        ("readings", "measured"),
+        "in_interval",
+        "bounds",
+        ("uniform", "is_uniform"),
+        ("fault", "misfit"),
+    )
 
     @property
     def z_score(self) -> np.ndarray:
@@ -104,42 +113,42 @@ class TableChecks(Part):
         return np.where(self.at_most, np.nan, z)
 
     @property
-    def decisive(self) -> np.ndarray:
-        """Whether the fit leans on a reading so much that weights cannot leave it out."""
+    def influential(self) -> np.ndarray:
+        """Mask of readings so influential that importance weights cannot leave them out."""
         return ~(self.predicted.pareto_k <= RELIABLE_K)
 
     @property
-    def chance(self) -> np.ndarray:
-        """Probability of a deviation as large, of each reading; where the weights fail, as if predictions were Student-t.
+    def p_values(self) -> np.ndarray:
+        """Return the p value of each deviation; where the weights fail, by a Student-t prediction.
 
-        Weights that lean on few draws leave much of the reading's own effect in its prediction, which is then too wide. The
+        Weights that rest on few draws leave much of the reading's own effect in its prediction, which is then too wide. The
         degrees of freedom are those of a scatter found from the other readings of the table, because a prediction by few
         readings has longer tails than a normal one: without them a healthy reading at 3.8 sds of twenty is an outlier.
         """
         from scipy.special import stdtr
 
-        freedom = max(self.measured - 2, _LEAST_FREEDOM)
-        t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(freedom / (freedom - 2))  # z is in sds of the prediction
-        failed = self.decisive & ~self.refitted
-        return np.where(failed, np.minimum(2 * stdtr(freedom, -t), self.predicted.tail), self.predicted.tail)
+        dof = max(self.measured - 2, _MIN_DEGREES_OF_FREEDOM)
+        t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(dof / (dof - 2))  # z is in sds of the prediction
+        unreliable = self.influential & ~self.refitted
+        return np.where(unreliable, np.minimum(2 * stdtr(dof, -t), self.predicted.tail), self.predicted.tail)
 
-    def readings(self, among: int) -> list[CheckedReading]:
-        """One by one.
+    def readings(self, n_total: int) -> list[CheckedReading]:
+        """Return the readings one by one.
 
         Args:
-            among: Number of readings of all tables, of which the farthest counts as an outlier.
+            n_total: Number of readings of all tables, by which p values are multiplied (Bonferroni).
         """
-        found, p = [], self.predicted
-        z, chance, decisive = self.z_score, self.chance, self.decisive
+        readings, p = [], self.predicted
+        z, p_values, influential = self.z_score, self.p_values, self.influential
         for i, (label, reading, bound) in enumerate(zip(self.labels, self.reading, self.at_most, strict=True)):
-            found.append(
+            readings.append(
                 CheckedReading(
                     self.table, label, self.unit, reading, bool(bound),
-                    p.median[i], p.sd[i], p.q05[i], p.q95[i], z[i], self.probability[i], chance[i], p.pareto_k[i],
-                    bool(self.places.inside[i]), bool(chance[i] * among < FALSE_ALARM), bool(decisive[i]),
+                    p.median[i], p.sd[i], p.q05[i], p.q95[i], z[i], self.pit[i], p_values[i], p.pareto_k[i],
+                    bool(self.positions.inside[i]), bool(p_values[i] * n_total < FALSE_ALARM), bool(influential[i]),
                 )
             )  # fmt: skip
-        return found
+        return readings
 
     @property
     def measured(self) -> int:
@@ -158,11 +167,11 @@ class TableChecks(Part):
         return int(np.sum(inside & ~self.at_most))
 
     @property
-    def uniform(self) -> bool | None:
-        """Whether the readings scatter as predicted; None of few."""
+    def is_uniform(self) -> bool | None:
+        """Whether the readings scatter as predicted; None for few readings."""
         return None if self.uniformity is None else self.uniformity.holds
 
     @property
-    def fault(self) -> str:
-        """How else they scatter, in words; empty if they do not."""
+    def misfit(self) -> str:
+        """How the readings scatter differently, in words; empty if they scatter as predicted."""
         return "" if self.uniformity is None else self.uniformity.fault

@@ -11,8 +11,8 @@ from bowdenfit.words import percent
 _SHARE = 0.5  # of what the last digit leaves open, below which an interval is too narrow
 
 
-def too_coarse(fit: Record) -> tuple[str, ...]:
-    """Tables whose repeated readings are alike to the last digit, where the fit claims to know more than that digit does.
+def describe_coarse_readings(fit: Record) -> tuple[str, ...]:
+    """Describe tables whose repeated readings are equal to the last digit while intervals are narrower than that digit allows.
 
     The average of independent errors of rounding in so many different readings, spread over the coefficients, is what the fit
     must leave open of the readings that it expects; without draws nothing is said.
@@ -20,16 +20,16 @@ def too_coarse(fit: Record) -> tuple[str, ...]:
     if fit.sampled is None:
         return ()
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
-    told = []
+    sentences = []
     for kind, table in each_table(fit.dataset.measurements):
-        found = kind.coarse_readings(table)
+        coarse = kind.coarse_readings(table)
         terms = [term for term in fit.model.terms if kind_of(term.name) is kind and term.name in fit.posterior.expected]
-        if found is None or not terms:
+        if coarse is None or not terms:
             continue
-        left_open = found.log_sd * np.sqrt(min(coefficients / found.different, 1.0))
+        left_open = coarse.log_sd * np.sqrt(min(coefficients / coarse.different, 1.0))
         if all(_log_sd(fit, term) < _SHARE * left_open for term in terms):
-            told.append(_sentence(found, terms[0]))
-    return tuple(told)
+            sentences.append(_coarse_sentence(coarse, terms[0]))
+    return tuple(sentences)
 
 
 def _log_sd(fit: Record, term: Term) -> float:
@@ -40,16 +40,16 @@ def _log_sd(fit: Record, term: Term) -> float:
     return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
 
 
-def _sentence(found: Coarse, term: Term) -> str:
+def _coarse_sentence(coarse: Coarse, term: Term) -> str:
     noise = getattr(term, "reading_noise", "")
     stated = (
-        f"[prior.{noise}] fixed = {found.sd:.2g} in cable.toml"
+        f"[prior.{noise}] fixed = {coarse.sd:.2g} in cable.toml"
         if noise
-        else f"a column efficiency_sd with {found.sd:.2g}"
+        else f"a column efficiency_sd with {coarse.sd:.2g}"
     )
     return (
-        f"Whatever was read more than once in {found.file} is alike to the last digit, {found.last_digit}, and does not show "
+        f"Whatever was read more than once in {coarse.file} is alike to the last digit, {coarse.last_digit}, and does not show "
         "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
-        f"{percent(np.sqrt(3) * found.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
+        f"{percent(np.sqrt(3) * coarse.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
         f"it may be off: {stated}."
     )

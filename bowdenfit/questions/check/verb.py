@@ -76,11 +76,11 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     from bowdenfit.results.folder import fill_folder_atomically
 
     with jax.enable_x64(True):
-        found = prior_predictive(dataset, seed)
+        predictive = prior_predictive(dataset, seed)
     with fill_folder_atomically(Path(folder)) as place:
         copy_captions(Path(folder), place)
-        write_figure(prior_figure, found, place, FIGURE, found.name)
-    return found
+        write_figure(prior_figure, predictive, place, FIGURE, predictive.name)
+    return predictive
 
 
 @read_first
@@ -99,23 +99,24 @@ def describe(
         reading: Keywords of `bowdenfit.read`.
     """
     from bowdenfit.dataset import is_lone_file
-    from bowdenfit.questions.check.data_set_words import check_text
+    from bowdenfit.questions.check.data_set_words import describe_data_set
 
     is_file = dataset.is_file() and dataset.suffix.lower() != ".toml"
     if (is_file or is_lone_file(dataset)) and not reading.get("wrap_angle"):
         from bowdenfit.files.apart import limits_times
-        from bowdenfit.questions.check.lone_file import lone_file_text
+        from bowdenfit.questions.check.lone_file import describe_single_file
 
         with limits_times(reading.get("reading_limit") or 1):
-            text, usable = lone_file_text(dataset, reading, check)
+            text, usable = describe_single_file(dataset, reading, check)
         return Reply(text, exit_code=0 if usable else DatasetError.exit_code)
-    found = check(dataset, **reading)
-    text = check_text(found)
+    report = check(dataset, **reading)
+    text = describe_data_set(report)
     if prior_predictive is not None:
-        from bowdenfit.questions.check.prior_words import prior_predictive_text
+        from bowdenfit.questions.check.prior_words import describe_prior_predictive
 
         text += (
-            prior_predictive_text(show_priors(found, prior_predictive)) + f"Wrote the figure to {prior_predictive}.\n"
+            describe_prior_predictive(show_priors(report, prior_predictive))
+            + f"Wrote the figure to {prior_predictive}.\n"
         )
     return Reply(text)
 

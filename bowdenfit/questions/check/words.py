@@ -1,38 +1,50 @@
-"""What the checks of a fit say, in a few sentences: scatter, outliers, readings that decide by themselves, priors."""
+"""The checks of a fit in sentences: coverage of the intervals, outliers, influential readings, priors."""
 
 from math import isfinite
 
 from bowdenfit.kinds import reading_called, readings_called
 from bowdenfit.questions.check.answer import Checks
-from bowdenfit.questions.check.sensitivity_words import priors_text
+from bowdenfit.questions.check.sensitivity_words import describe_prior_influence
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.words import decimals, few, filled, listed
+from bowdenfit.words import counted, decimals, few, filled, listed
 
-_FEW = 3  # readings of a kind that are named; of more, the rest is counted
-_FEW_CHANCE = "ten"  # where readings hang together, as two do of which each predicts the other
+_MAX_NAMED = 3  # readings named in a sentence; the others are counted
+_ONE_IN = "ten"  # two correlated readings, of which each predicts the other, miss their intervals together
 _HEADING = """Fit checks: every reading against its prediction from all the others
-(z is its deviation in standard deviations, k how far the fit leans on it: too far beyond 0.7)"""
+(z: deviation in standard deviations; k: Pareto k, influential above 0.7)"""
 
 
-def checks_text(found: Checks | None) -> str:
+def describe_checks(checks: Checks | None) -> str:
     """The checks of a fit in sentences; empty without draws.
 
     Args:
-        found: The checks.
+        checks: The checks.
     """
-    if found is None or not found.readings:
+    if checks is None or not checks.readings:
         return ""
-    sentences = [_scatter(found), _outliers(found), _decisive(found), _outside(found), priors_text(found)]
+    sentences = [
+        _describe_coverage(checks),
+        _describe_outliers(checks),
+        _describe_influential(checks),
+        _describe_outside_range(checks),
+        describe_prior_influence(checks),
+    ]
     return "\n".join([_HEADING, *(filled(sentence) for sentence in sentences if sentence)])
 
 
-def checks_page(found: Checks) -> str:
-    """The same for one who asks for the checks alone: whether any reading is off comes first.
+def checks_page(checks: Checks) -> str:
+    """Return the sentences for a page of the checks alone: outliers come first.
 
     Args:
-        found: The checks.
+        checks: The checks.
     """
-    sentences = [_outliers(found), _scatter(found), _decisive(found), _outside(found), priors_text(found)]
+    sentences = [
+        _describe_outliers(checks),
+        _describe_coverage(checks),
+        _describe_influential(checks),
+        _describe_outside_range(checks),
+        describe_prior_influence(checks),
+    ]
     return "\n".join(filled(sentence) for sentence in sentences if sentence)
 
 
@@ -41,48 +53,52 @@ def _name(reading: CheckedReading) -> str:
     return reading_called(reading.table, reading.label)
 
 
-def scattering(found: Checks) -> list[str]:
+def describe_misfits(checks: Checks) -> list[str]:
     """Tables whose readings scatter otherwise than predicted, and how.
 
     Args:
-        found: The checks.
+        checks: The checks.
     """
-    return [f"the readings of {readings_called(t.table).words} {t.fault}" for t in found.tables if t.fault]
+    return [f"the readings of {readings_called(t.table).words} {t.misfit}" for t in checks.tables if t.misfit]
 
 
-def _scatter(found: Checks) -> str:
+def _describe_coverage(checks: Checks) -> str:
     """How many readings their intervals hold, and which tables scatter otherwise than predicted."""
-    n, held = (sum(getattr(t, key) for t in found.tables) for key in ("measured", "in_interval"))
-    faults = scattering(found)
-    few = f" Of so few, chance leaves none inside in one fit of {_FEW_CHANCE}." if held == 0 and n <= _FEW else ""
-    start = f"The 90 % intervals of these predictions hold {held} of {n} readings.{few}"
-    if not faults:
-        return start
-    return f"{start} But {listed(faults)}, by more than chance does in one fit of a hundred."
-
-
-def _outliers(found: Checks) -> str:
-    far = found.outliers
-    if not far:
-        return "No reading is an outlier."
-    more = f", and {len(far) - _FEW} more" if len(far) > _FEW else ""
-    what = "Outlier" if len(far) == 1 else f"{len(far)} outliers"
-    return (
-        f"{what}: {'; '.join(_sentence(r) for r in far[:_FEW])}{more}. Look at how they were measured and written down."
+    n, held = (sum(getattr(t, key) for t in checks.tables) for key in ("measured", "in_interval"))
+    misfits = describe_misfits(checks)
+    few = (
+        f" With so few readings, that happens by chance in one fit of {_ONE_IN}."
+        if held == 0 and n <= _MAX_NAMED
+        else ""
     )
+    start = f"The 90 % intervals of these predictions contain {held} of {counted(n, 'reading')}.{few}"
+    if not misfits:
+        return start
+    return f"{start} But {listed(misfits)}, more than happens by chance in one fit of a hundred."
 
 
-def _sentence(reading: CheckedReading) -> str:
+def _describe_outliers(checks: Checks) -> str:
+    far = checks.outliers
+    if not far:
+        return "The reading is not an outlier." if len(checks.readings) == 1 else "No reading is an outlier."
+    more = f", and {len(far) - _MAX_NAMED} more" if len(far) > _MAX_NAMED else ""
+    what = "Outlier" if len(far) == 1 else f"{len(far)} outliers"
+    names = "; ".join(_describe_reading(reading) for reading in far[:_MAX_NAMED])
+    measured = "it was" if len(far) == 1 else "they were"
+    return f"{what}: {names}{more}. Check how {measured} measured and written down."
+
+
+def _describe_reading(reading: CheckedReading) -> str:
     """'efficiency at 550 mm: measured 67.8 %, expected 68.1 % without it (90 % interval ..., z = -0.2, k = 0.6)'"""
-    expected, low, high = (with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
-    measured = f"{'at most' if reading.is_bound else 'measured'} {with_unit(reading, reading.reading)}"
+    expected, low, high = (value_with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
+    measured = f"{'at most' if reading.is_bound else 'measured'} {value_with_unit(reading, reading.reading)}"
     z = f", z = {reading.z:+.1f}" if isfinite(reading.z) else ""
     k = f"= {reading.pareto_k:.2f}" if isfinite(reading.pareto_k) else "far above 1"
     interval = f"90 % interval {low} to {high}{z}, k {k}"
     return f"{_name(reading)}: {measured}, expected {expected} without it ({interval})"
 
 
-def with_unit(reading: CheckedReading, value: float) -> str:
+def value_with_unit(reading: CheckedReading, value: float) -> str:
     """A value of a reading's kind with its unit."""
     if readings_called(reading.table).are_efficiencies:
         return f"{100 * value:z.{decimals(100 * reading.sd)}f} %"
@@ -90,14 +106,14 @@ def with_unit(reading: CheckedReading, value: float) -> str:
     return f"{value:z.{decimals(reading.sd)}f}{unit}"
 
 
-def _decisive(found: Checks) -> str:
-    """Readings that the fit leans on."""
-    decisive = found.decisive
-    if not decisive:
+def _describe_influential(checks: Checks) -> str:
+    """Name the influential readings, without which the answer would change."""
+    influential = checks.influential
+    if not influential:
         return ""
     return (
-        f"The fit leans on {few(_name(r) for r in decisive)} (k above 0.7): without {_one(len(decisive))} it would be "
-        "markedly different, so measure there again first if in doubt."
+        f"Influential: {few(_name(r) for r in influential)} (k above 0.7). Without {_one(len(influential))} the answer would "
+        "change markedly, so repeat that measurement first if in doubt."
     )
 
 
@@ -105,10 +121,10 @@ def _one(n: int) -> str:
     return "it" if n == 1 else "one of them"
 
 
-def _outside(found: Checks) -> str:
+def _describe_outside_range(checks: Checks) -> str:
     """Readings outside the range of the curves, which test the model where it was not made for."""
-    outside = [r for r in found.readings if not r.inside and not r.outlier]
+    outside = [r for r in checks.readings if not r.inside and not r.outlier]
     if not outside:
         return ""
-    more = f"; and {len(outside) - _FEW} more" if len(outside) > _FEW else ""
-    return f"Outside the range of the curves: {'; '.join(_sentence(r) for r in outside[:_FEW])}{more}."
+    more = f"; and {len(outside) - _MAX_NAMED} more" if len(outside) > _MAX_NAMED else ""
+    return f"Outside the range of the curves: {'; '.join(_describe_reading(r) for r in outside[:_MAX_NAMED])}{more}."

@@ -70,7 +70,7 @@ def estimate_compensation(
         tuple(_summarize_bend(bends[i], friction[:, i], share * nominal[i], constant) for i in range(len(bends))),
         gain, tuple(missing),
         tuple(
-            PreloadOption(float(p), Interval.of(loop.felt[:, i]), Interval.of(loop.slack_from[:, i]))
+            PreloadOption(float(p), Interval.of(loop.friction_by_preload[:, i]), Interval.of(loop.slack_torque[:, i]))
             for i, p in enumerate(loop.references)
         ),
         float(np.mean(np.any(loop.preload <= 0, axis=1))),

@@ -53,7 +53,7 @@ def compensate(
 
     from bowdenfit.description.device import asked_for
     from bowdenfit.errors import UsageError
-    from bowdenfit.questions.bends.ring_down import device_for
+    from bowdenfit.questions.bends.ring_down import device_with_ring_down
     from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
     from bowdenfit.questions.compensate.gain import NEEDED
     from bowdenfit.questions.compensate.ranking import estimate_compensation
@@ -64,7 +64,7 @@ def compensate(
             "--schedule says what --simulate feeds forward; add --simulate, without --law active, or leave it out: what may be "
             "fed forward by bend is part of every answer."
         )
-    description = None if device is None else device_for(fit, Path(device))
+    description = None if device is None else device_with_ring_down(fit, Path(device))
     answer, loop = estimate_compensation(fit, description, wrap_angle, law, _parse_risk(risk))
     if simulate:
         if description is None:

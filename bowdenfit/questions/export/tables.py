@@ -15,7 +15,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.model import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import Bent, bending_contact, knows_stretch
+from bowdenfit.questions.bends.equations import BentCable, bending_contact, has_stretch
 from bowdenfit.questions.export.transmission import (
     DRAW,
     LEVELS,
@@ -179,7 +179,7 @@ def _tabulate_draws(
 def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
     """Exponent [1] and preload [N] of one draw at places, which are wrap angles or values of the route variable."""
     if bent:
-        cable = Bent(model, bending_contact(model), points)
+        cable = BentCable(model, bending_contact(model), points)
         return cable.exponent(values), cable.preload(values)[0]
     angles = model.cable.wrap_angles(values, points)
     preload = model.cable.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
@@ -188,10 +188,10 @@ def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Arr
 
 def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:
     """Stiffness at wrap angles, of an unloaded loop or of a rope under the reference force [N/mm]; nothing if not told."""
-    if not (bent and knows_stretch(model)):
+    if not (bent and has_stretch(model)):
         return jnp.zeros(0)
     load = 0.0 if model.cable.is_loop else model.cable.friction.conditions.reference_force
-    return Bent(model, bending_contact(model), points).stiffness(values, load)
+    return BentCable(model, bending_contact(model), points).stiffness(values, load)
 
 
 def _effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:

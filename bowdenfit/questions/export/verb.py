@@ -92,14 +92,16 @@ def export(
 
 
 def _compensation(fit: "Record", to: str, device: Path) -> dict[str, Any]:
-    from bowdenfit.questions.bends.ring_down import device_for
+    from bowdenfit.questions.bends.ring_down import device_with_ring_down
     from bowdenfit.questions.compensate.ranking import estimate_compensation
     from bowdenfit.questions.compensate.verb import ACCEPTED
     from bowdenfit.questions.export.compensation import compensation_parameters
     from bowdenfit.questions.export.refusals import refuse_compensation
 
     refuse_compensation(to)
-    return compensation_parameters(estimate_compensation(fit, device_for(fit, device), None, None, ACCEPTED)[0])
+    return compensation_parameters(
+        estimate_compensation(fit, device_with_ring_down(fit, device), None, None, ACCEPTED)[0]
+    )
 
 
 def _reply(answer: "ExportedFile", _: Mapping[str, Any]) -> Reply:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.recorded.rate import place_of
+from bowdenfit.questions.recorded.rate import usual_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent
 
@@ -83,7 +83,7 @@ def loss_by_contact(fit: Record) -> Loss | None:
     laws, route = fit.model.cable.laws, fit.dataset.description.route
     if fit.sampled is None or len(laws) < 2:
         return None
-    at, place = place_of(fit)
+    at, place = usual_length(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
         at, place = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"

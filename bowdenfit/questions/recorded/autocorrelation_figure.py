@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "Whether what is left over is noise"
+HEADING = "Autocorrelation of the residuals"
 MOST_COLUMNS = 4
 LEAST_BLOCKS, MOST_LAGS = 8, 60
 NORMAL_95 = 1.96
@@ -26,7 +26,7 @@ MOST_STEMS = 60  # lags that have a stem each; with more, a line alone
 
 @dataclass(frozen=True)
 class Autocorrelation:
-    """How deviations from the fit hang together in one recording.
+    """Autocorrelation of the deviations from the fit in one recording.
 
     Args:
         name: Name of the recording.
@@ -43,15 +43,15 @@ class Autocorrelation:
 
 def data(fit: Record) -> tuple[Autocorrelation, ...] | None:
     """Every recording whose deviations were correlated with each other; None without any."""
-    from bowdenfit.questions.recorded.traces import traces
+    from bowdenfit.questions.recorded.traces import trace_recordings
 
-    found = []
-    for trace in traces(fit):
+    autocorrelations = []
+    for trace in trace_recordings(fit):
         correlation = autocorrelation(trace.deviation)
         if len(correlation) > 1:
             lag = float(np.median(np.diff(trace.time))) * np.arange(len(correlation))
-            found.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
-    return tuple(found) or None
+            autocorrelations.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
+    return tuple(autocorrelations) or None
 
 
 def autocorrelation(deviation: np.ndarray) -> np.ndarray:
@@ -68,9 +68,9 @@ def caption(recordings: tuple[Autocorrelation, ...]) -> str:
     """What is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
-        f"How deviations from the fit hang together in {count_shown(shown, len(recordings), 'recording')}, by the time between "
-        "them. Of noise without memory 95 % lie in the gray band; a slow wave outside it is something that the model does not "
-        f"know. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
+        f"Autocorrelation of the deviations from the fit in {count_shown(shown, len(recordings), 'recording')}, by the "
+        "time between them. Of white noise 95 % lie in the gray band; a slow wave outside it is an effect that the model does "
+        f"not include. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
     )
 
 
@@ -101,7 +101,7 @@ def _bound(recording: Autocorrelation) -> float:
 def _panel(axes: Axes, recording: Autocorrelation) -> None:
     lag, correlation = recording.lag, recording.correlation
     bound = _bound(recording)
-    axes.axhspan(-bound, bound, facecolor="#D5D5D5", linewidth=0, zorder=0.6, label="95 % of noise without memory")
+    axes.axhspan(-bound, bound, facecolor="#D5D5D5", linewidth=0, zorder=0.6, label="95 % of white noise")
     axes.axhline(0, color=GRAY, linewidth=0.7, zorder=0.9)
     if len(lag) > MOST_STEMS:
         axes.plot(lag, correlation, color=BLUE, linewidth=1.0, label="Deviations from the fit")

@@ -40,7 +40,7 @@ POINT_COLORS = (BLACK, *SERIES_COLORS[2:4], *SERIES_COLORS[5:8], BLACK, BLACK)  
 
 
 def data(fit: Record) -> tuple[Dependence, ...] | None:
-    """On load, and on speed, as far as the friction model lets efficiency depend on them; None where it does not at all."""
+    """Return the dependence on load and on speed; None where the friction model has neither."""
     return dependences(fit)
 
 
@@ -73,7 +73,9 @@ def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Fig
         axes.set_title(" ".join(filter(None, (one.what.capitalize(), one.place))))
         if i % columns == 0:
             axes.set_ylabel(EFFICIENCY)
-    low, high = span([v for d in dependences for v in (d.quantiles, d.new_run, d.points_efficiency, np.array(d.constant))])
+    low, high = span(
+        [v for d in dependences for v in (d.quantiles, d.new_run, d.points_efficiency, np.array(d.constant))]
+    )
     flat[0].set_ylim(100 * low, 100 * high)
     legend_above(figure, flat, columns=3 if columns > 1 else 2)
     return figure
@@ -81,10 +83,10 @@ def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Fig
 
 def _curve(axes: Axes, one: Dependence) -> None:
     """Median with 90 % interval, or the least-squares line; and the constant efficiency for comparison."""
-    quantiles, drawn = 100 * one.quantiles, len(one.quantiles) > 1
+    quantiles, has_draws = 100 * one.quantiles, len(one.quantiles) > 1
     middle = quantiles[len(quantiles) // 2]
-    axes.plot(one.x, middle, color=BLUE, label=MEDIAN if drawn else LEAST_SQUARES)
-    if drawn:
+    axes.plot(one.x, middle, color=BLUE, label=MEDIAN if has_draws else LEAST_SQUARES)
+    if has_draws:
         low, high = quantiles[0], quantiles[-1]
         axes.fill_between(one.x, low, high, color=BLUE, alpha=0.18, linewidth=0, label=WIDE_INTERVAL)
     for end in one.new_run:

@@ -1,4 +1,4 @@
-"""How efficiency depends on load and speed, as plain arrays: curves of the draws, and what was measured."""
+"""Dependence of efficiency on load and speed, as plain arrays: curves of the draws, and measured points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
 CURVES = 4000  # draws of a curve
-Points = tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]  # x, efficiencies, half their intervals, and the run of each
+Points = tuple[
+    np.ndarray, np.ndarray, np.ndarray, list[str]
+]  # x, efficiencies, half their intervals, and the run of each
 
 
 @dataclass(frozen=True)
@@ -55,45 +57,58 @@ class Dependence:
 
 
 def dependences(fit: Record) -> tuple[Dependence, ...] | None:
-    """On load, and on speed, as far as the friction model lets efficiency depend on them; None where it does not at all."""
+    """Return the dependence on load and on speed, as far as the friction model has them; None where it has neither."""
     from bowdenfit.questions.recorded.lost_force import lost_force
-    from bowdenfit.questions.recorded.rate import SHOWN_SPEED, place_of
+    from bowdenfit.questions.recorded.rate import SHOWN_SPEED, usual_length
     from bowdenfit.recordings.recording import Recordings
 
     friction, recordings = fit.model.cable.friction, fit.dataset.measurements.table(Recordings)
     if recordings is None or not friction.options:
         return None
-    (at, place), found = place_of(fit), []
-    here = [r for r in recordings.each if not place or r.route == at]
+    (at, place), found_dependences = usual_length(fit), []
+    recordings_here = [r for r in recordings.each if not place or r.route == at]
     if friction.depends_on_load:
-        points = [_by_load(r) for r in here if _pulling(r).any()]
-        forces = np.concatenate([r.blocks.input_force[_pulling(r)] for r in here])
+        points = [_points_by_load(r) for r in recordings_here if _is_pulling(r).any()]
+        forces = np.concatenate([r.blocks.input_force[_is_pulling(r)] for r in recordings_here])
         low, high = (forces.min(), forces.max()) if len(forces) else (10.0, 100.0)
         grid = np.linspace(max(low, 1e-3), high, GRID)
         quantiles, constant, new_run = _curves(fit, at, grid, None)
-        x, efficiency, half, runs = _joined(points)
+        x, efficiency, half, runs = _join_points(points)
         lost = lost_force(fit)
         note = lost.short() if lost is not None else ""
-        shown = "load", "Input force (N)", grid, quantiles, constant, x, efficiency, runs, place, note, half, new_run
-        found.append(Dependence(*shown))
+        fields = "load", "Input force (N)", grid, quantiles, constant, x, efficiency, runs, place, note, half, new_run
+        found_dependences.append(Dependence(*fields))
     if friction.depends_on_rate:
         (unit, scale), (low, high) = SHOWN_SPEED[recordings.velocity_unit], friction.conditions.speeds
         grid = np.linspace(low, high, GRID)
         quantiles, constant, new_run = _curves(fit, at, None, grid)
-        x, efficiency, half, runs = _joined([_at_speed(r, scale) for r in here])
-        shown = "speed", f"Speed ({unit})", grid * scale, quantiles, constant, x, efficiency, runs, place, "", half, new_run
-        found.append(Dependence(*shown))
-    return tuple(found) or None
+        x, efficiency, half, runs = _join_points([_point_by_speed(r, scale) for r in recordings_here])
+        fields = (
+            "speed",
+            f"Speed ({unit})",
+            grid * scale,
+            quantiles,
+            constant,
+            x,
+            efficiency,
+            runs,
+            place,
+            "",
+            half,
+            new_run,
+        )
+        found_dependences.append(Dependence(*fields))
+    return tuple(found_dependences) or None
 
 
-def _pulling(recording: Recording) -> np.ndarray:
-    """The blocks that are used and in which the motor pulls."""
+def _is_pulling(recording: Recording) -> np.ndarray:
+    """Mask of the blocks that are used and in which the motor pulls."""
     return recording.strokes.used_sliding & (recording.strokes.stroke > 0)
 
 
-def _by_load(recording: Recording) -> Points:
+def _points_by_load(recording: Recording) -> Points:
     """Mean input force and mean efficiency of blocks of similar load, with half its 90 % interval."""
-    used = _pulling(recording)
+    used = _is_pulling(recording)
     force = recording.blocks.input_force[used]
     efficiency = recording.blocks.output_force[used] / force
     order = np.array_split(np.argsort(force), min(BINS, len(force)))
@@ -107,19 +122,19 @@ def _half_interval(values: np.ndarray) -> float:
     return float(NORMAL_90 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
 
 
-def _at_speed(recording: Recording, scale: float) -> Points:
+def _point_by_speed(recording: Recording, scale: float) -> Points:
     """Mean speed in the unit that is shown, and mean efficiency with half its 90 % interval."""
     blocks = recording.blocks
-    used = _pulling(recording) & np.isfinite(blocks.velocity)
+    used = _is_pulling(recording) & np.isfinite(blocks.velocity)
     ratio = np.log(blocks.output_force[used] / blocks.input_force[used])
     speed = np.abs(blocks.velocity[used]).mean() * scale
     efficiency = np.exp([ratio.mean()])
     return np.array([speed]), efficiency, efficiency * _half_interval(ratio), [recording.run]
 
 
-def _joined(points: list[Points]) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
+def _join_points(points: list[Points]) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
     x, y, half, runs = zip((np.zeros(0), np.zeros(0), np.zeros(0), []), *points, strict=True)
-    return np.concatenate(x), np.concatenate(y), np.concatenate(half), tuple(run for each in runs for run in each)
+    return np.concatenate(x), np.concatenate(y), np.concatenate(half), tuple(run for labels in runs for run in labels)
 
 
 def _curves(

@@ -1,4 +1,4 @@
-"""What each draw says of a recording: the output force that the cable gives at the measured input force."""
+"""Output force of each recording by the play operator, for every draw, from the measured input force."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -24,12 +24,12 @@ DRAWS = 200  # enough for the edges of a band
 MOST_BLOCKS = 1000  # of a recording in a figure
 
 
-def blocks_shown(n_blocks: int) -> np.ndarray:
-    """Which blocks of a recording are followed: all, or evenly spaced ones of a long recording."""
+def choose_blocks(n_blocks: int) -> np.ndarray:
+    """Choose the blocks of a recording that are followed: all, or evenly spaced ones of a long recording."""
     return np.arange(0, n_blocks, -(-n_blocks // MOST_BLOCKS))
 
 
-class Follower:
+class RecordingFollower:
     """Follows all recordings of a data set with the cable's play operator, for `DRAWS` draws at a time; compiled once.
 
     Args:
@@ -39,10 +39,10 @@ class Follower:
     """
 
     def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
-        self._data = _arrays(model, recordings, angles)
+        self._data = _block_arrays(model, recordings, angles)
         values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
-        function = jax.vmap(_followed(model), in_axes=(0, 0, None))
+        function = jax.vmap(_follow_function(model), in_axes=(0, 0, None))
         self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
 
     def __call__(
@@ -58,22 +58,22 @@ class Follower:
         return np.asarray(force), np.asarray(exponent)
 
 
-def _arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
+def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
-    shown = [blocks_shown(len(r.blocks.time)) for r in recordings.each]
-    both = list(zip(recordings.each, shown, strict=True))
+    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.each]
+    chosen = list(zip(recordings.each, shown, strict=True))
     drive = Loop if model.cable.is_loop else Rope
-    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in both]
+    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
     rows = row_angles(model.description, recorded_angles(recordings), angles).data
     held = {
-        name: beside([getattr(r.blocks, name)[s] for r, s in both])
+        name: beside([getattr(r.blocks, name)[s] for r, s in chosen])
         for name in ("input_force", "output_force", "velocity")
     }
-    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in both])
+    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in chosen])
     return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
 
 
-def _followed(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
+def _follow_function(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
     """Function of one draw's values, of mounting effects and of the blocks."""
 
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:

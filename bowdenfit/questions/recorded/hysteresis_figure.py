@@ -60,14 +60,14 @@ class LoopPanel:
 
 def data(fit: Record) -> tuple[LoopPanel, ...] | None:
     """Every recording of a single rope; None without any: those of a loop are in the figure of loops."""
-    from bowdenfit.questions.recorded.traces import traces
+    from bowdenfit.questions.recorded.traces import trace_recordings
 
-    found = []
-    for trace in traces(fit):
+    panels = []
+    for trace in trace_recordings(fit):
         forces, strokes = (trace.input_force, trace.output_force), trace.recording.strokes
-        if not trace.loop and np.any(np.isfinite(sum(forces))):
-            found.append(LoopPanel(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
-    return tuple(found) or None
+        if not trace.is_loop and np.any(np.isfinite(sum(forces))):
+            panels.append(LoopPanel(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
+    return tuple(panels) or None
 
 
 def caption(recordings: tuple[LoopPanel, ...]) -> str:
@@ -120,14 +120,14 @@ def _capstan_lines(axes: Axes, recording: LoopPanel) -> None:
     """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
     force = np.array(axes.get_xlim())
     low, middle, high = _exponent(recording)
-    drawn = len(recording.exponent) > 1
+    has_draws = len(recording.exponent) > 1
     for sign in (-1.0, 1.0):
-        if drawn:
+        if has_draws:
             axes.fill_between(
                 force, force * np.exp(sign * low), force * np.exp(sign * high), color=BLACK, alpha=0.18, linewidth=0,
                 label=f"Capstan equation, {WIDE_INTERVAL}",
             )  # fmt: skip
-        label = f"Capstan equation, {(MEDIAN if drawn else LEAST_SQUARES).lower()}"
+        label = f"Capstan equation, {(MEDIAN if has_draws else LEAST_SQUARES).lower()}"
         axes.plot(force, force * np.exp(sign * middle), color=BLACK, linewidth=0.6, label=label)
     axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
 

@@ -10,11 +10,11 @@ from bowdenfit.inference.draws import for_each_value
 from bowdenfit.kinds.recordings.reader import recorded_angles
 from bowdenfit.kinds.row_angles import resolve_angles, row_angles
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.questions.recorded.equations import blocks_shown
+from bowdenfit.questions.recorded.equations import choose_blocks
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record, parameter_values
 
-_ALIKE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
+_SAME_ANGLE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
 
 def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
@@ -30,31 +30,31 @@ def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
     recordings, parts = fit.dataset.measurements.table(Recordings), [np.zeros((4, 0))]
     if recordings is None or not recordings.loop:
         return parts[0]
-    angles = _angles(fit, recordings)
+    angles = _recording_angles(fit, recordings)
     angle = angles.sum(axis=1) if contact is None else angles[:, contact]
     order = np.argsort(angle, kind="stable")
-    for group in np.split(order, np.flatnonzero(np.diff(angle[order]) > _ALIKE) + 1):
-        parts += [_points(float(angle[group].mean()), recordings.each[i]) for i in group.tolist()]
+    for group in np.split(order, np.flatnonzero(np.diff(angle[order]) > _SAME_ANGLE) + 1):
+        parts += [_recording_points(float(angle[group].mean()), recordings.each[i]) for i in group.tolist()]
     return np.concatenate(parts, axis=1)
 
 
-def _angles(fit: Record, recordings: Recordings) -> np.ndarray:
+def _recording_angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
     measured = row_angles(cable.description, recorded_angles(recordings), angles).data
-    middle = {name: np.median(drawn, keepdims=True) for name, drawn in parameter_values(fit).items()}
+    middle = {name: np.median(draws, keepdims=True) for name, draws in parameter_values(fit).items()}
 
     def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:
         return resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in measured.items()})[0]
 
     with jax.enable_x64(True):
-        found: np.ndarray = for_each_value(angles_of, middle)[0]
-    return found
+        angles_by_recording: np.ndarray = for_each_value(angles_of, middle)[0]
+    return angles_by_recording
 
 
-def _points(angle: float, recording: Recording) -> np.ndarray:
+def _recording_points(angle: float, recording: Recording) -> np.ndarray:
     """Blocks that are readings, moving and at rest."""
     blocks, stroke = recording.blocks, recording.strokes.stroke * recording.strokes.used_sliding
-    shown = blocks_shown(len(blocks.time))
+    shown = choose_blocks(len(blocks.time))
     kept = shown[~blocks.saturated[shown]]
     return np.stack([np.full(len(kept), angle), blocks.input_force[kept], blocks.output_force[kept], stroke[kept]])

@@ -1,4 +1,4 @@
-"""What a hidden tension takes off the force: drag is a tension that the load cells do not show, not the force that is lost."""
+"""Force lost to drag: drag is a hidden tension that the load cells do not show, not the lost force itself."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.cable.friction import DRAG
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.recorded.rate import place_of
+from bowdenfit.questions.recorded.rate import usual_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit
 from bowdenfit.words import decimals
 
@@ -37,16 +37,16 @@ class LostForce:
     )  # fmt: skip
 
     def sentence(self) -> str:
-        """Both numbers in words."""
+        """Return both numbers in a sentence."""
         where = f" {self.place}" if self.place else ""
         load = "at any load" if self.at_any_load else "even at the smallest load"
         return (
-            f"Drag: while pulling{where}, {_shown(self.lost)} of the force is lost {load}, as if "
-            f"{_shown(self.hidden_tension)} of tension did not show at the cells."
+            f"Drag: while pulling{where}, {_interval_words(self.lost)} of the force is lost {load}, as if "
+            f"{_interval_words(self.hidden_tension)} of tension did not show at the cells."
         )
 
-    def explained(self) -> str:
-        """The same, and which parameter that is."""
+    def explanation(self) -> str:
+        """Return the sentence with the formula that relates both numbers."""
         return (
             f"{self.sentence()} The parameter drag is that hidden tension D; it costs D (1 - exp(-Lambda)), Lambda being the "
             "sum of friction coefficient times wrap angle."
@@ -55,7 +55,11 @@ class LostForce:
     def short(self) -> str:
         """Both medians, for a figure."""
         lost, hidden = (f"{of.median:z.{decimals(of.sd)}f} N" for of in (self.lost, self.hidden_tension))
-        return f"{lost} lost at any load,\nby {hidden} of hidden tension" if self.at_any_load else f"{hidden} of hidden tension"
+        return (
+            f"{lost} lost at any load,\nby {hidden} of hidden tension"
+            if self.at_any_load
+            else f"{hidden} of hidden tension"
+        )
 
 
 @cached_per_fit
@@ -68,7 +72,7 @@ def lost_force(fit: Record) -> LostForce | None:
     friction = fit.model.cable.friction
     if fit.sampled is None or DRAG not in friction.options:
         return None
-    at, place = place_of(fit)
+    at, place = usual_length(fit)
     route, best = fit.dataset.description.route, fit.posterior.optimum.get(OPTIMAL_LENGTH)
     if route is not None and best is not None:
         at = float(np.median(best))
@@ -81,6 +85,6 @@ def lost_force(fit: Record) -> LostForce | None:
     return LostForce(place, Interval.of(tension), Interval.of(lost), "load-dependent" not in friction.options)
 
 
-def _shown(known: Interval) -> str:
+def _interval_words(known: Interval) -> str:
     digits = decimals(known.sd)
     return f"{known.median:z.{digits}f} N (90 % interval {known.q05:z.{digits}f} to {known.q95:z.{digits}f} N)"

@@ -15,7 +15,7 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 from bowdenfit.words import significant
 
-_SURE = 0.99  # probability from which a dependence on speed is called one
+_CLEAR = 0.99  # probability from which a dependence on speed is stated rather than hinted at
 SHOWN_SPEED = {"rad/s": ("r/min", 30 / np.pi), "mm/s": ("mm/s", 1.0), "": ("", 1.0)}
 
 
@@ -46,7 +46,7 @@ class RateEffect:
             "so the data show no dependence on speed"
             if low <= 0 <= high
             else f"so efficiency {way} with speed"
-            if sure > _SURE
+            if sure > _CLEAR
             else f"a hint that efficiency {way} with speed, and no more than that"
         )
         where = f" {self.place}" if self.place else ""
@@ -64,9 +64,9 @@ def rate_effect(fit: Record) -> RateEffect | None:
         return None
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
     slow, fast = typical_speeds(fit)
-    at, place = place_of(fit)
+    at, place = usual_length(fit)
     with jax.enable_x64(True):
-        difference = _differences(fit, at, slow, fast)
+        difference = _efficiency_differences(fit, at, slow, fast)
     interval = Interval.of(difference)
     return RateEffect(slow * scale, fast * scale, unit, place, interval, float(np.mean(difference < 0)))
 
@@ -78,18 +78,18 @@ def typical_speeds(fit: Record) -> tuple[float, float]:
     return min(speeds), max(speeds)
 
 
-def place_of(fit: Record) -> tuple[float, str]:
-    """Where to answer: at the length with most recordings inside the range, else in its middle."""
+def usual_length(fit: Record) -> tuple[float, str]:
+    """Return the length with most recordings inside the range, else its middle, and its words."""
     route, recordings = fit.dataset.description.route, fit.dataset.measurements.table(Recordings)
     if route is None:
         return 0.0, ""
-    each = recordings.each if recordings is not None else ()
-    values = [r.route for r in each if route.range[0] <= r.route <= route.range[1]]
+    recorded = recordings.each if recordings is not None else ()
+    values = [r.route for r in recorded if route.range[0] <= r.route <= route.range[1]]
     at = max(set(values), key=values.count) if values else route.middle
     return at, f"at {at:g} {route.unit}"
 
 
-def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
+def _efficiency_differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
     model, friction = fit.model, fit.model.cable.friction
 
     def difference(values: Mapping[str, jax.Array]) -> jax.Array:
@@ -99,5 +99,5 @@ def _differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray
         output = friction.output_force(values, force, shifts, jnp.ones(())) / force
         return output[1] - output[0]
 
-    found: np.ndarray = for_each_value(difference, parameter_values(fit))
-    return found
+    differences: np.ndarray = for_each_value(difference, parameter_values(fit))
+    return differences

@@ -19,9 +19,9 @@ from bowdenfit.questions.recorded.recordings_figure import (
     start_of,
 )
 
-MOST = 24  # recordings
-_PLACES = 6000  # of all recordings together
-_LEFT_OUT = 300  # samples of each
+MOST_CHARTS = 24  # recordings
+_POINTS = 6000  # of all recordings together
+_MAX_LEFT_OUT = 300  # samples of each
 _COLORS = {1: "pull", -1: "return", 0: "rest"}
 
 
@@ -31,8 +31,8 @@ def recordings_charts(recordings: tuple[OverTime, ...]) -> tuple[Chart, ...]:
     Args:
         recordings: What the figure shows, and all that it has no room for.
     """
-    shown = choose_evenly(recordings, MOST)
-    return tuple(_chart(recording, _PLACES // len(shown)) for recording in shown)
+    shown = choose_evenly(recordings, MOST_CHARTS)
+    return tuple(_chart(recording, _POINTS // len(shown)) for recording in shown)
 
 
 def _chart(recording: OverTime, most: int) -> Chart:
@@ -53,7 +53,7 @@ def _chart(recording: OverTime, most: int) -> Chart:
         for (value, _, _), name in zip(PHASES, names, strict=True)
         for start, stop in phase_spans(recording, value)
     )
-    return Chart(recording.name, TIME, FORCE, (lines, *_left_out(recording)), spans)
+    return Chart(recording.name, TIME, FORCE, (lines, *_left_out_group(recording)), spans)
 
 
 def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> Iterator[Series]:
@@ -69,11 +69,11 @@ def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> 
     yield Series("Output fitted", "line", "vermillion", broken(recording.fitted))
 
 
-def _left_out(recording: OverTime) -> Iterator[Group]:
+def _left_out_group(recording: OverTime) -> Iterator[Group]:
     """Output force of samples that were left out, where they have one."""
-    there = np.flatnonzero(np.isfinite(recording.flagged_output))
-    if not len(there):
+    finite = np.flatnonzero(np.isfinite(recording.flagged_output))
+    if not len(finite):
         return
-    some = np.array(choose_evenly(there.tolist(), _LEFT_OUT))
-    time, first = np.unique(recording.flagged_time[some] - start_of(recording), return_index=True)
-    yield Group(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[some][first]),))
+    chosen = np.array(choose_evenly(finite.tolist(), _MAX_LEFT_OUT))
+    time, first = np.unique(recording.flagged_time[chosen] - start_of(recording), return_index=True)
+    yield Group(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[chosen][first]),))

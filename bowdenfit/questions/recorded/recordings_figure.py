@@ -28,7 +28,7 @@ from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.recorded.traces import Trace
+    from bowdenfit.questions.recorded.traces import RecordingTrace
     from bowdenfit.results.record import Record
 
 HEADING = "Recordings over time"
@@ -80,28 +80,34 @@ class OverTime:
 
 def data(fit: Record) -> tuple[OverTime, ...] | None:
     """Every recording; None without any of two blocks."""
-    from bowdenfit.questions.recorded.traces import traces
+    from bowdenfit.questions.recorded.traces import trace_recordings
 
-    return tuple(_over_time(trace) for trace in traces(fit) if len(trace.shown) > 1) or None
+    return tuple(_over_time(trace) for trace in trace_recordings(fit) if len(trace.block_numbers) > 1) or None
 
 
-def _over_time(trace: Trace) -> OverTime:
+def _over_time(trace: RecordingTrace) -> OverTime:
     recording, flagged = trace.recording, trace.recording.account.flagged
-    blocks = trace.time, trace.input_force, trace.output_force, trace.stroke, recording.blocks.saturated[trace.shown]
+    blocks = (
+        trace.time,
+        trace.input_force,
+        trace.output_force,
+        trace.stroke,
+        recording.blocks.saturated[trace.block_numbers],
+    )
     left_out = flagged.kind, flagged.time, flagged.input_force, flagged.output_force
-    return OverTime(recording.name, trace.loop, *blocks, trace.predicted, trace.fitted, *left_out)
+    return OverTime(recording.name, trace.is_loop, *blocks, trace.predicted, trace.fitted, *left_out)
 
 
 def caption(recordings: tuple[OverTime, ...]) -> str:
     """What is drawn, in plain words."""
     band = (
-        "the band holds it with 90 % probability, a new mounting included" if len(recordings[0].predicted) > 1 else (
-            "the dashed line is the least-squares prediction"
-        )
+        "the band holds it with 90 % probability, a new mounting included"
+        if len(recordings[0].predicted) > 1
+        else ("the dashed line is the least-squares prediction")
     )
     return (
-        f"Both forces over time of {counted(len(recordings), 'recording')}, of many evenly chosen ones: black the "
-        f"measured output, gray the measured input, blue what the cable would give out at this input ({band}), red the "
+        f"Both forces over time of {counted(len(recordings), 'recording')}, (of many, some evenly chosen): black the "
+        f"measured output, gray the measured input, blue what the cable would give out at this input ({band}), orange the "
         "fit with this recording's own mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
         f"n = {sum(len(r.time) for r in recordings)} blocks of samples."
     )

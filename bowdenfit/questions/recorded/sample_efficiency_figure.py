@@ -61,15 +61,15 @@ class Samples:
 
 def data(fit: Record) -> tuple[Samples, ...] | None:
     """Every recording of a single rope with blocks inside a sliding phase; None without any."""
-    from bowdenfit.questions.recorded.traces import traces
+    from bowdenfit.questions.recorded.traces import trace_recordings
 
-    recordings, found = [t for t in traces(fit) if not t.loop], []
-    runs = _runs(fit) if recordings else {}
+    recordings, samples = [t for t in trace_recordings(fit) if not t.is_loop], []
+    runs = _run_efficiencies(fit) if recordings else {}
     for trace in recordings:
         efficiency, stroke = sample_efficiencies(trace.input_force, trace.output_force, trace.stroke * trace.used)
         if len(efficiency):
-            found.append(Samples(trace.recording.name, efficiency, stroke, *runs[trace.recording.run]))
-    return tuple(found) or None
+            samples.append(Samples(trace.recording.name, efficiency, stroke, *runs[trace.recording.run]))
+    return tuple(samples) or None
 
 
 def sample_efficiencies(
@@ -81,7 +81,7 @@ def sample_efficiencies(
     return (output_force[here] / input_force[here]) ** stroke.astype(float), stroke
 
 
-def _runs(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
+def _run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
     """Of each run: efficiency as expected, as measured, and the standard error of that from its readings alone."""
     from bowdenfit.cable.load_cells import BLOCK_NOISE
     from bowdenfit.kinds.recordings.blocks import RECORDED
@@ -168,10 +168,10 @@ def _expected(axes: Axes, recording: Samples) -> None:
     efficiency = 100 * recording.expected
     low, middle, high = efficiency[0], efficiency[len(efficiency) // 2], efficiency[-1]
     right = axes.get_xlim()[1] * (1 - 0.4 * EDGE)
-    drawn = len(efficiency) > 1
-    words = f"{MEDIAN.lower()} with {WIDE_INTERVAL}" if drawn else LEAST_SQUARES.lower()
+    has_draws = len(efficiency) > 1
+    words = f"{MEDIAN.lower()} with {WIDE_INTERVAL}" if has_draws else LEAST_SQUARES.lower()
     axes.errorbar(
-        [right], [middle], [[middle - low], [high - middle]] if drawn else None, fmt="D", color=GREEN, markersize=3.2,
+        [right], [middle], [[middle - low], [high - middle]] if has_draws else None, fmt="D", color=GREEN, markersize=3.2,
         linewidth=1.3, capsize=2.2, zorder=4, label=f"Expected of the cable, {words}",
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from bowdenfit.questions.recorded.rate import SHOWN_SPEED, typical_speeds
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 from bowdenfit.words import percent, significant
 
-_SHOWN = 5  # speeds
+_N_SPEEDS = 5  # speeds
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,13 @@ class StickSlip:
 
     def sentence(self) -> str:
         """'Probability that friction falls with speed, ...: 84 % at 3 r/min, 2 % at 60 r/min.'"""
-        shown = dict.fromkeys((0, len(self.speeds) - 1))
-        each = ", ".join(f"{percent(self.probabilities[i], 0)} at {significant(self.speeds[i])} {self.unit}" for i in shown)
-        return f"Probability that friction falls with speed, so that a compliant drive sticks and slips: {each}."
+        ends = dict.fromkeys((0, len(self.speeds) - 1))
+        probabilities = ", ".join(
+            f"{percent(self.probabilities[i], 0)} at {significant(self.speeds[i])} {self.unit}" for i in ends
+        )
+        return (
+            f"Probability that friction falls with speed, so that a compliant drive sticks and slips: {probabilities}."
+        )
 
 
 @cached_per_fit
@@ -45,12 +49,12 @@ def stick_slip(fit: Record) -> StickSlip | None:
         return None
     unit, scale = SHOWN_SPEED[friction.conditions.velocity_unit]
     slow, fast = typical_speeds(fit)
-    speeds = np.unique(np.geomspace(max(slow, 1e-9), max(fast, 1e-9), _SHOWN))
-    falls = np.mean(slopes(fit, speeds) < 0, axis=0)
+    speeds = np.unique(np.geomspace(max(slow, 1e-9), max(fast, 1e-9), _N_SPEEDS))
+    falls = np.mean(friction_slopes(fit, speeds) < 0, axis=0)
     return StickSlip(tuple(float(speed * scale) for speed in speeds), unit, tuple(float(p) for p in falls))
 
 
-def slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
+def friction_slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
     """Slope of the friction coefficient by the speed, over the coefficient at speed 0 without Stribeck's rise, draws by speeds.
 
     Args:
@@ -62,5 +66,5 @@ def slopes(fit: Record, speeds: np.ndarray) -> np.ndarray:
         return rate_slope(at, *(values[name] for name in (STRIBECK, STRIBECK_SPEED, VISCOUS)))
 
     with jax.enable_x64(True):
-        found: np.ndarray = for_each_value(slope, parameter_values(fit), np.asarray(speeds, dtype=float))
-    return found
+        slope_draws: np.ndarray = for_each_value(slope, parameter_values(fit), np.asarray(speeds, dtype=float))
+    return slope_draws

@@ -1,4 +1,4 @@
-"""What a fit says of each recording: the band of output forces that it allows, and the one that it finds."""
+"""Predicted and fitted output force of each recording."""
 
 from dataclasses import dataclass
 
@@ -8,22 +8,22 @@ import numpy as np
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.cable.noise import noise_law
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.questions.recorded.equations import DRAWS, Follower, blocks_shown
+from bowdenfit.questions.recorded.equations import DRAWS, RecordingFollower, choose_blocks
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record, cached_per_fit, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
-_REACH = 0.1  # mounting effects of a run that are looked at, either way
+_MAX_MOUNTING = 0.1  # mounting effects of a run that are looked at, either way
 
 
 @dataclass(frozen=True)
-class Trace:
-    """One recording in the blocks that are looked at, and what the fit says of it.
+class RecordingTrace:
+    """One recording in the blocks that are shown, with its predicted and fitted output force.
 
     Args:
         recording: The recording.
-        loop: Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads.
-        shown: Places of the blocks.
+        is_loop: Whether it is of a pull-pull loop, which has no efficiency that is the same at all loads.
+        block_numbers: Numbers of the blocks that are shown.
         predicted: Output force [N] of each block that the cable gives at the measured input force, `QUANTILES` (first axis)
             over draws and over new mountings; one row, least squares', without draws.
         fitted: Output force [N] of each block with this run's own mounting effect.
@@ -31,8 +31,8 @@ class Trace:
     """
 
     recording: Recording
-    loop: bool
-    shown: np.ndarray
+    is_loop: bool
+    block_numbers: np.ndarray
     predicted: np.ndarray
     fitted: np.ndarray
     exponent: np.ndarray
@@ -40,53 +40,53 @@ class Trace:
     @property
     def time(self) -> np.ndarray:
         """Middle of each block [s]."""
-        return self.recording.blocks.time[self.shown]
+        return self.recording.blocks.time[self.block_numbers]
 
     @property
     def input_force(self) -> np.ndarray:
         """Mean force at the motor side in each block [N]."""
-        return self.recording.blocks.input_force[self.shown]
+        return self.recording.blocks.input_force[self.block_numbers]
 
     @property
     def output_force(self) -> np.ndarray:
         """Mean force at the load side in each block [N]."""
-        return self.recording.blocks.output_force[self.shown]
+        return self.recording.blocks.output_force[self.block_numbers]
 
     @property
     def stroke(self) -> np.ndarray:
         """+1 pulling, -1 returning, 0 switching or held."""
-        return self.recording.strokes.stroke[self.shown]
+        return self.recording.strokes.stroke[self.block_numbers]
 
     @property
     def used(self) -> np.ndarray:
         """Whether each block lies safely inside a sliding phase."""
-        return self.recording.strokes.used_sliding[self.shown]
+        return self.recording.strokes.used_sliding[self.block_numbers]
 
     @property
     def deviation(self) -> np.ndarray:
-        """How far the output force is off the fitted one in the blocks that are used; see `_apart`."""
-        return _apart(self.output_force, self.fitted, self.loop)[self.used]
+        """How far the output force is off the fitted one in the blocks that are used; see `_force_difference`."""
+        return _force_difference(self.output_force, self.fitted, self.is_loop)[self.used]
 
 
 @cached_per_fit
-def traces(fit: Record) -> tuple[Trace, ...]:
-    """Every recording of a fit."""
+def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
+    """Trace every recording of a fit; empty without any."""
     recordings = fit.dataset.measurements.table(Recordings)
     if recordings is None:
         return ()
     with jax.enable_x64(True):
-        follower = Follower(fit.model, recordings, fit.dataset.measurements.table(AngleTable))
+        follower = RecordingFollower(fit.model, recordings, fit.dataset.measurements.table(AngleTable))
         predicted, exponent = _predicted(fit, recordings, follower)
         fitted = _fitted(fit, recordings, follower)
-    found = []
+    recording_traces = []
     for i, recording in enumerate(recordings.each):
-        shown = blocks_shown(len(recording.blocks.time))
-        forces = predicted[:, : len(shown), i], fitted[: len(shown), i]
-        found.append(Trace(recording, recordings.loop, shown, *forces, exponent[:, i]))
-    return tuple(found)
+        block_numbers = choose_blocks(len(recording.blocks.time))
+        forces = predicted[:, : len(block_numbers), i], fitted[: len(block_numbers), i]
+        recording_traces.append(RecordingTrace(recording, recordings.loop, block_numbers, *forces, exponent[:, i]))
+    return tuple(recording_traces)
 
 
-def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple[np.ndarray, np.ndarray]:
+def _predicted(fit: Record, recordings: Recordings, follower: RecordingFollower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
     values, n = thinned_parameter_values(fit, DRAWS), len(recordings.each)
     if fit.sampled is None:
@@ -100,20 +100,20 @@ def _predicted(fit: Record, recordings: Recordings, follower: Follower) -> tuple
     return np.quantile(force, QUANTILES, axis=0), np.quantile(exponent, QUANTILES, axis=0)
 
 
-def _fitted(fit: Record, recordings: Recordings, follower: Follower) -> np.ndarray:
+def _fitted(fit: Record, recordings: Recordings, follower: RecordingFollower) -> np.ndarray:
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
-    center = {name: np.full(DRAWS, np.median(drawn)) for name, drawn in thinned_parameter_values(fit, DRAWS).items()}
-    grid = np.linspace(-_REACH, _REACH, DRAWS)
+    center = {name: np.full(DRAWS, np.median(draws)) for name, draws in thinned_parameter_values(fit, DRAWS).items()}
+    grid = np.linspace(-_MAX_MOUNTING, _MAX_MOUNTING, DRAWS)
     force, _ = follower(center, np.repeat(grid[:, None], len(recordings.each), axis=1))
     columns = []
     for i, recording in enumerate(recordings.each):
-        shown = blocks_shown(len(recording.blocks.time))
-        used, measured = recording.strokes.used_sliding[shown], recording.blocks.output_force[shown]
-        apart = np.abs(_apart(force[:, : len(shown), i], measured, recordings.loop))
-        columns.append(force[int(np.argmin(np.median(apart[:, used], axis=1))) if used.any() else 0, :, i])
+        block_numbers = choose_blocks(len(recording.blocks.time))
+        used, measured = recording.strokes.used_sliding[block_numbers], recording.blocks.output_force[block_numbers]
+        distance = np.abs(_force_difference(force[:, : len(block_numbers), i], measured, recordings.loop))
+        columns.append(force[int(np.argmin(np.median(distance[:, used], axis=1))) if used.any() else 0, :, i])
     return np.stack(columns, axis=1)
 
 
-def _apart(one: np.ndarray, other: np.ndarray, loop: bool) -> np.ndarray:
-    """How far forces are apart: their log ratio; of a loop, which pass through zero, their difference [N]."""
+def _force_difference(one: np.ndarray, other: np.ndarray, loop: bool) -> np.ndarray:
+    """Return the log ratio of two forces; for a loop, whose forces pass through zero, their difference [N]."""
     return one - other if loop else np.log(np.maximum(one, 1e-3) / np.maximum(other, 1e-3))

@@ -1,19 +1,19 @@
-"""Which column of a file is what, and in which unit: asked where its headings do not say it."""
+"""Assign columns of a file to quantities, and their units; ask where the headings do not say it."""
 
 from collections.abc import Sequence
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.matching import Quantity
 from bowdenfit.kinds.table_files import WantedColumn
-from bowdenfit.questions.start.question import Asker, agree, choose, number, unit
-from bowdenfit.questions.start.sheet import SeenColumn, Sheet
+from bowdenfit.questions.start.question import Asker, choose, number, unit, yes_or_no
+from bowdenfit.questions.start.sheet import FileColumn, MeasuredFile
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import quoted, shown
 
-_MOST_LABELS = 0.8  # of the rows, up to which a column of different labels may name runs or strokes
+_MAX_LABEL_SHARE = 0.8  # of the rows, up to which a column of different labels may name runs or strokes
 
 
-def name_columns(sheet: Sheet, ask: Asker) -> None:
+def name_columns(sheet: MeasuredFile, ask: Asker) -> None:
     """Name the columns that a file of its kind needs, and those that it may have.
 
     Args:
@@ -24,46 +24,49 @@ def name_columns(sheet: Sheet, ask: Asker) -> None:
         DatasetError: It has no column that could be one of those needed.
     """
     assert sheet.kind is not None and sheet.kind.init_questions is not None  # only files whose kind is known come here
-    for each in sheet.kind.init_questions.columns:
-        quantity = next((one for one in (each.quantity, *each.also) if sheet.can_be(one)), each.quantity)
-        options = sheet.can_be(quantity)
+    for wanted in sheet.kind.init_questions.columns:
+        quantity = next((one for one in (wanted.quantity, *wanted.also) if sheet.columns_for(one)), wanted.quantity)
+        options = sheet.columns_for(quantity)
         if len(options) == 1:
             column = options[0]
-        elif each.optional:
-            maybe = _optional(sheet, each, ask)
-            if maybe is None:
+        elif wanted.optional:
+            optional = _ask_optional_column(sheet, wanted, ask)
+            if optional is None:
                 continue
-            column = maybe
+            column = optional
         else:
-            column = _required(sheet, each, options, ask)
-        take(sheet, quantity, column, ask)
+            column = _ask_required_column(sheet, wanted, options, ask)
+        assign_column(sheet, quantity, column, ask)
     for question in sheet.kind.init_questions.yes_no:
-        if question.unless not in sheet.taken and ask.ask(agree(question.words.format(sheet.file), False)):
+        if question.unless not in sheet.assigned and ask.ask(yes_or_no(question.words.format(sheet.file), False)):
             sheet.settings[question.key] = question.value
 
 
-def take(sheet: Sheet, quantity: Quantity, column: SeenColumn, ask: Asker) -> None:
-    """A column is a quantity; its unit is asked for where the file does not say it."""
-    sheet.take(quantity, with_unit(sheet, quantity.dimension, column, ask))
+def assign_column(sheet: MeasuredFile, quantity: Quantity, column: FileColumn, ask: Asker) -> None:
+    """Assign a column to a quantity; ask for its unit where the file does not say it."""
+    sheet.assign(quantity, ask_unit(sheet, quantity.dimension, column, ask))
 
 
-def with_unit(sheet: Sheet, dimension: str, column: SeenColumn, ask: Asker) -> SeenColumn:
-    """A column with its unit."""
+def ask_unit(sheet: MeasuredFile, dimension: str, column: FileColumn, ask: Asker) -> FileColumn:
+    """Return a column with its unit, asked for where the file does not say it."""
     if column.unit or dimension == "text" or (dimension == "ratio" and column.high <= 1):
         return column
     what = f"the column {shown(column.name)} of {sheet.file}, which holds {column.low:.5g} to {column.high:.5g}"
-    named = "%" if dimension == "ratio" else "N" if dimension == "force" else "deg" if dimension == "angle" else "mm"
-    why = f"{sheet.file} does not say the unit of its column {shown(column.name)}; write it into the heading, such as " + (
-        f"{shown(f'{column.name} ({named})')}."
+    example = "%" if dimension == "ratio" else "N" if dimension == "force" else "deg" if dimension == "angle" else "mm"
+    why = (
+        f"{sheet.file} does not say the unit of its column {shown(column.name)}; write it into the heading, such as "
+        + (f"{shown(f'{column.name} ({example})')}.")
     )
-    of_route = "length" if dimension == "route" else dimension
-    return sheet.with_unit(column, ask.ask(unit(f"In which unit is {what}?", of_route, why)))
+    dimension_in_file = "length" if dimension == "route" else dimension
+    return sheet.set_unit(column, ask.ask(unit(f"In which unit is {what}?", dimension_in_file, why)))
 
 
-def _required(sheet: Sheet, wanted: WantedColumn, options: Sequence[SeenColumn], ask: Asker) -> SeenColumn:
+def _ask_required_column(
+    sheet: MeasuredFile, wanted: WantedColumn, options: Sequence[FileColumn], ask: Asker
+) -> FileColumn:
     """The column that must be there."""
     dimension = wanted.quantity.dimension
-    options = options or of_dimension(sheet, dimension)
+    options = options or unknown_columns_of(sheet, dimension)
     if not options:
         raise DatasetError(
             f"{sheet.file} has no column that could be {wanted.words}; it has {quoted(tuple(c.name for c in sheet.columns))}. "
@@ -78,34 +81,36 @@ def _required(sheet: Sheet, wanted: WantedColumn, options: Sequence[SeenColumn],
     return ask.ask(choose(f"Which column of {sheet.file} is {wanted.words}?", listed, proposed, why))
 
 
-def _optional(sheet: Sheet, wanted: WantedColumn, ask: Asker) -> SeenColumn | None:
+def _ask_optional_column(sheet: MeasuredFile, wanted: WantedColumn, ask: Asker) -> FileColumn | None:
     """A column of labels that may be there."""
     rows = max((each.values for each in sheet.columns), default=0)
     options = [
         each
-        for each in sheet.left
-        if not each.unit and 1 < each.values <= max(_MOST_LABELS * rows, 2) and _are_labels(each, wanted)
+        for each in sheet.unknown_columns
+        if not each.unit and 1 < each.values <= max(_MAX_LABEL_SHARE * rows, 2) and _holds_labels(each, wanted)
     ]
     if not options:
         return None
-    listed: list[tuple[str, SeenColumn | None]] = [(each.words, each) for each in options]
+    listed: list[tuple[str, FileColumn | None]] = [(each.words, each) for each in options]
     question = f"Which column of {sheet.file} says {wanted.words}?"
     return ask.ask(choose(question, [*listed, ("none of them", None)], len(listed) + 1))
 
 
-def _are_labels(column: SeenColumn, wanted: WantedColumn) -> bool:
+def _holds_labels(column: FileColumn, wanted: WantedColumn) -> bool:
     """Whether words, or whole numbers where these can be labels, stand in a column."""
     low, high = wanted.numbers
     return not column.numbers or (low <= column.low == int(column.low) and column.high <= high)
 
 
-def of_dimension(sheet: Sheet, dimension: str) -> list[SeenColumn]:
+def unknown_columns_of(sheet: MeasuredFile, dimension: str) -> list[FileColumn]:
     """Columns of numbers that are not known yet and can measure something: in such a unit, or else in none."""
-    numbers = [each for each in sheet.left if each.numbers]
-    return [each for each in numbers if each.dimension == dimension] or [each for each in numbers if not each.unit]
+    numbers = [column for column in sheet.unknown_columns if column.numbers]
+    return [column for column in numbers if column.dimension == dimension] or [
+        column for column in numbers if not column.unit
+    ]
 
 
-def name_channels(sheet: Sheet, ask: Asker) -> dict[str, ColumnSource]:
+def name_channels(sheet: MeasuredFile, ask: Asker) -> dict[str, ColumnSource]:
     """The channels of a recording that must be named, and its rate where it has no clock."""
     name_columns(sheet, ask)
     if not sheet.has_clock:

@@ -1,4 +1,4 @@
-"""Writing a new data set: in a folder that is there whole or not at all."""
+"""Write a new data set into a folder that exists whole or not at all."""
 
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +14,11 @@ from bowdenfit.results.folder import fill_folder_atomically, is_empty
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
-_VERBS = {DESCRIPTION_FILE: "fit", FLEET_DESCRIPTION: "fleet", "metabolic.toml": "metabolic"}  # that read such a description
+_VERB_BY_FILE = {
+    DESCRIPTION_FILE: "fit",
+    FLEET_DESCRIPTION: "fleet",
+    "metabolic.toml": "metabolic",
+}  # that read such a description
 _PACKAGE, _CHECKOUT = "examples", "datasets"  # where the shipped data sets are, in a wheel and beside the package
 
 
@@ -41,8 +45,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
         UsageError, StoreError: It exists already, or cannot be written.
     """
     refuse_existing(folder)
-    with fill_folder_atomically(folder) as place:
-        yield place
+    with fill_folder_atomically(folder) as partial:
+        yield partial
 
 
 def write_template(folder: Path) -> None:
@@ -86,7 +90,9 @@ def refuse_files(files: Sequence[Path]) -> None:
             what = "is a folder" if file.is_dir() else "does not exist"
             raise UsageError(f"{file} {what}; name the files that you measured.")
         if not file.name.isprintable():
-            raise DatasetError(f"a cable.toml cannot name the file {shown(file.name)}; rename it in letters that print.")
+            raise DatasetError(
+                f"a cable.toml cannot name the file {shown(file.name)}; rename it in letters that print."
+            )
     names = [file.name for file in files]
     if twice := [name for name in names if names.count(name) > 1 or name == DESCRIPTION_FILE]:
         raise DatasetError(f"a data set cannot hold {shown(twice[0])} twice; rename one of the files.")
@@ -103,7 +109,7 @@ def examples() -> Mapping[str, Path]:
 
 def verb_of(folder: Path) -> str:
     """The verb that reads a folder, by the description that stands in it; empty where none does."""
-    return next((verb for file, verb in _VERBS.items() if (folder / file).is_file()), "")
+    return next((verb for file, verb in _VERB_BY_FILE.items() if (folder / file).is_file()), "")
 
 
 def write_example(name: str, folder: Path) -> None:
@@ -127,6 +133,6 @@ def measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:
     return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings and path.is_file()]
 
 
-def written(folder: Path) -> str:
-    """What was written, in a sentence."""
+def describe_written_files(folder: Path) -> str:
+    """Say which files were written, in a sentence."""
     return f"Wrote {listed(sorted(path.name for path in folder.iterdir()))} to {folder}."

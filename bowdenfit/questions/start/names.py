@@ -1,4 +1,4 @@
-"""Names that a person writes: each is refused at once where `check` would refuse it later, in the same words."""
+"""Questions for names: a name is refused at once where `check` would refuse it later, in the same words."""
 
 import re
 from collections.abc import Callable, Collection
@@ -18,19 +18,19 @@ PARAMETERS = {
     "sigma_ringdown", "sigma_theta", "sigma_x", "stiffness", "stretch_zero", "stribeck", "stribeck_speed", "stroke_difference",
     "tau", "viscous",
 }  # fmt: skip
-"""What fits call the parameters that are no coefficients of friction and not of a column or a run."""
+"""Names of all parameters that belong neither to a contact, a column nor a run: coefficients may not use them."""
 _NUMBERED = re.compile(r"(amplitude|displacement_zero|release|rest)_\d+")  # of a run
 _OF_CURVE = ("a", "b", "c", "A", "B", "C", "middle", "slope")  # behind the name of its column
 _NAME = TypeAdapter[str](Name)
 
 
-def cable_name(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
-    """A question after what a cable is called."""
-    return Question(words, _nameable, default, why, example)
+def ask_cable_name(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
+    """Ask for the name of a cable."""
+    return Question(words, _checked_name, default, why, example)
 
 
-def place_name(words: str, default: str | None, taken: Collection[str]) -> Question[str]:
-    """A question after the name of a contact.
+def ask_contact_name(words: str, default: str | None, taken: Collection[str]) -> Question[str]:
+    """Ask for the name of a contact.
 
     Args:
         words: The question.
@@ -39,17 +39,17 @@ def place_name(words: str, default: str | None, taken: Collection[str]) -> Quest
     """
 
     def read(typed: str) -> str:
-        said = _nameable(typed)
-        if said in taken:
-            raise UsageError(f"{shown(said)} is another place already; write another one.")
-        return said
+        name = _checked_name(typed)
+        if name in taken:
+            raise UsageError(f"{shown(name)} is another place already; write another one.")
+        return name
 
     proposed = None if default in taken else default
     return Question(words, read, proposed, "" if proposed else "two places would have the same name.", "edge")
 
 
-def coefficient_name(words: str, default: str, columns: Collection[str]) -> Question[str]:
-    """A question after the name of a coefficient of friction.
+def ask_coefficient_name(words: str, default: str, columns: Collection[str]) -> Question[str]:
+    """Ask for the name of a coefficient of friction.
 
     Args:
         words: The question.
@@ -58,25 +58,27 @@ def coefficient_name(words: str, default: str, columns: Collection[str]) -> Ques
     """
 
     def read(typed: str) -> str:
-        said = _nameable(typed)
-        _as_described(lambda: Contact.model_validate({"name": "x", "friction": said, "wrap_angle": {"column": "x"}}))
+        name = _checked_name(typed)
+        _refuse_invalid(lambda: Contact.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
         of_curves = {f"{column}_{ending}" for column in columns for ending in _OF_CURVE}
-        if said in PARAMETERS or said in TAKEN or said in of_curves or _NUMBERED.fullmatch(said):
-            raise UsageError(f"{shown(said)} is what results call another number; write another name, such as {default}.")
-        return said
+        if name in PARAMETERS or name in TAKEN or name in of_curves or _NUMBERED.fullmatch(name):
+            raise UsageError(
+                f"{shown(name)} is what results call another number; write another name, such as {default}."
+            )
+        return name
 
     return Question(words, read, default)
 
 
-def _nameable(typed: str) -> str:
-    said = " ".join(typed.split())
-    if said in PLACEHOLDERS:
-        raise UsageError(f"{shown(said)} is left from the template; write {PLACEHOLDERS[said]}.")
-    _as_described(lambda: _NAME.validate_python(said))
-    return said
+def _checked_name(typed: str) -> str:
+    name = " ".join(typed.split())
+    if name in PLACEHOLDERS:
+        raise UsageError(f"{shown(name)} is left from the template; write {PLACEHOLDERS[name]}.")
+    _refuse_invalid(lambda: _NAME.validate_python(name))
+    return name
 
 
-def _as_described(validate: Callable[[], object]) -> None:
+def _refuse_invalid(validate: Callable[[], object]) -> None:
     """Refuse what a description would refuse."""
     try:
         validate()

@@ -23,8 +23,8 @@ def toml_text(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:
             lines.append("")
         lines += [f"# {line}" for line in remarks.get(key, "").splitlines()]
         if is_list:
-            for i, each in enumerate(value):
-                lines += [""] * (i > 0) + [f"[[{_key(key)}]]", *map(_line, each, each.values())]
+            for i, entry in enumerate(value):
+                lines += [""] * (i > 0) + [f"[[{_key(key)}]]", *map(_line, entry, entry.values())]
         elif isinstance(value, Mapping):
             lines += _section([key], value)
         else:

@@ -16,7 +16,7 @@ _QUANTITY = re.compile(r"(?P<value>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?
 
 @dataclass(frozen=True)
 class Question(Generic[Answer]):
-    """What is asked.
+    """A question, how its answer is read, and its default.
 
     Args:
         words: The question.
@@ -37,7 +37,7 @@ class Question(Generic[Answer]):
 
 @runtime_checkable
 class Asker(Protocol):
-    """Who puts questions: a terminal, or nobody."""
+    """Whoever answers questions: a person at a terminal, or `Unattended`."""
 
     def ask(self, question: Question[Answer]) -> Answer:
         """The answer."""
@@ -48,18 +48,18 @@ class Asker(Protocol):
         ...
 
     def settle(self) -> None:
-        """Before what rests on the answers so far."""
+        """Refuse here what was not answered, before later questions build on it."""
         ...
 
 
-class Nobody:
-    """Where there is no person: what files do not say is refused, all of it together, and proposals are no answers."""
+class Unattended:
+    """Answer without a person: refuse together all that the files do not say; proposed defaults do not count as answers."""
 
     def __init__(self) -> None:
         self.faults = Faults()
 
     def ask(self, question: Question[Answer]) -> Answer:
-        """The default; where it is only proposed, or an example, to find out what else is not said."""
+        """Return the default; where it is only proposed, or missing, note the fault and go on with it or an example."""
         if question.default is None or question.why:
             self.faults.faults.append(DescriptionError(question.why))
         return question.read(question.example if question.default is None else question.default)
@@ -77,18 +77,18 @@ class Nobody:
 
 
 def text(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
-    """A question after words of one line."""
+    """Ask for a line of text."""
     return Question(words, lambda typed: " ".join(typed.split()), default, why, example)
 
 
-def agree(words: str, default: bool, why: str = "") -> Question[bool]:
-    """A question after yes or no; `why` where the default is only proposed."""
+def yes_or_no(words: str, default: bool, why: str = "") -> Question[bool]:
+    """Ask yes or no; `why` where the default is only proposed."""
 
     def read(typed: str) -> bool:
-        said = typed.strip().lower()
-        if said not in (*_YES, *_NO):
+        answer = typed.strip().lower()
+        if answer not in (*_YES, *_NO):
             raise UsageError(f"{shown(typed)} is neither yes nor no; write y or n.")
-        return said in _YES
+        return answer in _YES
 
     return Question(f"{words} (y or n)", read, "y" if default else "n", why)
 
@@ -96,7 +96,7 @@ def agree(words: str, default: bool, why: str = "") -> Question[bool]:
 def choose(
     words: str, options: Sequence[tuple[str, Answer]], default: int | None = None, why: str = ""
 ) -> Question[Answer]:
-    """A question after one of several, which are numbered from 1.
+    """Ask for one of several options, numbered from 1.
 
     Args:
         words: The question.
@@ -106,16 +106,23 @@ def choose(
     """
 
     def read(typed: str) -> Answer:
-        said = typed.strip()
-        if said.isascii() and said.isdecimal() and 1 <= int(said) <= len(options):
-            return options[int(said) - 1][1]
+        answer = typed.strip()
+        if answer.isascii() and answer.isdecimal() and 1 <= int(answer) <= len(options):
+            return options[int(answer) - 1][1]
         raise UsageError(f"{shown(typed)} is none of them; write a number from 1 to {len(options)}.")
 
-    return Question(words, read, None if default is None else str(default), why, "1", tuple(each for each, _ in options))
+    return Question(
+        words,
+        read,
+        None if default is None else str(default),
+        why,
+        "1",
+        tuple(description for description, _ in options),
+    )
 
 
 def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
-    """A question after one of several words."""
+    """Ask for one of several known words."""
 
     def read(typed: str) -> str:
         if typed.strip() not in known:
@@ -126,7 +133,7 @@ def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
 
 
 def unit(words: str, dimension: str, why: str, default: str | None = None) -> Question[str]:
-    """A question after a unit.
+    """Ask for a unit.
 
     Args:
         words: The question.
@@ -149,7 +156,7 @@ def unit(words: str, dimension: str, why: str, default: str | None = None) -> Qu
 def quantity(
     words: str, dimension: str, example: str, why: str = "", default: str | None = None
 ) -> Question[tuple[float, str]]:
-    """A question after a number with its unit.
+    """Ask for a number with its unit.
 
     Args:
         words: The question.
@@ -163,45 +170,53 @@ def quantity(
         match = _QUANTITY.fullmatch(typed.strip())
         if not match:
             raise UsageError(f"{shown(typed)} is not a number with its unit; write it as {example}.")
-        value, written = float(match["value"].replace(",", ".")), match["unit"].strip()
+        value, unit_name = float(match["value"].replace(",", ".")), match["unit"].strip()
         try:
-            factor = conversion_factor(written, dimension)
+            factor = conversion_factor(unit_name, dimension)
         except DatasetError as error:
             raise UsageError(f"{error}.") from None
         if not 0 < value * factor < 1e9:
-            raise UsageError(f"{shown(typed)} is not possible here; write a positive number with its unit, as {example}.")
-        return value, written
+            raise UsageError(
+                f"{shown(typed)} is not possible here; write a positive number with its unit, as {example}."
+            )
+        return value, unit_name
 
     return Question(words, read, default, why, example)
 
 
 def number(words: str, default: str | None, why: str = "", example: str = "") -> Question[float]:
-    """A question after a positive number."""
+    """Ask for a positive number."""
 
     def read(typed: str) -> float:
         try:
-            found = float(typed.strip().removesuffix("Hz").replace(",", "."))
+            value = float(typed.strip().removesuffix("Hz").replace(",", "."))
         except ValueError:
             raise UsageError(f"{shown(typed)} is not a number; write one, such as {example or default}.") from None
-        if not 0 < found < 1e9:
-            raise UsageError(f"{shown(typed)} is not possible here; write a positive number, such as {example or default}.")
-        return found
+        if not 0 < value < 1e9:
+            raise UsageError(
+                f"{shown(typed)} is not possible here; write a positive number, such as {example or default}."
+            )
+        return value
 
     return Question(words, read, default, why, example)
 
 
 def numbers(words: str, default: str, least: int = 0, exactly: int | None = None) -> Question[tuple[float, ...]]:
-    """A question after numbers with blanks between, in rising order."""
+    """Ask for numbers separated by blanks, in rising order."""
 
     def read(typed: str) -> tuple[float, ...]:
         try:
-            found = tuple(float(part.replace(",", ".")) for part in typed.replace(";", " ").split())
+            values = tuple(float(part.replace(",", ".")) for part in typed.replace(";", " ").split())
         except ValueError:
-            raise UsageError(f"{shown(typed)} are not numbers; write them with blanks between, such as 430 530.") from None
-        if len(found) < least or (exactly is not None and len(found) != exactly):
-            raise UsageError(f"{shown(typed)}: {exactly or least} numbers are needed, with blanks between, such as 430 530.")
-        if not all(-1e9 < number < 1e9 for number in found) or list(found) != sorted(set(found)):
+            raise UsageError(
+                f"{shown(typed)} are not numbers; write them with blanks between, such as 430 530."
+            ) from None
+        if len(values) < least or (exactly is not None and len(values) != exactly):
+            raise UsageError(
+                f"{shown(typed)}: {exactly or least} numbers are needed, with blanks between, such as 430 530."
+            )
+        if not all(-1e9 < number < 1e9 for number in values) or list(values) != sorted(set(values)):
             raise UsageError(f"{shown(typed)} are not in rising order; write the smallest first, such as 430 530.")
-        return found
+        return values
 
     return Question(words, read, default)

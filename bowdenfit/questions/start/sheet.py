@@ -1,4 +1,4 @@
-"""A file that no description names: its columns, what they are known to hold, and what is said of them."""
+"""A measured file without a description: its columns, and the quantities they are assigned to."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from bowdenfit.words import shown
 
 
 @dataclass(frozen=True)
-class SeenColumn:
+class FileColumn:
     """A column, or a channel of a recording.
 
     Args:
@@ -59,7 +59,7 @@ class SeenColumn:
         return f"{shown(self.name)} ({holds})"
 
     @property
-    def plain(self) -> str:
+    def plain_name(self) -> str:
         """Its name as tables have it, without its unit: "Sheath angle (deg)" is sheath_angle."""
         name = split_brackets(self.name)[0]
         name = re.sub(rf"[\s_]+{re.escape(self.unit)}$", "", name) if self.unit else name
@@ -72,7 +72,7 @@ class SeenColumn:
 
 
 @dataclass
-class Sheet:
+class MeasuredFile:
     """A file, and what is known of it so far.
 
     Args:
@@ -88,12 +88,12 @@ class Sheet:
     """
 
     path: Path
-    columns: tuple[SeenColumn, ...]
+    columns: tuple[FileColumn, ...]
     kind: Kind[Any] | None
     why: str
     likely: Kind[Any] | None = None
     sources: dict[str, ColumnSource] = field(default_factory=dict)
-    taken: dict[str, str] = field(default_factory=dict)
+    assigned: dict[str, str] = field(default_factory=dict)
     settings: dict[str, object] = field(default_factory=dict)
     has_clock: bool = True
 
@@ -103,40 +103,42 @@ class Sheet:
         return self.path.name
 
     @property
-    def left(self) -> list[SeenColumn]:
-        """Columns that nothing is known of."""
-        return [each for each in self.columns if each.name not in self.taken.values()]
+    def unknown_columns(self) -> list[FileColumn]:
+        """Columns that are not assigned yet."""
+        return [each for each in self.columns if each.name not in self.assigned.values()]
 
-    def can_be(self, quantity: Quantity) -> list[SeenColumn]:
-        """The columns whose headings say that they are a quantity; an end of the cable may be said by that of the other."""
+    def columns_for(self, quantity: Quantity) -> list[FileColumn]:
+        """Return the columns whose headings name a quantity; the heading of one end may identify the other."""
         headings = [(each.name, each.below) for each in self.columns]
         wanted = FORCES if quantity in FORCES else (quantity,)
-        found = [(self.columns[each.position], each.unit or "") for each in candidates(headings, wanted)[quantity.name]]
-        return [column if column.unit else self.with_unit(column, unit) for column, unit in found]
+        matches = [
+            (self.columns[each.position], each.unit or "") for each in candidates(headings, wanted)[quantity.name]
+        ]
+        return [column if column.unit else self.set_unit(column, unit) for column, unit in matches]
 
-    def take(self, quantity: Quantity, column: SeenColumn) -> None:
-        """A column is a quantity; the description names it where its heading does not say all of that."""
-        self.taken[quantity.name] = column.name
-        said = [each.name for each in self.can_be(quantity)] == [column.name]
+    def assign(self, quantity: Quantity, column: FileColumn) -> None:
+        """Assign a column to a quantity; the description names it where its heading does not say all of it."""
+        self.assigned[quantity.name] = column.name
+        in_heading = [each.name for each in self.columns_for(quantity)] == [column.name]
         may_have_none = quantity.dimension == "text" or (quantity.dimension == "ratio" and not column.unit)
-        if not said or not (may_have_none or self._says_unit(quantity, column)):
+        if not in_heading or not (may_have_none or self._says_unit(quantity, column)):
             self.sources[quantity.name] = column.source
 
-    def _says_unit(self, quantity: Quantity, column: SeenColumn) -> bool:
+    def _says_unit(self, quantity: Quantity, column: FileColumn) -> bool:
         """Whether its unit stands where readers of tables find it."""
         wanted = FORCES if quantity in FORCES else (quantity,)
-        (place,) = candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
-        return place is not None and place.unit == column.unit and bool(column.unit)
+        (match,) = candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
+        return match is not None and match.unit == column.unit and bool(column.unit)
 
-    def with_unit(self, column: SeenColumn, unit: str) -> SeenColumn:
+    def set_unit(self, column: FileColumn, unit: str) -> FileColumn:
         """A column whose unit is known."""
         known = replace(column, unit=unit)
         self.columns = tuple(known if each.name == column.name else each for each in self.columns)
         return known
 
 
-def look(path: Path) -> Sheet:
-    """A file as it presents itself.
+def inspect_file(path: Path) -> MeasuredFile:
+    """Inspect a file: its kind and columns.
 
     Args:
         path: The file.
@@ -144,26 +146,33 @@ def look(path: Path) -> Sheet:
     Raises:
         DatasetError: It cannot be read.
     """
-    found = file_kind(path)
-    if not found.other and KINDS[found.kind].takes_channels:
-        return recording_sheet(path, found.why)
-    return _table_sheet(path, found)
+    detected = file_kind(path)
+    if not detected.other and KINDS[detected.kind].takes_channels:
+        return inspect_recording(path, detected.why)
+    return _inspect_table(path, detected)
 
 
-def recording_sheet(path: Path, why: str) -> Sheet:
-    """A recording as it presents itself.
+def inspect_recording(path: Path, why: str) -> MeasuredFile:
+    """Inspect a recording: its channels.
 
     Raises:
         DatasetError: It cannot be read.
     """
     file = read_channels(path)
-    signals = [each for each in file.channels if not is_clock(each)]
+    signals = [channel for channel in file.channels if not is_clock(channel)]
     columns = tuple(
-        SeenColumn(each.name, each.unit, each.unit or heading_of(each.name).unit, True, *_range(each.values), len(each.values))
-        for each in signals
+        FileColumn(
+            channel.name,
+            channel.unit,
+            channel.unit or heading_of(channel.name).unit,
+            True,
+            *_range(channel.values),
+            len(channel.values),
+        )
+        for channel in signals
     )
     kind = next(kind for kind in KINDS.values() if kind.takes_channels)
-    return Sheet(path, columns, kind, why, has_clock=any(each.time is not None for each in signals))
+    return MeasuredFile(path, columns, kind, why, has_clock=any(channel.time is not None for channel in signals))
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
@@ -171,29 +180,29 @@ def _range(values: np.ndarray) -> tuple[float, float]:
     return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
 
 
-def _table_sheet(path: Path, found: FileKind) -> Sheet:
+def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
     table = read_table(path)
-    of_numbers = {each.name: each for each in columns_of(table)}
+    number_columns = {each.name: each for each in columns_of(table)}
     columns = []
     for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
         if not heading or (names_time(heading) and not spelled(heading, below)):
             continue
         cells = [row[i] for row in table.rows]
-        numbers, other = of_numbers.get(heading), spelled(heading, below)
+        numbers, other = number_columns.get(heading), spelled(heading, below)
         unit = (other.unit if other else "") or heading_of(heading, below).unit
         spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
         different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
         unit = unit if unit and is_unit(unit) else ""
-        columns.append(SeenColumn(heading, below, unit, numbers is not None, *spread, different, blanks))
-    sheet = Sheet(path, tuple(columns), None, found.why)
-    fits = _kinds_that_fit(sheet)
-    said = [kind for kind in fits if kind.name == found.kind] or fits
-    sheet.kind = said[0] if len(said) == 1 and not found.other else None
-    sheet.likely = said[0] if said else _likely(sheet)
+        columns.append(FileColumn(heading, below, unit, numbers is not None, *spread, different, blanks))
+    sheet = MeasuredFile(path, tuple(columns), None, detected.why)
+    fitting = _fitting_kinds(sheet)
+    matching = [kind for kind in fitting if kind.name == detected.kind] or fitting
+    sheet.kind = matching[0] if len(matching) == 1 and not detected.other else None
+    sheet.likely = matching[0] if matching else _likely_kind(sheet)
     return sheet
 
 
-def _kinds_that_fit(sheet: Sheet) -> list[Kind[Any]]:
+def _fitting_kinds(sheet: MeasuredFile) -> list[Kind[Any]]:
     """The kinds whose columns a table has by its headings; of these those with most columns."""
     fits: dict[int, list[Kind[Any]]] = {}
     for kind in KINDS.values():
@@ -201,7 +210,12 @@ def _kinds_that_fit(sheet: Sheet) -> list[Kind[Any]]:
         if questions is None or not questions.is_guessed:
             continue
         if questions.by_length:
-            if _has(sheet, "angle") and _has(sheet, "length") and not _has(sheet, "force") and not _has(sheet, "ratio"):
+            if (
+                _columns_of_dimension(sheet, "angle")
+                and _columns_of_dimension(sheet, "length")
+                and not _columns_of_dimension(sheet, "force")
+                and not _columns_of_dimension(sheet, "ratio")
+            ):
                 fits.setdefault(1, []).append(kind)
             continue
         if _has_columns(sheet, questions.required):
@@ -209,17 +223,17 @@ def _kinds_that_fit(sheet: Sheet) -> list[Kind[Any]]:
     return fits[max(fits)] if fits else []
 
 
-def _has_columns(sheet: Sheet, wanted: Sequence[WantedColumn]) -> bool:
+def _has_columns(sheet: MeasuredFile, wanted: Sequence[WantedColumn]) -> bool:
     """Whether headings say all that is wanted."""
     ways = [(each.quantity, *each.also) for each in wanted]
-    return bool(wanted) and all(any(len(sheet.can_be(one)) == 1 for one in way) for way in ways)
+    return bool(wanted) and all(any(len(sheet.columns_for(one)) == 1 for one in way) for way in ways)
 
 
-def _has(sheet: Sheet, dimension: str) -> list[SeenColumn]:
+def _columns_of_dimension(sheet: MeasuredFile, dimension: str) -> list[FileColumn]:
     return [each for each in sheet.columns if each.dimension == dimension]
 
 
-def _likely(sheet: Sheet) -> Kind[Any] | None:
+def _likely_kind(sheet: MeasuredFile) -> Kind[Any] | None:
     """The kind whose required columns there may be, by their units alone, the most of them."""
     dimensions = [each.dimension for each in sheet.columns]
     best: Mapping[int, Kind[Any]] = {}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.questions.check.words import with_unit
+from bowdenfit.questions.check.words import value_with_unit
 from bowdenfit.questions.summary.answer import answer, checked_readings, quantities, readings_off
 from bowdenfit.questions.summary.trust_words import assumed, next_step, reasons, trust, warning
 from bowdenfit.questions.summary.verdict import verdict
@@ -112,7 +112,7 @@ def reading_row(reading: CheckedReading) -> tuple[str, str, str, str]:
     """A reading beside what all the others say of it, under `READING_HEADS`."""
     name = reading_called(reading.table, reading.label)
     measured, expected, low, high = (
-        with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
+        value_with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
     )
     bound = "at most " if reading.is_bound else ""
     interval = f"{low.rsplit(' ', 1)[0]} to {high}"

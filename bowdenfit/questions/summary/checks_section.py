@@ -2,7 +2,7 @@
 
 from bowdenfit.pages.section import Section, Table, prose
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.summary.answer import checked_readings, readings_off
 from bowdenfit.questions.summary.brief_words import READING_HEADS, none_is_off, reading_row
 from bowdenfit.results.record import Record
@@ -21,6 +21,6 @@ def section(fit: Record) -> Section | None:
     whole = "All readings" if len(every) <= _MOST else f"The first {_MOST} of {len(every)} readings"
     folded: list[tuple[str, str | Table]] = [
         (f"{whole} beside what all the others say of each", rest),
-        ("What the checks say, with their numbers", checks_text(checks_of(fit))),
+        ("What the checks say, with their numbers", describe_checks(checks_of(fit))),
     ]
     return prose("Checks", [none_is_off(every) if not off else ""], [far], folded=folded)

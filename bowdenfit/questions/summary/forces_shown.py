@@ -137,7 +137,7 @@ def _of_draws(
     from bowdenfit.kinds.forces.mountings import group_numbers
     from bowdenfit.kinds.row_angles import resolve_angles, row_angles
     from bowdenfit.kinds.tables import AngleTable
-    from bowdenfit.questions.bends.curves import of_draws
+    from bowdenfit.questions.bends.curves import evaluate_curves
 
     cable, friction = fit.model.cable, fit.model.cable.friction
     arrays = row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
@@ -147,7 +147,9 @@ def _of_draws(
     def output(values: Mapping[str, Any], which: np.ndarray, force: Any, stroke: Any) -> tuple[Any, Any]:
         data = {name: jnp.asarray(array[which]) for name, array in arrays.items()}
         angles, _ = resolve_angles(cable, values, data)
-        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(values, jnp.asarray(velocity[which]))
+        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(
+            values, jnp.asarray(velocity[which])
+        )
         cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
         read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
         return cells.shown_output(read, least), jnp.sum(angles, axis=-1)
@@ -161,7 +163,7 @@ def _of_draws(
         apparent = strokes * jnp.log(grid / law) / jnp.maximum(angle, _LEAST_ANGLE)[:, None, None]
         return {"law": law, "apparent": apparent, "rows": at_rows, "bend": bend}
 
-    return of_draws(fit, curves)
+    return evaluate_curves(fit, curves)
 
 
 def _here(
@@ -169,7 +171,7 @@ def _here(
     number: int, shown: bool,
 ) -> ForcesHere:  # fmt: skip
     """Readings at one place, and the law there."""
-    from bowdenfit.questions.bends.curves import quantiles
+    from bowdenfit.questions.bends.curves import quantiles_of_draws
 
     force_in, force_out = table.input_force[rows[mine]], table.output_force[rows[mine]]
     stroke = table.stroke[rows[mine]]
@@ -180,7 +182,7 @@ def _here(
     apparent = stroke * np.log(force_in / force_out) / bent
     weight = np.where(np.isfinite(apparent), 1 / (force_in**-2 + force_out**-2), 0.0)
     capstan = float(weight @ np.nan_to_num(apparent) / weight.sum()) if weight.sum() else float("nan")
-    law, apparent_law = (quantiles(found[name][:, number]) for name in ("law", "apparent"))
+    law, apparent_law = (quantiles_of_draws(found[name][:, number]) for name in ("law", "apparent"))
     lines = load, law, apparent_law, capstan, shown
     return ForcesHere(label, force_in, force_out, stroke, off, apparent, *lines, np.rad2deg(bend))
 

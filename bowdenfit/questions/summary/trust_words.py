@@ -2,9 +2,9 @@
 
 from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.sensitivity_words import assumed_widths
+from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.questions.check.words import scattering
+from bowdenfit.questions.check.words import describe_misfits
 from bowdenfit.questions.identify.confounding import confounded_pairs
 from bowdenfit.questions.identify.judgment import identifiability
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
@@ -53,7 +53,11 @@ _NO_MINIMUM = (
 
 def verdict_text(found: Verdict) -> str:
     """Whether a fit may be trusted, and if not, why."""
-    said = [warning(found), *reasons(found)] if found.troubles else [_settled(found) if found.sampled else _ALONE.format("")]
+    said = (
+        [warning(found), *reasons(found)]
+        if found.troubles
+        else [_settled(found) if found.sampled else _ALONE.format("")]
+    )
     return "\n".join(filled(sentence) for sentence in said)
 
 
@@ -76,7 +80,9 @@ def trust(fit: Record) -> list[str]:
     if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
         return [_ALONE.format(best)]
-    return [_settled(verdict(fit))] + [sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence]
+    return [_settled(verdict(fit))] + [
+        sentence for sentence in (_resting(fit), _alike(fit), _prior_against(fit)) if sentence
+    ]
 
 
 def _settled(found: Verdict) -> str:
@@ -91,9 +97,9 @@ def next_step(fit: Record) -> str:
         return ""
     if off:
         return f"Next: look at how {_named(off[0])} was measured and written down: it is far off (see below)."
-    if scattering(found):
+    if describe_misfits(found):
         return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
-    leant_on = few(map(_named, found.decisive), most=2)  # how far on each differs from one seed to the next
+    leant_on = few(map(_named, found.influential), most=2)  # how far on each differs from one seed to the next
     again = f"; in doubt, measure again what the fit leans on: {leant_on}" if leant_on else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
         return f"Next: nothing needs to be measured{again}. bowdenfit next says what would narrow it."
@@ -109,7 +115,7 @@ def _named(reading: CheckedReading) -> str:
 def assumed(fit: Record) -> str:
     """That few readings leave it to a prior how wide intervals are; empty where they do not."""
     found = checks_of(fit)
-    return assumed_widths(found) if found else ""
+    return describe_assumed_widths(found) if found else ""
 
 
 def _resting(fit: Record) -> str:

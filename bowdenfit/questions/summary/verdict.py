@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from bowdenfit.display import Display, Rows
 from bowdenfit.kinds import reading_called
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.copied import copied_readings
-from bowdenfit.questions.check.impossible import implausible_friction, impossible_efficiencies
-from bowdenfit.questions.check.lack_of_fit import say_what_is_not_described
-from bowdenfit.questions.check.too_coarse import too_coarse
-from bowdenfit.questions.check.words import scattering
+from bowdenfit.questions.check.copied import describe_copied_readings
+from bowdenfit.questions.check.impossible import describe_implausible_friction, describe_impossible_efficiencies
+from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
+from bowdenfit.questions.check.too_coarse import describe_coarse_readings
+from bowdenfit.questions.check.words import describe_misfits
 from bowdenfit.questions.identify.contradiction import contradiction
 from bowdenfit.questions.identify.judgment import say_what_is_not_determined
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
@@ -57,10 +57,10 @@ def verdict(fit: Record) -> Verdict:
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
         CONTRADICTORY: _sentences(contradiction(fit)),
-        IMPOSSIBLE: _sentences(impossible_efficiencies(fit)) + _sentences(implausible_friction(fit)),
-        COPIED: copied_readings(fit.dataset),
-        COARSE: too_coarse(fit),
-        NOT_DESCRIBED: say_what_is_not_described(fit),
+        IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
+        COPIED: describe_copied_readings(fit.dataset),
+        COARSE: describe_coarse_readings(fit),
+        NOT_DESCRIBED: describe_lack_of_fit(fit),
     }
     said = {kind: sentences for kind, sentences in troubles.items() if sentences}
     return Verdict(said, fit.sampled is not None, _doubts(fit))
@@ -73,7 +73,7 @@ def _doubts(fit: Record) -> tuple[str, ...]:
         return ()
     off = [reading_called(each.table, each.label) for each in found.outliers]
     far = [f"{few(off)} {'lies' if len(off) == 1 else 'lie'} far from what the others say"] if off else []
-    return (*far, *scattering(found))
+    return (*far, *describe_misfits(found))
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:

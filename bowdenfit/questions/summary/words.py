@@ -7,9 +7,9 @@ from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.kinds import each_table, readings_called
 from bowdenfit.kinds.recordings.kind import recordings_text
 from bowdenfit.kinds.terms import term_kind
-from bowdenfit.questions.bends.words import elastic_text
+from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.words import checks_text
+from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.groups.words import groups_text
 from bowdenfit.questions.identify.answer import say_what_is_determined
 from bowdenfit.questions.identify.confounding import confounded_pairs
@@ -57,9 +57,9 @@ def full_text(fit: Record) -> str:
         _mountings(fit, page),
         _recordings(fit),
         _measured(fit, page),
-        checks_text(checks_of(fit)),
+        describe_checks(checks_of(fit)),
         _friction_model(fit),
-        elastic_text(fit),
+        describe_elastic(fit),
         loss_text(fit),
         _answer(fit),
     ]
@@ -213,7 +213,7 @@ def _friction_model(fit: Record) -> str:
             "that stands beside them."
         )
         lost = lost_force(fit)
-        lines += [lost.explained()] if lost is not None else []
+        lines += [lost.explanation()] if lost is not None else []
     if friction.depends_on_stroke:
         lines.append(
             "Coefficients are the mean of pulling and returning; efficiencies and the best length are those of pulling."
@@ -247,10 +247,10 @@ def _measured(fit: Record, page: dict[str, Any]) -> str:
             [
                 what + row["label"],
                 *([f"{significant(row['input_force_N'])} N"] if of_load else []),
-                percent(row['measured'], 2),
-                percent(row['predicted'], 2),
+                percent(row["measured"], 2),
+                percent(row["predicted"], 2),
                 *interval,
-                percent(row['relative_error'], 2, "+"),
+                percent(row["relative_error"], 2, "+"),
             ]
         )
     return "Efficiency, measured and predicted\n" + table(heads, rows)

@@ -39,12 +39,12 @@ def teleoperate(
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
         StoreError: `output` cannot be written.
     """
-    from bowdenfit.questions.bends.ring_down import device_for
+    from bowdenfit.questions.bends.ring_down import device_with_ring_down
     from bowdenfit.questions.teleoperate import teleoperation_figure
     from bowdenfit.questions.teleoperate.stability import assess_teleoperation
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
-    answer = assess_teleoperation(fit, device_for(fit, Path(device)), wrap_angle, PROBABILITY)
+    answer = assess_teleoperation(fit, device_with_ring_down(fit, Path(device)), wrap_angle, PROBABILITY)
     if output is not None:
         write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, fit.name)
     return answer

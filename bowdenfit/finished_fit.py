@@ -12,16 +12,14 @@ from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.words import checks_page
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.groups.answer import Groups, contrast_groups
-from bowdenfit.questions.identify.answer import Identifiability
-from bowdenfit.questions.identify.judgment import identifiability
-from bowdenfit.questions.identify.words import identifiability_text
-from bowdenfit.questions.kept import answers_of
-from bowdenfit.questions.predict.words import predictions_text
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
+from bowdenfit.questions.identify.judgment import assess_identifiability
+from bowdenfit.questions.predict.predictions import predictions_text
+from bowdenfit.questions.stored_answers import collect_answers
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import posterior_intervals
 from bowdenfit.questions.summary.page import Summary, summarize
-from bowdenfit.questions.summary.parameter_words import drawn_intervals
-from bowdenfit.questions.summary.trust_words import verdict_text
-from bowdenfit.questions.summary.verdict import Verdict, verdict
+from bowdenfit.questions.summary.verdict import Verdict, assess_fit, verdict_text
 from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
@@ -51,7 +49,7 @@ class Fit(Record):
         Raises:
             StoreError: The folder holds a finished fit already, or cannot be written.
         """
-        save(self, self.summary(), Path(path), force, answers=answers_of(self))
+        save(self, self.summary(), Path(path), force, answers=collect_answers(self))
 
     @cached_property
     def plot(self) -> FigureMethods:
@@ -79,16 +77,16 @@ class Fit(Record):
 
     def verdict(self) -> Verdict:
         """Return whether the answers may be trusted, and if not, why."""
-        return verdict(self)
+        return assess_fit(self)
 
     @property
     def known(self) -> Identifiability:
         """What the draws determine, and what rests on the priors."""
-        return identifiability(self)
+        return assess_identifiability(self)
 
     def _table(self) -> Rows:
         """Return a row for each parameter: posterior beside least squares."""
-        posterior, squares = drawn_intervals(self), self.least_squares.estimates
+        posterior, squares = posterior_intervals(self), self.least_squares.estimates
         rows = [
             {"parameter": p.name}
             | (vars(posterior[p.name]) if p.name in posterior else {})

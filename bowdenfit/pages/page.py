@@ -8,13 +8,14 @@ import struct
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from bowdenfit.pages.section import Page, Picture
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup
+
+from bowdenfit.pages.section import HtmlPage, Picture
 from bowdenfit.words import printable, unbroken
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 MOST_BYTES = 1_450_000  # of a page, so that it can be mailed
 TOO_LARGE = "<p>This figure would make the page too large; it lies in the folder of figures.</p>"
@@ -24,7 +25,7 @@ _COLUMN = 576  # px of a page, 6 in: wider figures take both columns of a printe
 _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
 
 
-def render(page: Page, drawings: Mapping[str, bytes]) -> str:
+def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
     """A page as HTML.
 
     Args:
@@ -35,75 +36,69 @@ def render(page: Page, drawings: Mapping[str, bytes]) -> str:
     Raises:
         ValueError: A drawing is no PNG.
     """
-    drawn = Page(page.title, page.subtitle, tuple(s.with_pictures(drawings) for s in page.sections))
-    pieces = _assembled(drawn).split(_MARK)
+    with_drawings = HtmlPage(page.title, page.subtitle, tuple(s.with_pictures(drawings) for s in page.sections))
+    pieces = _assemble(with_drawings).split(_MARK)
     room = MOST_BYTES - sum(len(piece.encode()) for piece in pieces)
-    for i, picture in enumerate(drawn.pictures):
-        image = _image(drawings[picture.name], picture.title)
+    for i, picture in enumerate(with_drawings.pictures):
+        image = _image_tag(drawings[picture.name], picture.title)
         room -= len(image)
         pieces[2 * i + 1] = image if room > 0 else TOO_LARGE
     return "".join(pieces)
 
 
-def _image(png: bytes, words: str) -> str:
+def _image_tag(png: bytes, title: str) -> str:
     """Return a PNG as an element that holds it, in the size in which it was drawn."""
     if not png.startswith(_PNG):
         raise ValueError("a figure is damaged: its file is no PNG")
     width, height = (round(pixels * _CSS_PIXELS) for pixels in struct.unpack_from(">2I", png, len(_PNG) + 8))
     kind = "wide" if width > _COLUMN else "narrow"
-    data, alt = base64.b64encode(png).decode(), escape(printable(words))
+    data, alt = base64.b64encode(png).decode(), escape(printable(title))
     return f'<img class="{kind}" width="{width}" height="{height}" alt="{alt}" src="data:image/png;base64,{data}">'
 
 
-def _assembled(page: Page) -> str:
+def _assemble(page: HtmlPage) -> str:
     """The page with marks about the places of its drawings, one after the other."""
-    from markupsafe import Markup
-
-    environment = _environment()
-    scripts = _scripts() if any(picture.charts for picture in page.pictures) else ()
+    environment = _make_environment()
+    scripts = _load_scripts() if any(picture.charts for picture in page.pictures) else ()
     styles = [_HERE / "page.css", *([_HERE / "uplot" / "uPlot.min.css"] if scripts else [])]
     frame = environment.get_template("page.html")
     return frame.render(
         page=page,
-        bodies=[Markup(environment.from_string(_text(s.template)).render(s.context)) for s in page.sections],  # noqa: S704
-        style=Markup("\n".join(map(_text, styles))),  # noqa: S704  (ours)
+        bodies=[Markup(environment.from_string(_read_text(s.template)).render(s.context)) for s in page.sections],  # noqa: S704
+        style=Markup("\n".join(map(_read_text, styles))),  # noqa: S704  (ours)
         scripts=[Markup(script) for script in scripts],  # noqa: S704  (ours)
         allowed=" ".join(f"'sha256-{_digest(script)}'" for script in scripts) or "'none'",
     )
 
 
-def _environment() -> Environment:
+def _make_environment() -> Environment:
     """Templates in which everything is escaped, and nothing steers."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    from jinja2.utils import htmlsafe_json_dumps
-    from markupsafe import Markup
-
-    found = Environment(
-        autoescape=True, undefined=StrictUndefined, finalize=_inert, loader=FileSystemLoader(_HERE), trim_blocks=True,
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, finalize=_make_safe, loader=FileSystemLoader(_HERE), trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
 
     def charts(picture: Picture) -> Markup:
-        return htmlsafe_json_dumps([chart.plain() for chart in picture.charts], separators=(",", ":"))
+        return htmlsafe_json_dumps([chart.to_json() for chart in picture.charts], separators=(",", ":"))
 
-    found.globals |= {"charts": charts, "place": Markup(f"{_MARK}{_MARK}")}  # noqa: S704  (ours)
-    return found
+    environment.globals |= {"charts": charts, "place": Markup(f"{_MARK}{_MARK}")}  # noqa: S704  (ours)
+    return environment
 
 
-def _inert(value: Any) -> Any:
+def _make_safe(value: Any) -> Any:
     """Text without what turns its direction or cannot be seen, numbers beside their units; markup is left as it is."""
     return unbroken(printable(value)) if type(value) is str else value
 
 
-def _scripts() -> tuple[str, str]:
+def _load_scripts() -> tuple[str, str]:
     """UPlot with its license, and what draws charts with it."""
-    library, terms = _text(_HERE / "uplot" / "uPlot.iife.min.js"), _text(_HERE / "uplot" / "LICENSE")
-    return f"/*\n{terms}\n*/\n{library}", _text(_HERE / "charts.js")
+    library, terms = _read_text(_HERE / "uplot" / "uPlot.iife.min.js"), _read_text(_HERE / "uplot" / "LICENSE")
+    return f"/*\n{terms}\n*/\n{library}", _read_text(_HERE / "charts.js")
 
 
 def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     return path.read_text(encoding="utf-8")

@@ -3,11 +3,97 @@
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
-from bowdenfit.pages.chart import Chart
+import numpy as np
 
+from bowdenfit.words import printable
+
+Look: TypeAlias = Literal["line", "dashed", "low", "high", "points", "hollow"]
+_DIGITS, _X_DIGITS = 5, 8  # significant ones of a number; no screen tells more, but places may start far from zero
 PICTURES = "pictures"  # in the context of a section that has some
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values that belong together.
+
+    Args:
+        label: In the key; the edges of a band have the same.
+        look: "low" and "high", one after the other, are the edges of a band.
+        color: One of the page's colors, such as "blue".
+        values: At the places of their group; not finite where there are none.
+    """
+
+    label: str
+    look: Look
+    color: str
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class SeriesGroup:
+    """Series at the same places.
+
+    Args:
+        x: The places, ascending.
+        series: The series.
+    """
+
+    x: np.ndarray
+    series: tuple[Series, ...]
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of the axis across which something holds.
+
+    Args:
+        label: In the key.
+        color: One of the page's colors.
+        start: From where.
+        stop: To where.
+    """
+
+    label: str
+    color: str
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One chart.
+
+    Args:
+        name: By which it is chosen among others.
+        x_label: With unit.
+        y_label: With unit.
+        groups: What is drawn.
+        spans: What is shaded behind.
+    """
+
+    name: str
+    x_label: str
+    y_label: str
+    groups: tuple[SeriesGroup, ...]
+    spans: tuple[Span, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """For the page's script."""
+        return {
+            "name": printable(self.name),
+            "x": printable(self.x_label),
+            "y": printable(self.y_label),
+            "groups": [
+                {
+                    "x": _round_numbers(group.x, _X_DIGITS),
+                    "series": [vars(series) | {"values": _round_numbers(series.values)} for series in group.series],
+                }
+                for group in self.groups
+            ],
+            "spans": [vars(span) for span in self.spans],
+        }
 
 
 @dataclass(frozen=True)
@@ -30,7 +116,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of a page.
 
     Args:
@@ -51,19 +137,19 @@ class Section:
     @property
     def pictures(self) -> tuple[Picture, ...]:
         """Its figures."""
-        found: tuple[Picture, ...] = self.context.get(PICTURES, ())
-        return found
+        pictures: tuple[Picture, ...] = self.context.get(PICTURES, ())
+        return pictures
 
-    def with_pictures(self, names: Collection[str]) -> "Section":
+    def with_pictures(self, names: Collection[str]) -> "PageSection":
         """The same with those figures alone that are among some."""
         if PICTURES not in self.context:
             return self
-        found = tuple(picture for picture in self.pictures if picture.name in names)
-        return replace(self, context={**self.context, PICTURES: found})
+        kept = tuple(picture for picture in self.pictures if picture.name in names)
+        return replace(self, context={**self.context, PICTURES: kept})
 
 
 @dataclass(frozen=True)
-class Page:
+class HtmlPage:
     """A whole page.
 
     Args:
@@ -74,7 +160,7 @@ class Page:
 
     title: str
     subtitle: str
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
 
     @property
     def pictures(self) -> tuple[Picture, ...]:
@@ -83,7 +169,7 @@ class Page:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """Rows under heads.
 
     Args:
@@ -99,21 +185,21 @@ class Table:
     left: tuple[int, ...] = (0,)
 
 
-def meanings_table(meanings: Mapping[str, str]) -> Table:
+def make_meanings_table(meanings: Mapping[str, str]) -> PageTable:
     """What names stand for, of those that need it."""
     named = tuple((name, meaning) for name, meaning in meanings.items() if meaning and meaning != name)
-    return Table(("name", "what it is"), named, left=(0, 1))
+    return PageTable(("name", "what it is"), named, left=(0, 1))
 
 
-def prose(
+def prose_section(
     title: str,
     sentences: Iterable[str],
-    tables: Iterable[Table] = (),
+    tables: Iterable[PageTable] = (),
     items: Iterable[str] = (),
-    folded: Iterable[tuple[str, str | Table]] = (),
+    folded: Iterable[tuple[str, str | PageTable]] = (),
     pictures: tuple[Picture, ...] = (),
     headline: str = "",
-) -> Section:
+) -> PageSection:
     """A section without a template of its own.
 
     Args:
@@ -130,7 +216,13 @@ def prose(
         "sentences": tuple(filter(None, sentences)),
         "tables": tuple(table for table in tables if table.rows),
         "items": tuple(items),
-        "folded": tuple((what, text) for what, text in folded if (text.rows if isinstance(text, Table) else text)),
+        "folded": tuple((what, text) for what, text in folded if (text.rows if isinstance(text, PageTable) else text)),
         PICTURES: pictures,
     }
-    return Section(title, Path(__file__).with_name("prose.html"), context)
+    return PageSection(title, Path(__file__).with_name("prose.html"), context)
+
+
+def _round_numbers(values: np.ndarray, digits: int = _DIGITS) -> list[float | None]:
+    return [
+        float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in np.asarray(values, float).tolist()
+    ]

@@ -18,33 +18,33 @@ class AnswerFigure(Protocol):
 
     HEADING: str
 
-    def draw(self, found: Any, /) -> "Figure":
+    def draw(self, answer: Any, /) -> "Figure":
         """The figure."""
 
-    def caption(self, found: Any, /) -> str:
+    def caption(self, answer: Any, /) -> str:
         """What is drawn, in plain words."""
 
 
-def titled(heading: str, cable: str) -> str:
+def add_cable_name(heading: str, cable: str) -> str:
     """A heading with the name of the cable, where it is known."""
     return f"{heading} \N{EN DASH} {cable}" if cable else heading
 
 
 @in_paper_style
-def answer_figure(figure: AnswerFigure, found: Any, cable: str) -> "Figure":
+def draw_answer_figure(figure: AnswerFigure, answer: Any, cable: str) -> "Figure":
     """The figure of an answer under its title.
 
     Args:
         figure: Its file.
-        found: The answer.
+        answer: The answer.
         cable: Name of the cable; empty where there are several.
     """
-    drawn = figure.draw(found)
-    title_above(drawn, titled(figure.HEADING, cable))
-    return drawn
+    drawing = figure.draw(answer)
+    title_above(drawing, add_cable_name(figure.HEADING, cable))
+    return drawing
 
 
-def write_figure(figure: AnswerFigure, found: Any, folder: Path, name: str, cable: str) -> list[Path]:
+def write_figure(figure: AnswerFigure, answer: Any, folder: Path, name: str, cable: str) -> list[Path]:
     """Write the figure of an answer in every format, and its caption beside it.
 
     Args:
@@ -53,6 +53,6 @@ def write_figure(figure: AnswerFigure, found: Any, folder: Path, name: str, cabl
         name: Of the files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = write_all(answer_figure(figure, found, cable), folder, name)
-    write_captions({name: f"{titled(figure.HEADING, cable)}. {figure.caption(found)}"}, folder)
-    return written
+    paths = write_all(draw_answer_figure(figure, answer, cable), folder, name)
+    write_captions({name: f"{add_cable_name(figure.HEADING, cable)}. {figure.caption(answer)}"}, folder)
+    return paths

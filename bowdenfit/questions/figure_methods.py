@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import UsageError, suggest_name
-from bowdenfit.questions.figures import FIGURES, figure_of, figures_of, mark_of, page_width
-from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_with_title, parse_page_width, warning_mark
+from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import Record
 from bowdenfit.words import listed
 
@@ -44,10 +44,10 @@ class FigureMethods:
         """
         if name not in FIGURES:
             raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
-        if self._shown(name) is None:
+        if self._data_of(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
-        mark = mark_of(verdict(self._fit).troubles)
-        return figure_of(name, self._shown(name), self._fit.name, page_width(width), mark)
+        mark = warning_mark(assess_fit(self._fit).troubles)
+        return draw_with_title(name, self._data_of(name), self._fit.name, parse_page_width(width), mark)
 
     def __getattr__(self, name: str) -> "Callable[..., Figure]":
         if name.startswith("_"):
@@ -57,12 +57,12 @@ class FigureMethods:
         return partial(self, name)
 
     def __dir__(self) -> list[str]:
-        return [name for name in FIGURES if self._shown(name) is not None]
+        return [name for name in FIGURES if self._data_of(name) is not None]
 
     def __repr__(self) -> str:
         return f"Figures of {self._fit.name}: {', '.join(f'plot.{name}()' for name in dir(self))}"
 
-    def _shown(self, name: str) -> Any:
+    def _data_of(self, name: str) -> Any:
         if name not in self._data:
-            self._data[name] = dict(figures_of(self._fit, [name])).get(name)
+            self._data[name] = dict(collect_figure_data(self._fit, [name])).get(name)
         return self._data[name]

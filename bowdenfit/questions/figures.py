@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from bowdenfit.arguments import NumberWithUnit
+from bowdenfit.errors import UsageError
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
@@ -23,7 +24,7 @@ from bowdenfit.questions.bends import (
     stretch_figure,
 )
 from bowdenfit.questions.check import checks_figure
-from bowdenfit.questions.figure_files import titled
+from bowdenfit.questions.figure_files import add_cable_name
 from bowdenfit.questions.length import efficiency_figure, wrap_angles_figure
 from bowdenfit.questions.recorded import (
     autocorrelation_figure,
@@ -75,7 +76,7 @@ AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that d
 NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
 
 
-def figures_of(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
+def collect_figure_data(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
     """Name and data of each figure that a fit has something to show in, or of some of them."""
     import jax
 
@@ -86,7 +87,7 @@ def figures_of(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str
             yield name, data
 
 
-def kept_figures(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
+def read_figure_data(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
     """Data of the figures that a fit was drawn with, or of some of them; empty where they are not kept.
 
     Args:
@@ -96,18 +97,18 @@ def kept_figures(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
     if not read_answers(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
         return {}
     try:
-        return read_arrays(folder / FIGURE_DATA, data_types(names or FIGURES))
+        return read_arrays(folder / FIGURE_DATA, figure_data_types(names or FIGURES))
     except (KeyError, TypeError, ValueError):  # kept when the figure showed something else
         return {}
 
 
-def data_types(names: Iterable[str]) -> dict[str, Any]:
+def figure_data_types(names: Iterable[str]) -> dict[str, Any]:
     """Annotated type of the data of some figures, by their names."""
     return {name: get_type_hints(FIGURES[name].data, localns={"Record": object})["return"] for name in names}
 
 
 @in_paper_style
-def figure_of(name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "") -> "Figure":
+def draw_with_title(name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "") -> "Figure":
     """A figure under its title; loads matplotlib, and no model.
 
     Args:
@@ -118,21 +119,21 @@ def figure_of(name: str, data: Any, cable: str = "", width: float | None = None,
         mark: See `mark_of`.
     """
     figure: Figure = FIGURES[name].draw(data, width)
-    title_above(figure, title_of(name, cable), mark)
+    title_above(figure, figure_title(name, cable), mark)
     return figure
 
 
-def mark_of(troubles: Iterable[str]) -> str:
+def warning_mark(troubles: Iterable[str]) -> str:
     """What stands on every figure of a fit that is not to be trusted; empty of one that is.
 
     Args:
         troubles: Kinds of what is wrong, see `verdict`.
     """
-    wrong = tuple(troubles)
-    return f"Do not use: this fit is {listed(wrong)}." if wrong else ""
+    kinds = tuple(troubles)
+    return f"Do not use: this fit is {listed(kinds)}." if kinds else ""
 
 
-def page_width(width: NumberWithUnit | None) -> float | None:
+def parse_page_width(width: NumberWithUnit | None) -> float | None:
     """Width of the page [in]; None for what suits each figure.
 
     Args:
@@ -144,8 +145,7 @@ def page_width(width: NumberWithUnit | None) -> float | None:
     if width is None:
         return None
 
-    from bowdenfit.errors import UsageError
-    from bowdenfit.units import conversion_factor
+    from bowdenfit.units import conversion_factor  # which loads pint
 
     value, unit = width
     inches = round(value * conversion_factor(unit, "length") / conversion_factor("in", "length"), 9)
@@ -157,18 +157,18 @@ def page_width(width: NumberWithUnit | None) -> float | None:
     return float(inches)
 
 
-def title_of(name: str, cable: str) -> str:
+def figure_title(name: str, cable: str) -> str:
     """Heading of a figure with the name of the cable."""
-    return titled(FIGURES[name].HEADING, cable)
+    return add_cable_name(FIGURES[name].HEADING, cable)
 
 
-def caption_of(name: str, data: Any) -> str:
+def figure_caption(name: str, data: Any) -> str:
     """What a figure shows, in plain words: what is drawn, what the bands are, of how many."""
-    said: str = FIGURES[name].caption(data)
-    return said
+    text: str = FIGURES[name].caption(data)
+    return text
 
 
-def draw_figure(
+def write_figure_files(
     name: str,
     data: Any,
     folder: Path,
@@ -187,10 +187,10 @@ def draw_figure(
         cable, width, mark: See `figure_of`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return write_all(figure_of(name, data, cable, width, mark), folder, name, formats)
+    return write_all(draw_with_title(name, data, cable, width, mark), folder, name, formats)
 
 
-def captions_of(shown: Mapping[str, Any], cable: str, mark: str) -> dict[str, str]:
+def titles_and_captions(data: Mapping[str, Any], cable: str, mark: str) -> dict[str, str]:
     """Title and caption of each figure, by name.
 
     Args:
@@ -198,5 +198,5 @@ def captions_of(shown: Mapping[str, Any], cable: str, mark: str) -> dict[str, st
         cable: Name of the cable.
         mark: See `mark_of`.
     """
-    of = {name: f"{title_of(name, cable)}. {mark}".rstrip() for name in FIGURES if name in shown}
-    return {name: f"{title} {caption_of(name, shown[name])}" for name, title in of.items()}
+    titles = {name: f"{figure_title(name, cable)}. {mark}".rstrip() for name in FIGURES if name in data}
+    return {name: f"{title} {figure_caption(name, data[name])}" for name, title in titles.items()}

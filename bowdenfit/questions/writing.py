@@ -6,9 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bowdenfit.display import Display, Rows
+from bowdenfit.errors import StoreError
+from bowdenfit.plots.write import FORMATS
+from bowdenfit.results.figures_folder import copy_captions
+from bowdenfit.results.folder import fill_folder_atomically, is_empty, write_text
 
 if TYPE_CHECKING:
-    from bowdenfit.pages.section import Page
+    from bowdenfit.pages.section import HtmlPage
     from bowdenfit.questions.figure_files import AnswerFigure
 
 PAGE, TEXT = "json", "txt"
@@ -24,25 +28,23 @@ class Files(Display, list[Path]):
         return [{"file": str(path)} for path in self], {}
 
 
-def files_of(folder: str | Path, name: str) -> list[Path]:
+def answer_files(folder: str | Path, name: str) -> list[Path]:
     """The files of an answer.
 
     Args:
         folder: Where they are.
         name: Of the answer.
     """
-    return [*(Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT)), *figures_of(folder, name)]
+    return [*(Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT)), *answer_figures(folder, name)]
 
 
-def figures_of(folder: str | Path, name: str) -> list[Path]:
+def answer_figures(folder: str | Path, name: str) -> list[Path]:
     """The figure of an answer in every format.
 
     Args:
         folder: Where they are.
         name: Of the answer.
     """
-    from bowdenfit.plots.write import FORMATS
-
     return [Path(folder) / f"{name}.{ending}" for ending in FORMATS]
 
 
@@ -58,9 +60,6 @@ def refuse_to_replace(folder: Path, name: str, what: str, force: bool) -> None:
     Raises:
         StoreError: The folder holds something else already, or an earlier answer.
     """
-    from bowdenfit.errors import StoreError
-    from bowdenfit.results.folder import is_empty
-
     if not folder.exists() or (folder.is_dir() and is_empty(folder)):
         return
     if not (folder / f"{name}.{PAGE}").exists():
@@ -76,7 +75,7 @@ def write_answer(
     text: str,
     figures: "Mapping[str, AnswerFigure]",
     cable: str = "",
-    page: "Page | None" = None,
+    page: "HtmlPage | None" = None,
 ) -> list[Path]:
     """Write an answer as text, as figures and, last, as JSON: all of them or none; a folder that has the JSON has everything.
 
@@ -96,25 +95,23 @@ def write_answer(
         StoreError: The folder cannot be written.
     """
     from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.figures_folder import copy_captions
-    from bowdenfit.results.folder import fill_folder_atomically, write_text
     from bowdenfit.results.serialization import plain_data
 
-    page_file, text_file, *_ = files = files_of(folder, name)
-    files += [path for each in figures if each != name for path in figures_of(folder, each)]
-    with fill_folder_atomically(Path(folder), page_file.name) as place:
-        copy_captions(Path(folder), place)
-        write_text(place / text_file.name, text)
-        for each, figure in figures.items():
-            write_figure(figure, answer, place, each, cable)
+    page_file, text_file, *_ = files = answer_files(folder, name)
+    files += [path for figure_name in figures if figure_name != name for path in answer_figures(folder, figure_name)]
+    with fill_folder_atomically(Path(folder), page_file.name) as working_folder:
+        copy_captions(Path(folder), working_folder)
+        write_text(working_folder / text_file.name, text)
+        for figure_name, figure in figures.items():
+            write_figure(figure, answer, working_folder, figure_name, cable)
         if page is not None:
-            written = write_page(page, place, place / f"{name}.html")
-            files.insert(0, Path(folder) / written.name)
-        write_text(place / page_file.name, json.dumps(plain_data(answer), indent=1, allow_nan=False) + "\n")
+            page_path = write_page(page, working_folder, working_folder / f"{name}.html")
+            files.insert(0, Path(folder) / page_path.name)
+        write_text(working_folder / page_file.name, json.dumps(plain_data(answer), indent=1, allow_nan=False) + "\n")
     return files
 
 
-def write_page(page: "Page", drawn: Path, path: Path) -> Path:
+def write_page(page: "HtmlPage", figures_folder: Path, path: Path) -> Path:
     """Write a page whole, with the figures that lie in a folder; loads no model.
 
     Args:
@@ -122,10 +119,8 @@ def write_page(page: "Page", drawn: Path, path: Path) -> Path:
         drawn: Where its figures are, as PNG.
         path: The file.
     """
-    from bowdenfit.pages.page import render
-    from bowdenfit.results.folder import write_text
-
-    files = {picture.name: drawn / f"{picture.name}.png" for picture in page.pictures}
+    from bowdenfit.pages.page import render_page
+    files = {picture.name: figures_folder / f"{picture.name}.png" for picture in page.pictures}
     drawings = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
-    write_text(path, render(page, drawings))
+    write_text(path, render_page(page, drawings))
     return path

@@ -9,12 +9,12 @@ from bowdenfit.errors import DiskError, system_error
 from bowdenfit.finished_fit import Fit
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
-from bowdenfit.questions.figures import captions_of, draw_figure, figures_of, mark_of
-from bowdenfit.questions.kept import answers_of
-from bowdenfit.questions.report.sections import report_page
-from bowdenfit.questions.summary.brief_words import summary_text
-from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.figures import collect_figure_data, titles_and_captions, warning_mark, write_figure_files
+from bowdenfit.questions.report.page import report_page
+from bowdenfit.questions.stored_answers import collect_answers
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
+from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.figures_folder import record_drawn_figures, write_captions
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit, write_text
@@ -47,16 +47,16 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
             failed[name] = error
 
     data = _figure_data(fit, failed) if figures else {}
-    save(fit, fit.summary(), folder, True, answers_of(fit), data)
+    save(fit, fit.summary(), folder, True, collect_answers(fit), data)
     attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
-    attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(full_text(fit))))
-    mark = mark_of(verdict(fit).troubles)
+    attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(details_text(fit))))
+    mark = warning_mark(assess_fit(fit).troubles)
     for name, shown in data.items():
-        attempt(name, draw_figure, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
+        attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
     attempt(REPORT, lambda: write_page(report_page(fit, data), folder / FIGURES, folder / REPORT))
     drawn_figures = {name: shown for name, shown in data.items() if name not in failed}
     if data:
-        captions, is_complete = captions_of(drawn_figures, fit.name, mark), len(drawn_figures) == len(data)
+        captions, is_complete = titles_and_captions(drawn_figures, fit.name, mark), len(drawn_figures) == len(data)
         attempt("captions", _write_captions, folder, captions, is_complete)
     return _what_is_missing(folder, failed)
 
@@ -66,7 +66,7 @@ def _figure_data(fit: Fit, failed: dict[str, Exception]) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for name in FIGURE_NAMES:
         try:
-            data |= dict(figures_of(fit, [name]))
+            data |= dict(collect_figure_data(fit, [name]))
         except Exception as error:
             failed[name] = error
     return data

@@ -21,7 +21,7 @@ from bowdenfit.physics.geometry import logistic_wrap_angle
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.compare.words import comparison_text
 from bowdenfit.questions.length.wrap_angles_figure import data, draw
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.details import details_text
 
 ROUTE = Route(variable="cable_length", unit="mm", range=(400.0, 600.0))
 LENGTHS = np.linspace(400.0, 600.0, 41)
@@ -227,7 +227,7 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
     ],
 )
 def test_the_summary_heads_a_family_s_table_with_its_own_name(fits, name, heading, rows):
-    lines = full_text(fits[name]).splitlines()
+    lines = details_text(fits[name]).splitlines()
     at = lines.index(heading)
     assert all(line.startswith("  sheath_angle_") for line in lines[at + 1 : at + 1 + rows])
     assert sum("median (90 % interval):" in line for line in lines) == 1

@@ -17,8 +17,8 @@ import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.finished_fit import Fit
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.questions.figures import figures_of
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.figures import collect_figure_data
+from bowdenfit.questions.summary.brief import summary_text
 
 FOLDER = Path(__file__).parents[2] / "datasets" / "yarn-on-cylinder"
 NOMINAL = np.repeat([45, 90, 135, 180, 225, 270, 315], 3)
@@ -58,7 +58,7 @@ def test_the_summary_is_one_page_that_says_whether_a_trial_is_off(fit):
 
 @pytest.mark.extended
 def test_its_figures_can_be_read(fit):
-    shown = dict(figures_of(fit))
+    shown = dict(collect_figure_data(fit))
     assert {"forces", "residuals", "coefficients", "pairs", "traces", "checks"} <= set(shown)
     assert_readable(shown, fit.name)
 

@@ -14,7 +14,7 @@ from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.overview import describe_products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended
 
@@ -123,7 +123,7 @@ def test_good_tables_leave_nothing_unidentified():
 def test_the_summary_says_which_values_fit_as_well():
     tables, design, truth, *_ = CASES["a loop that is always slack"]
     data, _ = measured(cable_with(tables), 0, design=design_of(**design), once=True, **(TRUTH | truth))
-    text = " ".join(full_text(bf.fit(data, mcmc=False, seed=1)).split())
+    text = " ".join(details_text(bf.fit(data, mcmc=False, seed=1)).split())
     assert "preload is not identified by least squares: values from" in text
     assert "fit about as well" in text
 

@@ -13,7 +13,7 @@ from bowdenfit.inference.objective import Problem, make_objective, sum_of_square
 from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.inference.solver import QUICK
 from bowdenfit.model import build_model
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended
 
@@ -37,7 +37,7 @@ def test_where_the_solver_is_stuck_no_interval_is_given_and_the_fit_is_not_trust
     assert np.isnan([estimate.lower, estimate.upper]).all()
     assert not fit.converged
     assert "stuck at a kink" in fit.reasons[0] and "sampling gets past kinks" in fit.reasons[0]
-    said, short = (" ".join(text.split()) for text in (full_text(fit), str(fit)))
+    said, short = (" ".join(text.split()) for text in (details_text(fit), str(fit)))
     assert "no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc" in short
     assert "mu and preload have no profile interval, since the solver is stuck at kinks" in said and "without --no-mcmc" in said
 

@@ -20,7 +20,7 @@ from bowdenfit.inference.diagnostics import Trajectories, compute_energy_mixing,
 from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended
 
@@ -226,7 +226,7 @@ def test_statistics_of_trajectories_are_stored_under_arviz_s_names(saved, tmp_pa
 
 
 def test_the_summary_says_how_trajectories_went(saved):
-    text = " ".join(full_text(saved[0]).split())
+    text = " ".join(details_text(saved[0]).split())
     assert "NUTS, 8 chains of 300 draws after 500 of warm-up" in text
     assert "no trajectory diverged; energy mixing (E-BFMI)" in text
 

@@ -18,8 +18,8 @@ from bowdenfit.inference.sampler_agreement import (
     compare_samplers,
     recommend_sampler,
 )
-from bowdenfit.questions.figures import figures_of
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.figures import collect_figure_data
+from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended
 
@@ -133,7 +133,7 @@ def by_both():
 def test_a_fit_by_both_samplers_says_that_they_agree(by_both):
     """The first sampler's draws are the result."""
     assert by_both.posterior.sampler == "emcee"
-    assert "emcee and NUTS agree within Monte Carlo error" in " ".join(full_text(by_both).split())
+    assert "emcee and NUTS agree within Monte Carlo error" in " ".join(details_text(by_both).split())
     assert by_both.summary()["samplers"]["agree"]
 
 
@@ -151,7 +151,7 @@ def test_samplers_that_disagree_are_a_reason_not_to_trust(monkeypatch):
     found = bf.fit(YARN, sampler="both", seed=1, settings=("sampler.n_walkers=64", "sampler.target_ess=500"))
     assert not found.converged
     assert any(reason.startswith("emcee and NUTS disagree on the") for reason in found.reasons)
-    assert "NOT CONVERGED" in full_text(found)
+    assert "NOT CONVERGED" in details_text(found)
 
 
 @EACH
@@ -168,4 +168,4 @@ def test_emcee_and_nuts_agree_on_every_data_set(name):
 @EACH
 def test_figures_of_draws_can_be_read_on_every_data_set(name):
     found = fitted_by_both(name)
-    assert_readable(dict(figures_of(found)), found.name)
+    assert_readable(dict(collect_figure_data(found)), found.name)

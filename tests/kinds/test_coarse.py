@@ -5,9 +5,9 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.kinds.plausibility import coarse
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import COARSE
-from bowdenfit.questions.summary.words import full_text
 
 pytestmark = pytest.mark.extended
 
@@ -74,7 +74,7 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
         "open by 3.6 % up or down" in sentence and "may be off: [prior.sigma_F] fixed = 0.29 in cable.toml." in sentence
     )
     assert "the readings are too coarse for such intervals" in " ".join(summary_text(hidden).split())
-    assert "READINGS TOO COARSE" in full_text(hidden)
+    assert "READINGS TOO COARSE" in details_text(hidden)
     shown = _fit(tmp_path, 2, 0.003)
     assert shown.verdict().trusted
     assert shown.parameter("mu").q05 < TRUE_MU < shown.parameter("mu").q95

@@ -11,7 +11,7 @@ import bowdenfit as bf
 from bowdenfit.kinds.plausibility import Compared, copies
 from bowdenfit.questions.check.copied import describe_copied_readings
 from bowdenfit.questions.check.data_set_words import describe_data_set
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.verdict import COPIED
 
 pytestmark = pytest.mark.extended

@@ -40,8 +40,8 @@ from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths, describe_prior_influence
 from bowdenfit.questions.check.suspects import find_influential_outliers
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.summary import methods_section
-from bowdenfit.questions.summary.trust_words import next_step
+from bowdenfit.questions.summary.methods import methods_section
+from bowdenfit.questions.summary.verdict import suggest_next_step
 from bowdenfit.results.record import Draws, Provenance, Record
 
 DRAWS = 8000
@@ -295,7 +295,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
 
 def test_in_doubt_what_the_fit_leans_on_is_to_be_measured_again(fit):
     leant_on = [reading.label for reading in fit.checks.readings if reading.pareto_k > 0.7]
-    said = next_step(fit)
+    said = suggest_next_step(fit)
     shown = [label for label in leant_on if label in said]
     assert "in doubt, measure again what the fit leans on: " in said and len(shown) == min(2, len(leant_on)) > 0
     assert (f" and {len(leant_on) - 2} more." in said) == (len(leant_on) > 2)
@@ -343,7 +343,7 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
     fit = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1)
     found = fit.checks
-    methods, n = methods_section.section(fit).context["paragraphs"][0], sum(np.sum(t.refitted) for t in found.tables)
+    methods, n = methods_section(fit).context["paragraphs"][0], sum(np.sum(t.refitted) for t in found.tables)
     assert n >= 1
     assert f"], {n} of them against that of a fit without it." in methods
     (far,) = found.outliers

@@ -11,7 +11,7 @@ from bowdenfit.physics.friction import rate_factor, rate_slope
 from bowdenfit.physics.loop import dynamic_range, loop_output_force
 from bowdenfit.physics.stretch import stiffness_with_springs
 from bowdenfit.questions.recorded.stick_slip import StickSlip, friction_slopes, stick_slip
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.details import details_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.3", "sampler.max_steps=300")
 
@@ -83,4 +83,4 @@ def test_a_rope_whose_friction_falls_with_speed_says_so(tmp_path):
         -2 * values["stribeck"] * 5 / values["stribeck_speed"] ** 2 * np.exp(-((5 / values["stribeck_speed"]) ** 2))
     )
     np.testing.assert_allclose(friction_slopes(fit, np.array([5.0]))[:, 0], by_hand + values["viscous"], rtol=1e-9)
-    assert "sticks and slips" in " ".join(full_text(fit).split())
+    assert "sticks and slips" in " ".join(details_text(fit).split())

@@ -15,7 +15,7 @@ from bowdenfit.questions.bends.loops_figure import LoopCurve
 from bowdenfit.questions.bends.preload_figure import PreloadCurve, true_stretches
 from bowdenfit.questions.bends.preload_window_figure import PreloadWindowCurves
 from bowdenfit.questions.bends.stretch_figure import StretchCurve
-from bowdenfit.questions.figures import FIGURES, draw_figure
+from bowdenfit.questions.figures import FIGURES, write_figure_files
 
 pytestmark = pytest.mark.extended
 
@@ -511,7 +511,7 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
     before = dict(mpl.rcParams)
     data = CASES["twelve angles"]()
     for folder in ("first", "second"):
-        written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
+        written = [path for name in NAMES for path in write_figure_files(name, data[name], tmp_path / folder)]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg", "pdf")]
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()

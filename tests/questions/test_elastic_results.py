@@ -24,11 +24,11 @@ from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.refit import with_parameters_of
-from bowdenfit.questions.figures import figures_of
+from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.simulate.simulation import empty_tables, true_values, with_readings
 from bowdenfit.questions.simulate.tables import read_bench
-from bowdenfit.questions.summary.brief_words import summary_text
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
 from bowdenfit.results.along_route import make_optimizer
 
 pytestmark = pytest.mark.extended
@@ -87,7 +87,7 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
 
 
 def test_the_summary_says_what_each_wrap_angle_does(fit):
-    text = full_text(fit)
+    text = details_text(fit)
     assert "Fitted to 105 readings of stretch, 8 preloads and 64 readings of a loop." in text
     assert "Stretch and preload, median (90 % interval)" in text
     assert "Over bends from 0 to 180 deg the cable stays taut from a preload of" in text
@@ -113,7 +113,7 @@ def test_the_summary_says_what_each_wrap_angle_does(fit):
 def test_all_figures_of_the_elastic_side_are_drawn(fit, tmp_path):
     names = {path.stem for path in bf.plot(fit, tmp_path)}
     assert {"stretch", "preload", "bending_loss", "loops", "preload_window"} <= names
-    shown = dict(figures_of(fit))
+    shown = dict(collect_figure_data(fit))
     assert_readable(shown, fit.name)
     assert [curve.wrap_angle for curve in shown["stretch"]] == pytest.approx([0, 45, 90, 135, 180])
     for curve in shown["stretch"]:
@@ -295,7 +295,7 @@ def test_the_report_says_which_table_disagrees_and_the_fit_goes_on(tmp_path):
             rows.append(f"{angle},pull,{0.02 * force:.5f},{0.02 * out + 0.004 * np.sin(17 * len(rows)):.5f}")
     (tmp_path / "loop.csv").write_text("\n".join(rows) + "\n")
     fit = bf.fit(tmp_path, mcmc=False)
-    text = " ".join(full_text(fit).split())
+    text = " ".join(details_text(fit).split())
     assert "The table of loop disagrees with everything else by" in text
     assert "standard deviations: without it" in text
     worst = fit.summary()["agreement"][0]

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import bowdenfit as bf
-from bowdenfit.questions.figures import FIGURES, figures_of, page_width
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, parse_page_width
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def fit(on_body_squares):
 
 
 def test_the_figures_that_a_fit_has_are_listed_and_no_others(fit):
-    assert dir(fit.plot) == sorted(dict(figures_of(fit)))
+    assert dir(fit.plot) == sorted(dict(collect_figure_data(fit)))
     assert {"efficiency", "residuals"} <= set(dir(fit.plot)) < set(FIGURES)
     assert "plot.efficiency()" in repr(fit.plot)
 
@@ -68,6 +68,6 @@ def test_a_figure_chooses_no_backend_and_loads_no_pyplot(on_body):
 
 @pytest.mark.parametrize(("least", "unit"), [(3, "in"), (76.2, "mm"), (7.62, "cm")])
 def test_figures_may_be_as_wide_as_is_said_and_no_narrower(least, unit):
-    assert page_width((least, unit)) == 3.0
+    assert parse_page_width((least, unit)) == 3.0
     with pytest.raises(bf.UsageError, match="say a width from 3 in to 20 in"):
-        page_width((0.999 * least, unit))
+        parse_page_width((0.999 * least, unit))

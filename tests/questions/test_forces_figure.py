@@ -8,9 +8,9 @@ from figure_words import check_words, words
 from hand_bench import pull, write
 
 import bowdenfit as bf
-from bowdenfit.questions.figures import figures_of
+from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.summary import forces_figure
-from bowdenfit.questions.summary.forces_shown import MOST_PLACES, MOST_READINGS, Forces, ForcesHere
+from bowdenfit.questions.summary.forces_data import MOST_PLACES, MOST_READINGS, ForcesAtBend, ForcesData
 
 LONG = "The model does not describe force runs: around a load of 1.8 N the loss is 65 % larger than the model says; and so on"
 
@@ -25,7 +25,7 @@ def _here(label, mu, load, trusted_law, strokes=(1, -1, 0), shown=True, sign=(1.
     slides = np.where(stroke == 0, np.nan, 1.0)
     off = slides * 2.0 * np.where(np.arange(len(force)) % 2, 1, -1)
     read = force * np.exp(-stroke * mu * bend)
-    return ForcesHere(label, force, read, stroke, off, mu * slides, load, law, apparent, mu, shown)
+    return ForcesAtBend(label, force, read, stroke, off, mu * slides, load, law, apparent, mu, shown)
 
 
 def _forces(n=1, lowest=1.0, highest=10.0, trusted=True, drawn=True, logarithmic=False, names="{} deg"):
@@ -34,7 +34,7 @@ def _forces(n=1, lowest=1.0, highest=10.0, trusted=True, drawn=True, logarithmic
     if not drawn:
         places = tuple(replace(p, law=p.law[1:2], apparent_law=p.apparent_law[1:2]) for p in places)
     spread = np.full(21, 3.0) if drawn else np.zeros(0)
-    return Forces(places, load, spread, "capstan", trusted, "" if trusted else LONG, logarithmic, 0 if n == 1 else 9600)
+    return ForcesData(places, load, spread, "capstan", trusted, "" if trusted else LONG, logarithmic, 0 if n == 1 else 9600)
 
 
 CASES = {
@@ -77,7 +77,7 @@ def drag(tmp_path_factory):
     rows = pull(np.random.default_rng(0), bends, 0.12 * np.deg2rad(bends), (2, 4, 8, 16, 64), drag=2.0, noise=(1e-4, 1e-4))
     folder = write(tmp_path_factory.mktemp("drag"), rows)
     fits = {model: bf.fit(folder, friction=model, mcmc=False) for model in ("drag", "capstan")}
-    return {model: dict(figures_of(fit, ["forces"]))["forces"] for model, fit in fits.items()}
+    return {model: dict(collect_figure_data(fit, ["forces"]))["forces"] for model, fit in fits.items()}
 
 
 @pytest.mark.extended
@@ -113,7 +113,7 @@ def test_held_readings_have_no_residual_and_of_many_some_are_shown(tmp_path):
     text = (folder / "forces.csv").read_text().splitlines()
     held = [line.replace("pull", "hold") if number == 0 else line for line, number in zip(text[1:], stroke, strict=True)]
     (folder / "forces.csv").write_text("\n".join([text[0], *held]) + "\n")
-    forces = dict(figures_of(bf.fit(folder, mcmc=False), ["forces"]))["forces"]
+    forces = dict(collect_figure_data(bf.fit(folder, mcmc=False), ["forces"]))["forces"]
     (here,) = forces.places
     assert forces.count == len(rows.stroke) > len(here.stroke) == MOST_READINGS
     assert np.isnan(here.off[here.stroke == 0]).all() and np.isfinite(here.off[here.stroke != 0]).all()

@@ -8,7 +8,7 @@ from hand_bench import BENDS, LENGTHS, pull, write
 
 import bowdenfit as bf
 from bowdenfit.questions.length.efficiency_figure import data, draw
-from bowdenfit.questions.predict.outside import Measured, pulled
+from bowdenfit.questions.predict.measured_range import MeasuredRange, clip_to_tension
 from bowdenfit.questions.recorded.lost_force import lost_force
 
 pytestmark = pytest.mark.extended
@@ -90,19 +90,19 @@ def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag
 
 
 def test_a_rope_pulls_or_is_slack():
-    force, words = pulled(np.array([[1.0, -1.0, 3.0], [1.0, -2.0, -1.0]]), 10.0)
+    force, words = clip_to_tension(np.array([[1.0, -1.0, 3.0], [1.0, -2.0, -1.0]]), 10.0)
     np.testing.assert_array_equal(force, [[1.0, 0.0, 3.0], [1.0, 0.0, 0.0]])
     assert words == ["", "slack", "slack with 50 % probability"]
 
 
 def test_what_was_measured_says_what_lies_outside():
-    ranges = Measured((430.0, 550.0), (10.0, 60.0), "mm")
+    ranges = MeasuredRange((430.0, 550.0), (10.0, 60.0), "mm")
     assert ranges.notes(550.0, 60.0) == []
     assert ranges.notes(551.0, 9.0) == [
         "outside the lengths measured, 430 to 550 mm",
         "outside the loads measured, 10 to 60 N",
     ]
-    assert Measured(None, None, "").notes(None, 5.0) == ["no table says at which loads"]
+    assert MeasuredRange(None, None, "").notes(None, 5.0) == ["no table says at which loads"]
 
 
 def test_the_figure_of_the_efficiency_says_at_which_force_its_curve_holds(tmp_path):

@@ -5,8 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.loss.answer import ContactShare, Loss, loss_by_contact
-from bowdenfit.questions.loss.words import loss_text
+from bowdenfit.questions.loss.answer import ContactShare, LossByContact, loss_by_contact, loss_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
 
@@ -58,6 +57,8 @@ def test_one_contact_has_no_shares(tmp_path):
 
 def test_a_sentence_names_four_contacts_and_leaves_none_of_the_loss_out():
     share = Interval(0.2, 0.01, 0.2, 0.18, 0.22)
-    four, six = (Loss("", tuple(ContactShare(f"contact {i}", share, 0.2) for i in range(n))).sentence() for n in (4, 6))
+    four, six = (
+        LossByContact("", tuple(ContactShare(f"contact {i}", share, 0.2) for i in range(n))).sentence() for n in (4, 6)
+    )
     assert four.endswith("20 % at 'contact 1', 20 % at 'contact 2' and 20 % at 'contact 3'.")
     assert six.endswith("20 % at 'contact 3' and the rest at 2 others.")

@@ -8,7 +8,7 @@ from matplotlib.text import Text
 
 import bowdenfit as bf
 from bowdenfit.plots.layout import EDGE, empty_page, title_above
-from bowdenfit.questions.figures import mark_of
+from bowdenfit.questions.figures import warning_mark
 
 pytestmark = pytest.mark.extended
 
@@ -33,7 +33,7 @@ def unmarked(folder):
 @pytest.mark.slow
 def test_all_figures_of_a_refused_fit_and_their_captions_are_marked(unfinished, tmp_path):
     fit, folder = unfinished
-    assert mark_of(fit.verdict().troubles) == "Do not use: this fit is not converged and not identifiable."
+    assert warning_mark(fit.verdict().troubles) == "Do not use: this fit is not converged and not identifiable."
     drawn = list((folder / "figures").glob("*.png"))
     bf.plot(fit, tmp_path / "again", formats=["png", "svg"])
     assert unmarked(tmp_path / "again") == []
@@ -68,11 +68,11 @@ def test_no_figure_of_a_good_fit_is_marked(quick_fit, quick_results, tmp_path):
 def test_a_mark_takes_lines_of_its_own_on_a_narrow_page():
     plain, marked = empty_page(3.0, 2.0), empty_page(3.0, 2.0)
     title_above(plain, "Coefficients")
-    title_above(marked, "Coefficients", mark_of(["not converged", "contradictory", "made of copied readings"]))
+    title_above(marked, "Coefficients", warning_mark(["not converged", "contradictory", "made of copied readings"]))
     taller = marked.get_figheight() - plain.get_figheight()
     title, *lines = marked.texts
     assert len(lines) >= 2 and taller == pytest.approx(0.15 * len(lines))
     boxes = [text.get_window_extent() for text in (title, *lines)]
     assert all(above.y0 > below.y0 for above, below in pairwise(boxes))
     assert max(box.x1 for box in boxes) <= marked.bbox.x1 - EDGE * marked.dpi / 2
-    assert mark_of([]) == ""
+    assert warning_mark([]) == ""

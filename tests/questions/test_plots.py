@@ -24,15 +24,15 @@ from bowdenfit.plots.curves import BAND_QUANTILES, NEW_RUN, Band, density
 from bowdenfit.plots.layout import NUMBER_SPACE, axes_at, empty_page, number_below, ticks
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write
-from bowdenfit.questions.figures import FIGURES, draw_figure, figures_of
-from bowdenfit.questions.length.efficiency_figure import AlongRoute, EfficiencyPoints
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, write_figure_files
+from bowdenfit.questions.length.efficiency_figure import EfficiencyAlongRoute, EfficiencyPoints
 from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, WrapAngles
 from bowdenfit.questions.summary import pairs_figure
 from bowdenfit.questions.summary.coefficients_figure import Coefficient
 from bowdenfit.questions.summary.pairs_figure import Pairs
-from bowdenfit.questions.summary.quantities import SampledQuantity
 from bowdenfit.questions.summary.residuals_figure import Residuals
-from bowdenfit.questions.summary.traces_figure import Paths
+from bowdenfit.questions.summary.sampled_quantities import SampledQuantity
+from bowdenfit.questions.summary.traces_figure import Traces
 from bowdenfit.results.optimal_length import Choice, OptimalLength, Window
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
@@ -105,10 +105,10 @@ def paper_data(length_draws=None):
     answer = best(lengths, 0.79 + 0.008 * rng.standard_normal((WALKERS, DRAWS)))
     return {
         "wrap_angles": WrapAngles(curves, LABEL, RANGE),
-        "efficiency": AlongRoute(LABEL, RANGE, band, (points,), optimum(lengths), lengths),
+        "efficiency": EfficiencyAlongRoute(LABEL, RANGE, band, (points,), optimum(lengths), lengths),
         "coefficients": friction,
         "pairs": Pairs([positive(c) for c in (*friction, *noise)] + answer, "cable length"),
-        "traces": Paths([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES),
+        "traces": Traces([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES),
         "residuals": Residuals((points,)),
     }
 
@@ -116,7 +116,7 @@ def paper_data(length_draws=None):
 def without_route(data):
     (points,), first = data["residuals"].points, data["coefficients"][:1]
     points = dataclasses.replace(points, route=np.full(4, np.nan), inside=np.ones(4, dtype=bool))
-    paths = Paths([positive(first[0])], ENSEMBLES)
+    paths = Traces([positive(first[0])], ENSEMBLES)
     return {"coefficients": first, "traces": paths, "residuals": Residuals((points,))}
 
 
@@ -129,7 +129,7 @@ def without_draws(data):
     points = (dataclasses.replace(points, predicted=points.predicted[2:3]),)
     return {
         "wrap_angles": WrapAngles(curves, LABEL, RANGE),
-        "efficiency": AlongRoute(LABEL, RANGE, line(along.efficiency), points),
+        "efficiency": EfficiencyAlongRoute(LABEL, RANGE, line(along.efficiency), points),
         "residuals": Residuals(points),
     }
 
@@ -158,7 +158,7 @@ def with_five_contacts(data):
     data = data | {"coefficients": friction + data["coefficients"]}
     data = changed(data, "wrap_angles", curves=curves)
     pairs = sampled + data["pairs"].quantities
-    data = changed(data, "pairs", quantities=pairs[: pairs_figure.MOST - 2] + pairs[-2:])
+    data = changed(data, "pairs", quantities=pairs[: pairs_figure.MOST_QUANTITIES - 2] + pairs[-2:])
     return changed(data, "traces", quantities=sampled + data["traces"].quantities)
 
 
@@ -221,13 +221,13 @@ def fit(quick_fit):
 
 @pytest.mark.extended
 def test_only_figures_that_apply_are_drawn(fit, least_squares_of):
-    shown = dict(figures_of(fit))
+    shown = dict(collect_figure_data(fit))
     assert list(shown) == [*ALL, "checks"]
     assert_readable(shown, fit.name)
     squares = least_squares_of("on-body-exoskeleton")
-    assert [name for name, _ in figures_of(squares)] == ["wrap_angles", "efficiency", "residuals"]
+    assert [name for name, _ in collect_figure_data(squares)] == ["wrap_angles", "efficiency", "residuals"]
     without = least_squares_of("yarn-on-cylinder")
-    assert [name for name, _ in figures_of(without)] == ["forces", "residuals"]
+    assert [name for name, _ in collect_figure_data(without)] == ["forces", "residuals"]
 
 
 def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):
@@ -244,7 +244,7 @@ def test_a_single_draw_of_each_walker_has_no_trace_but_all_else(fit):
 
 def test_another_process_reads_what_figures_show_without_a_model_or_matplotlib(fit):
     program = "import pickle, sys; pickle.load(sys.stdin.buffer); print({'jax', 'matplotlib'} & set(sys.modules))"
-    data = pickle.dumps(dict(figures_of(fit)))
+    data = pickle.dumps(dict(collect_figure_data(fit)))
     done = subprocess.run([sys.executable, "-c", program], input=data, capture_output=True, check=True)
     assert done.stdout.strip() == b"set()"
 
@@ -436,7 +436,7 @@ def test_traces_tell_a_stray_ensemble():
     stray = first.draws.copy()
     stray[: WALKERS // ENSEMBLES] += 0.05
     moved = dataclasses.replace(first, draws=stray)
-    figure = drawn("traces", {"traces": Paths([moved], ENSEMBLES)})
+    figure = drawn("traces", {"traces": Traces([moved], ENSEMBLES)})
     medians = [line.get_ydata().mean() for line in figure.axes[0].lines if line.get_linewidth() == 1.0]
     assert len(medians) == ENSEMBLES
     assert medians[0] > max(medians[1:]) + 0.04
@@ -518,7 +518,7 @@ def test_an_axis_has_two_numbers_which_make_a_scale(width):
 
 def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
-    written = [path for name, data in paper_data().items() for path in draw_figure(name, data, tmp_path / "figures")]
+    written = [path for name, data in paper_data().items() for path in write_figure_files(name, data, tmp_path / "figures")]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in paper_data() for ending in FORMATS]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
@@ -526,14 +526,14 @@ def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):
 
 
 def test_only_the_formats_asked_for_are_written(tmp_path):
-    written = draw_figure("coefficients", paper_data()["coefficients"], tmp_path, formats=("svg",))
+    written = write_figure_files("coefficients", paper_data()["coefficients"], tmp_path, formats=("svg",))
     assert [path.name for path in written] == ["coefficients.svg"]
 
 
 def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
     for folder in ("first", "second"):
         for name, data in paper_data().items():
-            draw_figure(name, data, tmp_path / folder, formats=("svg",))
+            write_figure_files(name, data, tmp_path / folder, formats=("svg",))
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
     assert "Wrap angle (deg)</text>" in (tmp_path / "first" / "wrap_angles.svg").read_text(encoding="utf-8")
@@ -542,7 +542,7 @@ def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
 def test_a_pdf_has_letters_that_can_be_searched(tmp_path):
     name = "Łódź λ <b> $x (50 %)"
     for folder in (tmp_path / "first", tmp_path / "second"):
-        draw_figure("coefficients", paper_data()["coefficients"], folder, ("pdf",), name)
+        write_figure_files("coefficients", paper_data()["coefficients"], folder, ("pdf",), name)
     page = (tmp_path / "first" / "coefficients.pdf").read_bytes()
     assert page == (tmp_path / "second" / "coefficients.pdf").read_bytes()
     assert page.startswith(b"%PDF") and b"/FontFile2" in page and b"/Type3" not in page

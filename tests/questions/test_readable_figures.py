@@ -13,7 +13,7 @@ import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
 from bowdenfit.plots.layout import text_width
 from bowdenfit.plots.panels import shorten_title
-from bowdenfit.questions.figures import caption_of, figures_of
+from bowdenfit.questions.figures import collect_figure_data, figure_caption
 
 pytestmark = pytest.mark.extended
 
@@ -53,15 +53,15 @@ def table(folder, name, bends, mountings, scale, strokes):
 @pytest.mark.parametrize("friction", TABLES)
 def test_figures_of_every_friction_model_can_be_read(friction, mcmc, tmp_path):
     fit = bf.fit(table(tmp_path, *TABLES[friction]), friction=friction, mcmc=mcmc, seed=1, settings=QUICK if mcmc else ())
-    shown = dict(figures_of(fit))
+    shown = dict(collect_figure_data(fit))
     assert {"forces", "residuals"} <= set(shown)
-    assert all(" n = " in caption_of(name, data) for name, data in shown.items())
+    assert all(" n = " in figure_caption(name, data) for name, data in shown.items())
     assert_readable(shown, fit.name)
 
 
 def test_figures_of_the_synthetic_bench_can_be_read(least_squares_of):
     fit = least_squares_of("synthetic-bench")
-    assert_readable(dict(figures_of(fit)), fit.name)
+    assert_readable(dict(collect_figure_data(fit)), fit.name)
 
 
 def test_a_name_that_is_too_long_for_a_panel_begins_with_a_word():

@@ -11,7 +11,7 @@ from loop_benches import MU, PRELOAD, folder_of, recorded, several_in
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.questions.check.data_set_words import describe_data_set
-from bowdenfit.questions.figures import FIGURES, figures_of
+from bowdenfit.questions.figures import FIGURES, collect_figure_data
 from bowdenfit.questions.recorded.loop_traces import loop_points
 from bowdenfit.questions.recorded.traces import trace_recordings
 from bowdenfit.recordings.recording import Recordings
@@ -92,7 +92,7 @@ def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
 
 
 def test_only_the_figures_that_make_sense_for_a_loop_are_drawn(sampled):
-    shown = dict(figures_of(sampled))
+    shown = dict(collect_figure_data(sampled))
     assert_readable(shown, sampled.name)
     assert {"recordings", "autocorrelation"} <= set(shown)
     assert not set(shown) & {"hysteresis", "sample_efficiency", "dependence"}

@@ -16,14 +16,14 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.descriptions import design_of
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import describe_data_set
-from bowdenfit.questions.figures import figures_of
-from bowdenfit.questions.identify.confounding import confounded_pairs
+from bowdenfit.questions.figures import collect_figure_data
+from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.recorded.traces import trace_recordings
-from bowdenfit.questions.summary.answer import answer
-from bowdenfit.questions.summary.brief_words import summary_text
-from bowdenfit.questions.summary.words import full_text
+from bowdenfit.questions.summary.answer import summary_sentences
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
 from bowdenfit.recordings.recording import Recordings
 
 pytestmark = pytest.mark.extended
@@ -58,12 +58,12 @@ def truth(recorded):
 def test_the_summary_of_recordings_is_one_page(plain, with_rate):
     assert faults(summary_text(plain[0])) == []
     assert faults(summary_text(with_rate[0])) == []  # so short that it is not trusted, and begins with that
-    assert "no dependence on speed" in " ".join(answer(with_rate[0]))
+    assert "no dependence on speed" in " ".join(summary_sentences(with_rate[0]))
 
 
 def test_figures_of_recordings_can_be_read(plain, with_rate):
-    assert_readable(dict(figures_of(plain[0])), plain[0].name)
-    shown = dict(figures_of(with_rate[0], ["dependence", "efficiency", "recordings"]))
+    assert_readable(dict(collect_figure_data(plain[0])), plain[0].name)
+    shown = dict(collect_figure_data(with_rate[0], ["dependence", "efficiency", "recordings"]))
     assert_readable(shown, with_rate[0].name)
 
 
@@ -101,7 +101,7 @@ def test_both_likelihoods_ask_for_the_same_coefficients(recorded, plain):
 def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     fit, folder = plain
     again = bf.load(folder)
-    assert full_text(again) == full_text(fit)
+    assert details_text(again) == details_text(fit)
     for before, after in zip(
         fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).each, strict=True
     ):
@@ -121,7 +121,7 @@ def test_no_sample_disappears_without_being_counted(plain):
 
 
 def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(plain):
-    text = " ".join(full_text(plain[0]).split())
+    text = " ".join(details_text(plain[0]).split())
     samples = sum(r.account.samples for r in plain[0].dataset.measurements.table(Recordings).each)
     assert f"{samples} samples of 7 recordings in 7 runs" in text
     assert "From one mounting of the cable to the next the efficiency scatters by" in text
@@ -156,7 +156,7 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     assert abs(effect.difference.median) < 0.01  # the truth is 0, mountings differ by 1 %
     page = json.loads((folder / "summary.json").read_text())
     assert page["rate_effect"]["difference"]["median"] == pytest.approx(effect.difference.median)
-    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(full_text(fit).split())
+    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(details_text(fit).split())
     (dependence,) = dependence_figure.data(fit)
     assert (dependence.what, dependence.label) == ("speed", "Speed (r/min)")
     assert len(dependence.points_x) == 4
@@ -251,7 +251,7 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
     truth = values["mu_edge"] + pair.factor * values["gain_error"]
     assert pair.mean == pytest.approx(truth, abs=4 * pair.sd)  # fails by chance for one seed in 10^4
     assert pair.sd < 0.4 * pair.first_sd
-    text = " ".join(full_text(fit).split())
+    text = " ".join(details_text(fit).split())
     assert "hardly tell mu_edge and gain_error apart" in text
     assert fit.summary()["confounded"][0]["combination"] == pair.combination
     assert not fit.least_squares.estimates["mu_edge"].identified

@@ -10,7 +10,7 @@ from figure_words import check_words, words
 from kept_data import assert_kept
 
 from bowdenfit.plots.panels import extremes
-from bowdenfit.questions.figures import FIGURES, draw_figure
+from bowdenfit.questions.figures import FIGURES, write_figure_files
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.questions.recorded.autocorrelation_figure import Autocorrelation, autocorrelation
 from bowdenfit.questions.recorded.dependence_figure import Dependence
@@ -435,7 +435,7 @@ def test_the_same_data_give_the_same_small_files(case, tmp_path):
     before = dict(mpl.rcParams)
     data = ONCE.data(case)
     for folder in ("first", "second"):
-        written = [path for name in NAMES for path in draw_figure(name, data[name], tmp_path / folder)]
+        written = [path for name in NAMES for path in write_figure_files(name, data[name], tmp_path / folder)]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in NAMES for ending in ("png", "svg", "pdf")]
     for path in (tmp_path / "first").iterdir():
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()

@@ -9,7 +9,7 @@ import pytest
 from reading_room import browser, opened
 
 import bowdenfit as bf
-from bowdenfit.questions.report.sections import report_page
+from bowdenfit.questions.report.page import report_page
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import REPORT
 
@@ -208,10 +208,10 @@ def test_a_folder_that_is_no_fit_or_was_edited_is_refused(refuse, tmp_path):
 
 
 def test_a_fit_whose_report_cannot_be_written_is_kept(on_body, tmp_path, monkeypatch):
-    from bowdenfit.questions.summary import methods_section
+    from bowdenfit.questions.report import page
 
     said = []
-    monkeypatch.setattr(methods_section, "section", lambda _: 1 / 0)
+    monkeypatch.setattr(page, "BELOW_FIGURES", (lambda _: 1 / 0,))
     bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, figures=False, report=said.append)
     (sentence,) = said
     assert "holds the whole fit, but its report could not be written (division by zero)" in sentence

@@ -12,11 +12,11 @@ from one_page import faults
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.style import rounded_texts
-from bowdenfit.questions.summary import brief_words
-from bowdenfit.questions.summary.answer import Quantity
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary import brief
+from bowdenfit.questions.summary.answer import KeyQuantity
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict
-from bowdenfit.questions.summary.words import full_text
 
 GOLDEN = Path(__file__).parent / "golden"
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
@@ -40,7 +40,7 @@ def masked(text: str) -> str:
     return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
 
 
-@pytest.mark.parametrize(("text", "file"), [(summary_text, "summary"), (full_text, "details")], ids=["short", "full"])
+@pytest.mark.parametrize(("text", "file"), [(summary_text, "summary"), (details_text, "details")], ids=["short", "full"])
 def test_the_printed_summary_is_that_of_the_golden_file(fit, text, file):
     assert masked(text(fit)) == (GOLDEN / f"on_body_{file}.txt").read_text()
 
@@ -56,8 +56,8 @@ def test_the_summary_is_one_page_that_an_engineer_reads_in_a_terminal(fit):
 def test_what_a_coefficient_is_comes_before_that_no_reading_is_off(fit, monkeypatch, n):
     """Both where there is room; that all readings agree is said above already."""
     words = "what this coefficient of the cable is, in more words than one line has"
-    many = [Quantity(f"q{i}", f"{words} {i}", "N", "1.00", "0.50 to 1.50") for i in range(n)]
-    monkeypatch.setattr(brief_words, "quantities", lambda _: many)
+    many = [KeyQuantity(f"q{i}", f"{words} {i}", "N", "1.00", "0.50 to 1.50") for i in range(n)]
+    monkeypatch.setattr(brief, "key_quantities", lambda _: many)
     page = summary_text(fit)
     assert faults(page) == []
     assert re.findall(r"line\s+has\s+(\d)", page) == [str(i) for i in range(n)]
@@ -70,7 +70,7 @@ def test_nothing_is_below_zero_by_rounding_alone():
 
 
 def test_a_page_that_nobody_reads_is_found_out(fit):
-    found = faults(full_text(fit))
+    found = faults(details_text(fit))
     for fault in ("wider than 80", "lines", "no answer", "walkers", "LogNormal(", "condition number"):
         assert any(fault.lower() in each.lower() for each in found), fault
 
@@ -103,8 +103,8 @@ def test_the_page_of_a_name_and_reasons_without_end_is_still_a_page(fit, monkeyp
     description = fit.dataset.description.model_copy(update={"name": "long " * 60})
     long = replace(fit, dataset=replace(fit.dataset, description=description))
     refused = Verdict({CONTRADICTORY: tuple(f"Reason {i}: {'word ' * 60}" for i in range(9))})
-    for module in ("brief_words", "trust_words", "answer"):
-        monkeypatch.setattr(f"bowdenfit.questions.summary.{module}.verdict", lambda _: refused, raising=False)
+    for module in ("brief", "verdict"):
+        monkeypatch.setattr(f"bowdenfit.questions.summary.{module}.assess_fit", lambda _: refused, raising=False)
     page = summary_text(long)
     assert faults(page) == []
     assert "the measurements contradict each other" in " ".join(page.splitlines()[:3])
@@ -113,7 +113,7 @@ def test_the_page_of_a_name_and_reasons_without_end_is_still_a_page(fit, monkeyp
 
 
 def test_no_line_of_the_full_summary_is_too_wide_for_a_terminal_of_130(fit):
-    assert max(map(len, full_text(fit).splitlines())) <= 130
+    assert max(map(len, details_text(fit).splitlines())) <= 130
 
 
 def test_every_measured_efficiency_stands_beside_its_prediction(fit):
@@ -193,7 +193,7 @@ def test_a_coefficient_that_no_measurement_informs_is_said_to_rest_on_its_prior(
         (tmp_path / path.name).write_text(path.read_text())
     text = (tmp_path / "cable.toml").read_text().replace('efficiencies = { file = "efficiencies.csv" }', "")
     (tmp_path / "cable.toml").write_text(text)
-    page = full_text(bf.fit(tmp_path, seed=1, settings=QUICK))
+    page = details_text(bf.fit(tmp_path, seed=1, settings=QUICK))
     assert "mu1, mu2 and mu3 rest on the prior almost alone" in " ".join(page.split())
     assert "the measurements do not determine it" in page
 
@@ -215,6 +215,6 @@ def test_without_a_route_there_is_no_length_to_choose(tmp_path):
     fit = bf.fit(table, wrap_angle=(180.0, "deg"), seed=1)
     assert fit.converged
     assert fit.parameter("mu").q05 < -np.log(0.7) / np.pi < fit.parameter("mu").q95
-    assert "Best" not in full_text(fit)
+    assert "Best" not in details_text(fit)
     with pytest.raises(bf.UsageError, match="no \\[route\\]"):
         fit.optimal_length()

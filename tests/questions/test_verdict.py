@@ -14,10 +14,10 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.questions.summary import answer_section
-from bowdenfit.questions.summary.brief_words import summary_text
+from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.details import details_text
+from bowdenfit.questions.summary.sections import answer_section
 from bowdenfit.questions.summary.verdict import IMPOSSIBLE, NOT_CONVERGED, NOT_DESCRIBED, NOT_IDENTIFIABLE
-from bowdenfit.questions.summary.words import full_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=400", "sampler.target_r_hat=1.03", "sampler.max_steps=4000")
 HALF_TURN = """
@@ -57,7 +57,7 @@ def _swapped(data: Dataset) -> Dataset:
 
 def _told(fit) -> str:
     with jax.enable_x64(True):
-        return " ".join(full_text(fit).split())
+        return " ".join(details_text(fit).split())
 
 
 @pytest.mark.extended
@@ -118,7 +118,7 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     assert faults(page) == [] and "Off: 1 of 26 readings" in page and re.search(r"82(\.0)? deg", page)
     assert student.verdict().trusted
     assert student.verdict().doubts == ("free_sheath_angle at 480 mm lies far from what the others say",)
-    assert answer_section.section(student).context["doubtful"]
+    assert answer_section(student).context["doubtful"]
     for text in (summary_text(student), repr(student.verdict())):
         assert "against the model, but free_sheath_angle at 480 mm lies far from" in " ".join(text.split())
         assert "the readings agree with the model" not in " ".join(text.split())

@@ -13,9 +13,10 @@ from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.questions import figures
-from bowdenfit.questions.figures import FIGURES, figures_of, kept_figures
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
+from bowdenfit.questions.summary import drawing as figure_drawing
 from bowdenfit.results import figures_folder
 from bowdenfit.results.answer_cache import SCHEMA, read_answers, write_answers
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
@@ -169,7 +170,7 @@ def test_a_figure_is_drawn_anew_where_it_is_not_as_the_fit_drew_it(results, tmp_
     if change is not None:
         change(copy, monkeypatch)
     drawing = []
-    monkeypatch.setattr(figures, "draw_figure", lambda name, *_: drawing.append(name))
+    monkeypatch.setattr(figure_drawing, "write_figure_files", lambda name, *_: drawing.append(name))
     bf.plot(copy, tmp_path / "drawn", figures=["efficiency"], formats=["png"])
     assert drawing == ([] if change is None else ["efficiency"])
     bf.plot(copy, tmp_path / "wide", figures=["pairs"], width=(5, "in"))
@@ -327,7 +328,7 @@ def test_a_fit_that_is_not_to_be_trusted_says_so_beside_what_is_read_back(on_bod
 
 
 def test_figures_show_what_they_would_show_if_it_were_worked_out(results):
-    worked_out, again = dict(figures_of(bf.load(results))), kept_figures(results)
+    worked_out, again = dict(collect_figure_data(bf.load(results))), read_figure_data(results)
     assert list(again) == list(worked_out)
     for name, data in worked_out.items():
         assert type(again[name]) is type(data), name
@@ -339,7 +340,7 @@ def test_figures_that_were_changed_are_not_drawn_again(results, tmp_path):
     page = bytearray((copy / FIGURE_DATA).read_bytes())
     page[len(page) // 2] ^= 1
     (copy / FIGURE_DATA).write_bytes(page)
-    assert kept_figures(copy) == {}
+    assert read_figure_data(copy) == {}
     assert read_answers(copy)
 
 

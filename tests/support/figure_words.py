@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.text import Text
 from one_page import jargon
 
-from bowdenfit.questions.figure_files import answer_figure
-from bowdenfit.questions.figures import caption_of, figure_of
+from bowdenfit.questions.figure_files import draw_answer_figure
+from bowdenfit.questions.figures import draw_with_title, figure_caption
 
 NARROW = 3.5  # in, a column of a paper
 LEAST = 6.0  # pt
@@ -59,9 +59,9 @@ def assert_readable(shown, cable, widths=(None, NARROW)):
         cable: Name of the cable.
         widths: Of the pages [in]; None for the usual one.
     """
-    drawn = [(name, width, figure_of(name, data, cable, width)) for name, data in shown.items() for width in widths]
+    drawn = [(name, width, draw_with_title(name, data, cable, width)) for name, data in shown.items() for width in widths]
     wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
-    wrong += [f"caption of {name}: {fault}" for name, data in shown.items() for fault in jargon(caption_of(name, data))]
+    wrong += [f"caption of {name}: {fault}" for name, data in shown.items() for fault in jargon(figure_caption(name, data))]
     assert not wrong, "\n".join(wrong)
 
 
@@ -75,7 +75,7 @@ def assert_answer_readable(file, found, cable):
     """
     said = file.caption(found)
     assert " n = " in said
-    assert not (wrong := [*faults(answer_figure(file, found, cable)), *jargon(said)]), "\n".join(wrong)
+    assert not (wrong := [*faults(draw_answer_figure(file, found, cable)), *jargon(said)]), "\n".join(wrong)
 
 
 def faults(figure):

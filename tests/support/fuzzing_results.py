@@ -207,10 +207,10 @@ def resume_fleet(folder: Path) -> None:
 
 def ask_fit(folder: Path) -> None:
     """What questions read of a finished fit."""
-    from bowdenfit.questions.figures import kept_figures
+    from bowdenfit.questions.figures import read_figure_data
 
     read_answers(folder)
-    kept_figures(folder)
+    read_figure_data(folder)
     found = bf.load(folder)
     found.summary()
     found.verdict()

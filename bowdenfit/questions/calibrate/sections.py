@@ -1,6 +1,6 @@
 """A calibration as a page: whether intervals keep their word, quantity by quantity, and what was left out."""
 
-from bowdenfit.pages.section import Page, Picture, Table, meanings_table, prose
+from bowdenfit.pages.section import HtmlPage, PageTable, Picture, make_meanings_table, prose_section
 from bowdenfit.questions.calibrate.answer import Calibration
 from bowdenfit.questions.calibrate.figures import figures_of_calibration
 from bowdenfit.questions.calibrate.words import (
@@ -18,26 +18,26 @@ from bowdenfit.questions.calibrate.words import (
 FOLDED = ("ranks", "sharpness")
 
 
-def calibration_page(found: Calibration) -> Page:
+def calibration_page(found: Calibration) -> HtmlPage:
     """The page of a calibration.
 
     Args:
         found: The calibration.
     """
     first, *others = verdict_sentences(found)
-    table = [Table(HEADS, tuple(rows(found)))] if found.quantities else []
-    evidence = Table(EVIDENCE_HEADS, tuple(evidence_rows(found)), how_to_read_evidence(found))
-    names = meanings_table({quantity.name: quantity.meaning for quantity in found.quantities})
+    table = [PageTable(HEADS, tuple(rows(found)))] if found.quantities else []
+    evidence = PageTable(EVIDENCE_HEADS, tuple(evidence_rows(found)), how_to_read_evidence(found))
+    names = make_meanings_table({quantity.name: quantity.meaning for quantity in found.quantities})
     sections = (
-        prose("The answer", [*others, what_was_done(found)], headline=first),
-        prose(
+        prose_section("The answer", [*others, what_was_done(found)], headline=first),
+        prose_section(
             "Quantity by quantity", [how_to_read(found)] if table else [], table,
             folded=[("What the names stand for", names), ("What the verdict on each rests on", evidence)],
             pictures=_pictures(found),
         ),
-        prose("What was left out", account_sentences(found)),
+        prose_section("What was left out", account_sentences(found)),
     )  # fmt: skip
-    return Page(found.name, "Calibration by bowdenfit", sections)
+    return HtmlPage(found.name, "Calibration by bowdenfit", sections)
 
 
 def _pictures(found: Calibration) -> tuple[Picture, ...]:

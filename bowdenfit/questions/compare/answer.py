@@ -19,7 +19,7 @@ from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
 from bowdenfit.kinds.terms import measured_kinds, term_kind
 from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
-from bowdenfit.questions.summary.verdict import NOT_CONVERGED, verdict
+from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
 
@@ -196,7 +196,7 @@ def compare(
         {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
         unit,
         few,
-        {name: tuple(found.troubles) for name, fit in ordered.items() if (found := verdict(fit)).troubles},
+        {name: tuple(found.troubles) for name, fit in ordered.items() if (found := assess_fit(fit)).troubles},
     )
 
 

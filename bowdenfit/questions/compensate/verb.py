@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Quantity, as_pair, number_with_unit, read_first
-from bowdenfit.questions.writing import figures_of, files_of, write_answer
+from bowdenfit.questions.writing import answer_figures, answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -107,9 +107,9 @@ def _write(answer: "Compensation", folder: Path, cable: str) -> None:
 def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compensate.words import compensation_text
 
-    files = files_of(options["output"], NAME) if options["output"] else []
+    files = answer_files(options["output"], NAME) if options["output"] else []
     if files and answer.simulated is not None:
-        files += figures_of(options["output"], TRACES)
+        files += answer_figures(options["output"], TRACES)
     notes = tuple(f"Wrote {path}." for path in files)
     return Reply(compensation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 

@@ -26,7 +26,7 @@ from bowdenfit.questions.export.transmission import (
     TablePoints,
     TransmissionTables,
 )
-from bowdenfit.questions.predict.outside import measured
+from bowdenfit.questions.predict.measured_range import measured_range
 from bowdenfit.results.record import Record
 
 SUPPORTED_OPTIONS = (
@@ -128,7 +128,7 @@ def _interpolation_error(curve: np.ndarray) -> float:
 
 def _describe_ranges(fit: Record, bent: bool) -> tuple[str, ...]:
     """Loads, lengths and wrap angles measured at, in words."""
-    limits, ranges = measured(fit), []
+    limits, ranges = measured_range(fit), []
     if bent:
         bends = np.rad2deg(elastic_answers(fit).measured_bends)
         ranges.append(f"wrap angles {bends[0]:.4g} to {bends[-1]:.4g} deg")

@@ -72,7 +72,7 @@ def export(
     from bowdenfit.questions.export.tables import tabulate_transmission
     from bowdenfit.questions.export.words import identifier
     from bowdenfit.questions.export.writers import WRITERS, ExportRequest
-    from bowdenfit.questions.summary.verdict import verdict
+    from bowdenfit.questions.summary.verdict import assess_fit
     from bowdenfit.results.folder import file_to_write
 
     path = Path(identifier(fit.name) + _ENDINGS[to] if output is None else output)
@@ -81,7 +81,7 @@ def export(
     fit.draws()
     refuse_inexpressible(fit, to, draws)
     compensation = None if device is None else _compensation(fit, to, Path(device))
-    trust = verdict(fit)
+    trust = assess_fit(fit)
     tables = tabulate_transmission(fit, points, draws, " and ".join(trust.troubles))
     content = WRITERS[to](
         ExportRequest(fit, tables, path, convert_point(fit, tables.points, to, as_pair(at)), compensation)

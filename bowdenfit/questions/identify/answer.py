@@ -4,10 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from bowdenfit.display import Display, Named, Rows
-from bowdenfit.inference.identifiability import Combination, CovarianceAnalysis, ParameterContraction
-from bowdenfit.results.serialization import values_by_key
-from bowdenfit.words import decimals, listed, significant
+from bowdenfit.display import Display, Named, Rows, text_of
+from bowdenfit.inference.identifiability import (
+    IDENTIFIABLE,
+    PRIOR_DOMINATED,
+    Combination,
+    CovarianceAnalysis,
+    ParameterContraction,
+)
+from bowdenfit.results.serialization import deserialize, values_by_key
+from bowdenfit.words import decimals, filled, legend, listed, narrow_table, percent, significant
 
 if TYPE_CHECKING:
     from bowdenfit.inference.profiles import Profile
@@ -53,12 +59,12 @@ class Identifiability(Display):
     def sentences(self) -> list[str]:
         """What is known, in words: friction first, and a remedy where something is not."""
         friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
-        said = [say_what_is_determined(friction, self.measured)] if friction else []
+        sentences = [describe_identified(friction, self.measured)] if friction else []
         if elastic is not None:
-            said.append(say_what_is_determined(elastic, self.measured, "Of how the cable gives they determine"))
+            sentences.append(describe_identified(elastic, self.measured, "Of how the cable gives they determine"))
         if friction is not None and (friction.undetermined or friction.determined):
-            said.append(_REMEDY)
-        return said
+            sentences.append(_REMEDY)
+        return sentences
 
     def _table(self) -> Rows:
         rows = [
@@ -74,32 +80,106 @@ class Identifiability(Display):
         return Named({p.name: Named({"value": p.values, "rise": p.rise}) for p in self.profiles})
 
 
-def say_what_is_determined(found: CovarianceAnalysis, measured: bool, opening: str = "") -> str:
+def describe_identified(analysis: CovarianceAnalysis, measured: bool, opening: str = "") -> str:
     """What some parameters are known to, in one sentence.
 
     Args:
-        found: What is known.
+        analysis: What is known of them.
         measured: Whether readings entered.
         opening: How the sentence begins.
     """
     opening = opening or ("These measurements determine" if measured else "Measurements by this plan would determine")
-    parts = [f"{p.name} {how_well(p)}" for p in found.identified]
-    parts += [f"{c.words} {how_well(c)}" for c in found.determined]
-    said = f"{opening} {listed(parts)}" if parts else f"{opening} no coefficient by itself"
-    resting, half = found.resting, found.partly_identified
-    if half:
-        verb = "owes" if len(half) == 1 else "owe"
-        said += f"; {listed([p.name for p in half])} {verb} about as much to the prior as to them"
-    if resting:
-        verb = "rests on its prior" if len(resting) == 1 else "rest on their priors"
-        said += f"; {listed(resting)} {verb}"
-    if found.sharpest is not None and not found.determined:
-        said += f"; sharpest of all is {found.sharpest.words}, {how_well(found.sharpest)}"
-    return said + "."
+    parts = [f"{p.name} {describe_precision(p)}" for p in analysis.identified]
+    parts += [f"{c.words} {describe_precision(c)}" for c in analysis.determined]
+    sentence = f"{opening} {listed(parts)}" if parts else f"{opening} no coefficient by itself"
+    prior_driven, partly = analysis.resting, analysis.partly_identified
+    if partly:
+        verb = "owes" if len(partly) == 1 else "owe"
+        sentence += f"; {listed([p.name for p in partly])} {verb} about as much to the prior as to them"
+    if prior_driven:
+        verb = "rests on its prior" if len(prior_driven) == 1 else "rest on their priors"
+        sentence += f"; {listed(prior_driven)} {verb}"
+    if analysis.sharpest is not None and not analysis.determined:
+        sentence += f"; sharpest of all is {analysis.sharpest.words}, {describe_precision(analysis.sharpest)}"
+    return sentence + "."
 
 
-def how_well(known: ParameterContraction | Combination) -> str:
+def describe_precision(known: ParameterContraction | Combination) -> str:
     """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
         return f"to {significant(100 * known.sd / abs(known.value), 2)} %"
     return f"to ± {known.sd:z.{decimals(known.sd)}f}"
+
+
+_COLLINEAR = 1000.0  # condition number beyond which parameters are hardly told apart
+_CORRELATED = 0.9  # correlation beyond which two of them are
+
+
+def rebuild_identifiability(stored: Mapping[str, Any]) -> Identifiability:
+    """Identifiability from the plain data that are stored in a results folder; profiles are not stored."""
+    groups = deserialize(dict[str, CovarianceAnalysis], stored["groups"])
+    words = {"units": stored["units"], "meanings": stored["meanings"]}
+    return Identifiability(stored["name"], stored["basis"], stored["measured"], groups, **words)
+
+
+@text_of.register(Identifiability)
+def identifiability_text(result: Identifiability) -> str:
+    """What measurements determine, for people: the answer first, then parameters and combinations."""
+    first, *others = result.sentences() or ["There is nothing to determine."]
+    blocks = ["\n".join(filled(sentence) for sentence in [f"{result.name}: {first[0].lower()}{first[1:]}", *others])]
+    for name, group in result.groups.items():
+        units = result.units if name != CURVES else {}  # of which numbers on a logarithmic scale have none that people know
+        blocks.append(_parameter_table(name, group, units))
+        if name != CURVES:
+            blocks.append(_combination_table(group))
+    named = {p.name for group in result.groups.values() for p in group.parameters}
+    blocks.append(legend({name: what for name, what in result.meanings.items() if name in named}))
+    blocks.append(
+        filled(
+            f"Judged at {result.basis}. ± is one standard deviation, now and before anything was measured; told by: who "
+            "settles the value, and how much of what was open before."
+        )
+    )
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> str:
+    heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
+    unit = {p.name: units.get(p.name, "1") for p in group.parameters}
+    rows: list[tuple[str, ...]] = [
+        (p.name, *_format_numbers(p), "" if unit[p.name] == "1" else unit[p.name], _describe_source(p.share))
+        for p in group.parameters
+    ]
+    if set(unit.values()) <= {"1"}:
+        heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
+    text = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "told by"))
+    correlated = [sorted((p.name, p.most_correlated)) for p in group.parameters if abs(p.correlation) > _CORRELATED]
+    pairs = [f"{first} and {second}" for first, second in dict.fromkeys(map(tuple, correlated))]
+    if len(group.parameters) > 1 and not group.collinearity < _COLLINEAR:
+        pairs = [*pairs, "all of them together"]
+    return "\n".join([text, filled(f"Hard to tell apart: {'; '.join(pairs)}.")]) if pairs else text
+
+
+def _format_numbers(p: ParameterContraction) -> tuple[str, str, str]:
+    digits = decimals(p.sd)
+    return f"{p.value:z.{digits}f}", f"± {p.sd:z.{digits}f}", f"± {p.prior_sd:z.{digits}f}"
+
+
+def _describe_source(share: float) -> str:
+    """What settles it: measurements, or what was assumed before."""
+    if share < IDENTIFIABLE:
+        return f"measurements ({percent(1 - share, 0)})"
+    return f"assumption ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (assumption {percent(share, 0)})"
+
+
+def _combination_table(group: CovarianceAnalysis) -> str:
+    """Independent combinations, the best determined first; of a single parameter there is nothing more to say."""
+    if len(group.directions) < 2:
+        return ""
+    rows = [(combination.words, *_format_sum(combination)) for combination in group.directions]
+    return "Independent sums, the best determined first\n" + narrow_table(("", "value", "known to"), rows)
+
+
+def _format_sum(d: Combination) -> tuple[str, str]:
+    digits = decimals(d.sd)
+    return f"{d.value:z.{digits}f}", f"± {d.sd:z.{digits}f}"

@@ -1,5 +1,9 @@
 """How a fit, or a plan, comes to know what its measurements determine: from draws, or from the information at one point."""
 
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar
+
 import jax
 import numpy as np
 
@@ -9,16 +13,20 @@ from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.model import Model
-from bowdenfit.questions.identify.answer import GROUPS, Identifiability, how_well
+from bowdenfit.questions.identify.answer import GROUPS, Identifiability, describe_precision
 from bowdenfit.results.record import Record, cached_per_fit
-from bowdenfit.words import listed
+from bowdenfit.words import listed, significant
 
-DRAWS = "what the fit found"
+BASIS_DRAWS = "what the fit found"
 _STEP = 1e-4  # of z, from which a slope is told to a part in 10^8
 
 
+_ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
+_CONFOUNDED = 0.9  # correlation beyond which two parameters are said to be confounded
+_WELL_KNOWN = 0.1  # relative standard deviation below which a positive quantity is known well
+_WORTH_SAYING = 0.5  # the combination must be known to less than this share of what it would be without the correlation
 @cached_per_fit
-def identifiability(fit: Record) -> Identifiability:
+def assess_identifiability(fit: Record) -> Identifiability:
     """What a fit knows, from its draws.
 
     Args:
@@ -27,16 +35,18 @@ def identifiability(fit: Record) -> Identifiability:
     Raises:
         UsageError: There is no posterior.
     """
-    drawn = fit.draws()
-    values = np.column_stack([drawn.values[p.name].ravel() for p in fit.model.space.free])
+    posterior = fit.draws()
+    values = np.column_stack([posterior.values[p.name].ravel() for p in fit.model.space.free])
     spread = np.cov(values, rowvar=False).reshape(values.shape[1], values.shape[1])
     with jax.enable_x64(True):
-        _, prior_sd = _linear(fit.model, values_program(fit), np.median(drawn.flat_z, axis=0))
-    groups = _groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
-    return Identifiability(fit.name, DRAWS, True, groups, units=fit.posterior.units, meanings=_meanings(fit.model))
+        _, prior_sd = _linearize(fit.model, values_program(fit), np.median(posterior.flat_z, axis=0))
+    groups = _analyze_groups(fit.model, np.mean(values, axis=0), spread, prior_sd)
+    return Identifiability(
+        fit.name, BASIS_DRAWS, True, groups, units=fit.posterior.units, meanings=_parameter_meanings(fit.model)
+    )
 
 
-def of_maximum(
+def identifiability_at_maximum(
     model: Model, start: MaximumPosterior, basis: str, measured: bool, profiles: tuple[Profile, ...] = ()
 ) -> Identifiability:
     """What measurements will tell, or tell before sampling: from the Fisher information at one point.
@@ -48,20 +58,20 @@ def of_maximum(
         measured: Whether readings entered.
         profiles: Of the friction coefficients.
     """
-    covariance = _with_tails(model, np.asarray(start.covariance))
+    covariance = _adjust_for_student(model, np.asarray(start.covariance))
     with jax.enable_x64(True):
-        value, slope = _linear(model, _compile_values(model), np.asarray(start.z))
-    groups = _groups(model, value, covariance * np.outer(slope, slope), slope)
+        value, slope = _linearize(model, _compile_values(model), np.asarray(start.z))
+    groups = _analyze_groups(model, value, covariance * np.outer(slope, slope), slope)
     units = {p.name: p.unit for p in model.space.free}
-    return Identifiability(model.description.name, basis, measured, groups, profiles, units, _meanings(model))
+    return Identifiability(model.description.name, basis, measured, groups, profiles, units, _parameter_meanings(model))
 
 
-def _meanings(model: Model) -> dict[str, str]:
+def _parameter_meanings(model: Model) -> dict[str, str]:
     """What each parameter is, in words."""
     return {p.name: p.meaning for p in model.space.free}
 
 
-def _with_tails(model: Model, covariance: np.ndarray) -> np.ndarray:
+def _adjust_for_student(model: Model, covariance: np.ndarray) -> np.ndarray:
     """The covariance, with the information of Student-t readings: nu / (nu + 3) of what residuals near zero suggest."""
     description = model.description
     if description.noise != "student":
@@ -80,47 +90,51 @@ def _compile_values(model: Model) -> DrawFunction:
     return for_each_draw(value_function(model), model.space.size, run_once=True)
 
 
-def _linear(model: Model, values_of: DrawFunction, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _linearize(model: Model, values_of: DrawFunction, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
-    found = values_of(z + _STEP * np.array([[0.0], [-1.0], [1.0]]))
-    value, below, above = np.column_stack([found[p.name] for p in model.space.free])
+    values = values_of(z + _STEP * np.array([[0.0], [-1.0], [1.0]]))
+    value, below, above = np.column_stack([values[p.name] for p in model.space.free])
     slope = (above - below) / (2 * _STEP)
     return value, np.maximum(np.abs(slope), 1e-12 * np.maximum(np.abs(value), 1.0))
 
 
-def _groups(model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray) -> dict[str, CovarianceAnalysis]:
+def _analyze_groups(
+    model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
+) -> dict[str, CovarianceAnalysis]:
     """Knowledge of every group, in shown units."""
-    found = {}
+    analyses = {}
     for group, roles in GROUPS.items():
         which = np.array([i for i, p in enumerate(model.space.free) if p.role in roles], dtype=int)
         if len(which):
             names = [model.space.free[i].name for i in which]
-            found[group] = analyze_covariance(names, value[which], covariance[np.ix_(which, which)], prior_sd[which])
-    return found
+            analyses[group] = analyze_covariance(names, value[which], covariance[np.ix_(which, which)], prior_sd[which])
+    return analyses
 
 
-def say_what_is_not_determined(fit: Record) -> str:
+def describe_unidentified(fit: Record) -> str:
     """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
     that it rests on that. The same holds for what the data sheet of a load cell says.
     """
-    names = [p.name for p in fit.model.space.free if p.role == "friction" and not _stated(fit, p.name)]
+    names = [p.name for p in fit.model.space.free if p.role == "friction" and not _has_stated_prior(fit, p.name)]
     if fit.sampled is None:
-        return _in_words([name for name in names if _undetermined(fit, name) or _nothing_or_anything(fit, name)], None)
-    friction = identifiability(fit).groups.get("friction")
+        return _unidentified_sentence(
+            [name for name in names if _undetermined(fit, name) or _may_be_zero_or_usual(fit, name)], None
+        )
+    friction = assess_identifiability(fit).groups.get("friction")
     if friction is None:
         return ""
     share = {p.name: p.share for p in friction.parameters}
-    lost = [
+    unidentified = [
         n
         for n in names
         if share[n] > PRIOR_DOMINATED or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.unidentified)
     ]
-    if not lost and not friction.identified and not friction.determined:
-        return _in_words(names, None, " in good part")
-    known = next((c for c in friction.determined if set(c.weights) & set(lost)), None)
-    return _in_words(lost, known)
+    if not unidentified and not friction.identified and not friction.determined:
+        return _unidentified_sentence(names, None, " in good part")
+    combination = next((c for c in friction.determined if set(c.weights) & set(unidentified)), None)
+    return _unidentified_sentence(unidentified, combination)
 
 
 def _as_wide_as_prior(fit: Record, name: str) -> bool:
@@ -137,7 +151,7 @@ def _undetermined(fit: Record, name: str) -> bool:
     return estimates[name].remark == UNDETERMINED
 
 
-def _nothing_or_anything(fit: Record, name: str) -> bool:
+def _may_be_zero_or_usual(fit: Record, name: str) -> bool:
     """Whether least squares runs to no friction at all and does not exclude what its prior thinks usual either.
 
     A contact that hardly rubs is one of which more is excluded; that contradictory readings do so is as likely.
@@ -148,22 +162,93 @@ def _nothing_or_anything(fit: Record, name: str) -> bool:
     return not estimate.upper < value_at(parameter.prior, 0.0) * parameter.shown_scale
 
 
-def _in_words(lost: list[str], known: Combination | None, how_much: str = "") -> str:
-    if not lost:
+def _unidentified_sentence(names: list[str], combination: Combination | None, how_much: str = "") -> str:
+    if not names:
         return ""
-    them = listed(lost)
-    if known is not None:
-        said = f"The measurements do not tell {them} apart: what they determine is {known.words}, {how_well(known)}"
+    them = listed(names)
+    if combination is not None:
+        precision = describe_precision(combination)
+        sentence = f"The measurements do not tell {them} apart: what they determine is {combination.words}, {precision}"
     else:
-        said = f"The measurements do not determine {them}"
-    rest = "rest on their priors" if len(lost) > 1 else "rests on its prior"
+        sentence = f"The measurements do not determine {them}"
+    remark = "rest on their priors" if len(names) > 1 else "rests on its prior"
     return (
-        f"{said}; {them} by {'themselves' if len(lost) > 1 else 'itself'} {rest}{how_much}. Efficiencies where you measured "
-        "still hold, the coefficients do not: measure where the wrap angles change in other proportions, or state a "
+        f"{sentence}; {them} by {'themselves' if len(names) > 1 else 'itself'} {remark}{how_much}. Efficiencies where you "
+        "measured still hold, the coefficients do not: measure where the wrap angles change in other proportions, or state a "
         "coefficient that was measured separately under [friction.NAME]."
     )
 
 
-def _stated(fit: Record, name: str) -> bool:
+def _has_stated_prior(fit: Record, name: str) -> bool:
     """Whether the description says something of a coefficient beyond naming it."""
     return name in fit.dataset.description.friction
+
+
+@dataclass(frozen=True)
+class ConfoundedPair:
+    """Two parameters of which only a combination is known.
+
+    Args:
+        first, second: Their names.
+        factor: The combination is first + factor x second, in shown units.
+        mean, sd: Of the combination.
+        first_sd, second_sd: Of the parameters by themselves.
+        correlation: Of their draws.
+    """
+
+    first: str
+    second: str
+    factor: float
+    mean: float
+    sd: float
+    first_sd: float
+    second_sd: float
+    correlation: float
+
+    JSON: ClassVar = (..., "combination")
+
+    @property
+    def combination(self) -> str:
+        """The combination in symbols."""
+        sign = "+" if self.factor >= 0 else "-"
+        return f"{self.first} {sign} {significant(abs(self.factor))} {self.second}"
+
+    def sentence(self) -> str:
+        """What to say of it."""
+        digits = int(np.clip(1 - np.floor(np.log10(max(self.sd, 1e-12))), 0, 8))
+        return (
+            f"The measurements hardly tell {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); what "
+            f"they do determine is {self.combination} = {self.mean:z.{digits}f} ± {self.sd:z.{digits}f}, while {self.first} "
+            f"alone is known to ± {significant(self.first_sd, 2)}."
+        )
+
+
+def confounded_pairs(fit: Record) -> list[ConfoundedPair]:
+    """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
+    if fit.sampled is None:
+        return []
+    names = [
+        p.name for p in fit.model.space.free if p.role in _ROLES and not (p.role == "elastic" and _is_well_known(fit, p.name))
+    ]
+    pairs = [_analyze_pair(fit, a, b) for a, b in combinations(names, 2)]
+    confounded = [pair for pair in pairs if abs(pair.correlation) > _CONFOUNDED and pair.sd < _WORTH_SAYING * pair.first_sd]
+    return sorted(confounded, key=lambda pair: -abs(pair.correlation))
+
+
+def _is_well_known(fit: Record, name: str) -> bool:
+    """Whether a parameter is known well by itself, so that what it is correlated with does not matter."""
+    draws = fit.posterior.values[name]
+    return bool(np.std(draws) < _WELL_KNOWN * np.abs(np.median(draws)))
+
+
+def _analyze_pair(fit: Record, first: str, second: str) -> ConfoundedPair:
+    a, b = fit.posterior.values[first].ravel(), fit.posterior.values[second].ravel()
+    covariance = np.cov(a, b)
+    factor = -covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0
+    spread = np.sqrt(covariance[0, 0] * covariance[1, 1])
+    correlation = float(covariance[0, 1] / spread) if spread > 0 else 0.0
+    combination = a + factor * b
+    a_sd, b_sd = (float(np.std(x)) for x in (a, b))
+    return ConfoundedPair(
+        first, second, float(factor), float(combination.mean()), float(combination.std()), a_sd, b_sd, correlation
+    )

@@ -1,1 +1,5 @@
-"""Which length is best?"""
+"""Which length is best, and efficiency along the route; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -5,24 +5,56 @@ import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function
+from bowdenfit.kinds import readings_called
+from bowdenfit.kinds.places import route_values
 from bowdenfit.plots.curves import BAND_QUANTILES, Band
+from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.results.along_route import route_grid
-from bowdenfit.results.record import Record, cached_per_fit
+from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit
 
-_DRAWS = 5000  # enough for a line's width of accuracy
+_DRAWS = 5000  # from so many draws a quantile is off by less than the width of a line on paper
 
 
 @cached_per_fit
-def along_route(fit: Record) -> dict[str, Band]:
+def curves_along_route(fit: Record) -> dict[str, Band]:
     """The efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
     if fit.dataset.description.route is None:
         return {}
     if fit.sampled is not None:
         grid, draws = fit.along_route.grid, fit.along_route.curves
-        every = max(1, len(fit.posterior.flat_z) // _DRAWS)
-        return {name: Band(grid, np.quantile(d[::every], BAND_QUANTILES, axis=0)) for name, d in draws.items()}
+        step = max(1, len(fit.posterior.flat_z) // _DRAWS)
+        return {name: Band(grid, np.quantile(d[::step], BAND_QUANTILES, axis=0)) for name, d in draws.items()}
     grid = route_grid(fit.model)
     with jax.enable_x64(True):
         z = np.asarray(fit.least_squares.z)
         lines = compile_program(curve_function(fit.model, grid), z, run_once=True)(z)
     return {name: Band(grid, np.asarray(line)[None]) for name, line in lines.items()}
+
+
+def new_run_interval(fit: Record) -> np.ndarray:
+    """Quantiles of the efficiency of a run along the route, whose mounting shifts the friction exponent."""
+    efficiency, thinned = fit.along_route.curves["efficiency"], slice(None, None, max(1, len(fit.mounting()) // _DRAWS))
+    mounted = efficiency[thinned] * np.exp(-fit.mounting()[thinned, None])
+    return np.quantile(mounted, (BAND_QUANTILES[0], BAND_QUANTILES[-1]), axis=0)
+
+
+def optimal_length_draws(fit: Record) -> np.ndarray:
+    """Draws of the optimal length, in the unit of the route."""
+    return np.asarray(fit.posterior.optimum[OPTIMAL_LENGTH])
+
+
+def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
+    """Every measured efficiency, by table."""
+    route, points = fit.dataset.description.route, []
+    for term in fit.model.terms:
+        reading_kind, position = readings_called(term.name), route_values(term)
+        if not reading_kind.are_efficiencies:
+            continue
+        if route is None or position is None:
+            position = np.full(len(term.labels), np.nan)
+        predicted = fit.least_squares.readings[term.name][None]
+        if fit.sampled is not None:
+            predicted = np.quantile(fit.posterior.replicated[term.name], BAND_QUANTILES, axis=(0, 1))
+        inside = (position >= route.range[0]) & (position <= route.range[1]) if route else np.ones(len(position), dtype=bool)
+        points.append(EfficiencyPoints(reading_kind.are_runs, term.labels, position, term.observed(), predicted, inside))
+    return tuple(points)

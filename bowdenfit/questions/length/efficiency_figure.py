@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.captions import describe_strip
-from bowdenfit.plots.curves import (
-    BAND_QUANTILES,
-    GRID_POINTS,
-    NEW_RUN,
-    Band,
-    density,
-    draw_band,
-    route_limits,
-    shade_outside,
-)
+from bowdenfit.plots.curves import GRID_POINTS, NEW_RUN, Band, density, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import TITLE, legend_above, panels, wrap_words
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import (
@@ -33,24 +24,45 @@ from bowdenfit.plots.style import (
     percent,
     rounded_texts,
 )
-from bowdenfit.questions.length.efficiency_points import EfficiencyPoints, efficiency_points
+from bowdenfit.questions import length
 from bowdenfit.results.optimal_length import OptimalLength
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-# marker, its size [pt] and label
 HEADING = "Efficiency along the route"
+# marker, its size [pt] and label
 READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
-MOST_NUMBERS, LEAST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
+MOST_NUMBERS, SMALLEST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
 LEAST_AT_EDGE = 0.005
-DRAWS = 5000  # of a band
 DOTS = (0, (1, 1.2))
 
 
 @dataclass(frozen=True)
-class AlongRoute:
+class EfficiencyPoints:
+    """Measured efficiencies [1].
+
+    Args:
+        of_runs: Whether each is the mean of a run.
+        labels: Each in words.
+        route: Route value; NaN without a route.
+        measured: Efficiency.
+        predicted: Quantiles (`BAND_QUANTILES`, first axis) of readings drawn anew; one row, least squares', without
+            draws.
+        inside: Whether it lies within the range of the curves.
+    """
+
+    of_runs: bool
+    labels: tuple[str, ...]
+    route: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    inside: np.ndarray
+
+
+@dataclass(frozen=True)
+class EfficiencyAlongRoute:
     """Efficiency along the route, and its optimum.
 
     Args:
@@ -75,41 +87,33 @@ class AlongRoute:
     new_run: np.ndarray | None = None
 
 
-def data(fit: Record) -> AlongRoute | None:
+def data(fit: Record) -> EfficiencyAlongRoute | None:
     """What is shown; None without a route."""
-    from bowdenfit.questions.length.curves import along_route
-    from bowdenfit.results.record import OPTIMAL_LENGTH
-
     route, posterior = fit.dataset.description.route, fit.sampled
     if route is None:
         return None
     friction = fit.model.cable.friction
     force = friction.conditions.reference_force if friction.depends_on_load else None
-    points = efficiency_points(fit)
-    shown = AlongRoute(route.label, route.range, along_route(fit)["efficiency"], points, at_input_force=force)
+    points = length.efficiency_points(fit)
+    shown = EfficiencyAlongRoute(
+        route.label, route.range, length.curves_along_route(fit)["efficiency"], points, at_input_force=force
+    )
     if posterior is None:
         return shown
-    mounted = _new_run(fit) if any(p.of_runs for p in points) else None
+    mounted = length.new_run_interval(fit) if any(p.of_runs for p in points) else None
     return replace(
-        shown, optimum=fit.optimal_length(), optimal_length=posterior.optimum[OPTIMAL_LENGTH], new_run=mounted
+        shown, optimum=fit.optimal_length(), optimal_length=length.optimal_length_draws(fit), new_run=mounted
     )
 
 
-def _new_run(fit: Record) -> np.ndarray:
-    """Quantiles of the efficiency of a run along the route, whose mounting shifts the friction exponent."""
-    efficiency, every = fit.along_route.curves["efficiency"], slice(None, None, max(1, len(fit.mounting()) // DRAWS))
-    mounted = efficiency[every] * np.exp(-fit.mounting()[every, None])
-    return np.quantile(mounted, (BAND_QUANTILES[0], BAND_QUANTILES[-1]), axis=0)
-
-
-def caption(data: AlongRoute) -> str:
+def caption(data: EfficiencyAlongRoute) -> str:
     """What is drawn, in plain words."""
-    n, drawn = sum(len(points.labels) for points in data.points), not data.efficiency.is_line
+    n, has_draws = sum(len(points.labels) for points in data.points), not data.efficiency.is_line
     best = data.optimum
     return " ".join(filter(None, (
         "Efficiency of the cable, output over input force, against the length.",
         "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability."
-        if drawn else "Line: least squares.",
+        if has_draws else "Line: least squares.",
         "Dotted: nine of ten runs lie between these lines, because no two mountings are alike."
         if data.new_run is not None else "",
         describe_strip("in percent of the input force") if n else "",
@@ -123,30 +127,32 @@ def caption(data: AlongRoute) -> str:
 
 
 @in_paper_style
-def draw(data: AlongRoute, width: float | None = None) -> Figure:
+def draw(data: EfficiencyAlongRoute, width: float | None = None) -> Figure:
     """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
-    read = any(np.isfinite(points.route).any() for points in data.points)
-    figure, flat = panels([2.3] + [STRIP] * read + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.02), width or WIDE, sharex=True)
-    shown = route_limits(data.route_range, *(points.route for points in data.points))
-    _curve_and_points(flat[0], data)
-    if read:
-        _residuals(flat[1], data)
+    has_points = any(np.isfinite(points.route).any() for points in data.points)
+    figure, flat = panels(
+        [2.3] + [STRIP] * has_points + [0.75] * below, 1, 0.08, (0.0, TITLE + 0.02), width or WIDE, sharex=True
+    )
+    x_limits = route_limits(data.route_range, *(points.route for points in data.points))
+    _draw_curve_and_points(flat[0], data)
+    if has_points:
+        _draw_residuals(flat[1], data)
         place_names(flat[0], flat[1])
     if data.optimum is not None:
-        _optimum(flat[1 + read], data, data.optimum)
-        for axes in (flat[0], flat[1 + read]):
-            _mark_optimum(axes, data.optimum)
+        _draw_optimum_density(flat[1 + has_points], data, data.optimum)
+        for axes in (flat[0], flat[1 + has_points]):
+            _draw_optimum_marks(axes, data.optimum)
         if data.optimum.choices:
-            _choices(flat[2 + read], data.optimum, float(np.ptp(data.route_range)))
+            _draw_choices(flat[2 + has_points], data.optimum, float(np.ptp(data.route_range)))
     for axes in flat:
-        shade_outside(axes, data.route_range, shown)
+        shade_outside(axes, data.route_range, x_limits)
     flat[-1].set_xlabel(data.route_label)
     legend_above(figure, flat[:1], columns=3)
     return figure
 
 
-def _residuals(strip: Axes, data: AlongRoute) -> None:
+def _draw_residuals(strip: Axes, data: EfficiencyAlongRoute) -> None:
     """Measured less predicted, and where a reading would lie with 90 % probability if it were taken anew."""
     for points in data.points:
         marker, size, _ = RUN if points.of_runs else READING
@@ -163,22 +169,22 @@ def _residuals(strip: Axes, data: AlongRoute) -> None:
     name_strip(strip, "%")
 
 
-def _curve_and_points(axes: Axes, data: AlongRoute) -> None:
+def _draw_curve_and_points(axes: Axes, data: EfficiencyAlongRoute) -> None:
     draw_band(axes, data.efficiency, scale=100.0)
     if data.new_run is not None:
         for end in data.new_run:
             axes.plot(data.efficiency.route, 100 * end, color=BLUE, linewidth=0.8, linestyle=DOTS, label=NEW_RUN)
     for points in data.points:
-        _measured(axes, points, points.inside, BLACK, "")
+        _draw_measured(axes, points, points.inside, BLACK, "")
         outside = ~points.inside & np.isfinite(points.route)
         if outside.any():
-            _predicted(axes, points, outside)
-            _measured(axes, points, outside, "white", ", outside the range")
+            _draw_predicted(axes, points, outside)
+            _draw_measured(axes, points, outside, "white", ", outside the range")
     axes.set_ylabel(EFFICIENCY if data.at_input_force is None else f"{EFFICIENCY}\ncurve at {data.at_input_force:g} N")
     axes.locator_params(axis="y", nbins=6)
 
 
-def _measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
+def _draw_measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
     """Some of the measured points; the note is added to their label."""
     marker, size, label = RUN if points.of_runs else READING
     if where.any():
@@ -188,7 +194,7 @@ def _measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str
         )  # fmt: skip
 
 
-def _predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
+def _draw_predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
     """What is predicted where there is no curve: median with 90 % interval, or the least-squares value."""
     predicted, route = 100 * points.predicted[:, where], points.route[where]
     if len(predicted) == 1:
@@ -201,7 +207,7 @@ def _predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
     )  # fmt: skip
 
 
-def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
+def _draw_optimum_density(axes: Axes, data: EfficiencyAlongRoute, optimum: OptimalLength) -> None:
     assert data.optimal_length is not None  # comes with the optimum
     grid = np.linspace(*data.route_range, 2 * GRID_POINTS)
     height = density(data.optimal_length, grid, *data.route_range)
@@ -213,15 +219,15 @@ def _optimum(axes: Axes, data: AlongRoute, optimum: OptimalLength) -> None:
     axes.locator_params(axis="y", nbins=3)
     if optimum.at_edge > LEAST_AT_EDGE:
         left = bool(optimum.length.median > np.mean(data.route_range))
-        said = f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability"
+        remark = f"at an end of the range with {percent(round(optimum.at_edge, 3))} probability"
         room = 0.4 * axes.bbox.width / axes.figure.dpi  # beside the density
         axes.text(
-            0.03 if left else 0.97, 0.9, wrap_words(said, room),
+            0.03 if left else 0.97, 0.9, wrap_words(remark, room),
             transform=axes.transAxes, ha="left" if left else "right", va="top", fontsize=SMALL,
         )  # fmt: skip
 
 
-def _mark_optimum(axes: Axes, optimum: OptimalLength) -> None:
+def _draw_optimum_marks(axes: Axes, optimum: OptimalLength) -> None:
     """The median optimum, and the window of lengths that are good enough."""
     length, window, unit = optimum.length, optimum.window, optimum.unit
     median, low, high = rounded_texts((length.median, length.q05, length.q95), length.q95 - length.q05)
@@ -234,20 +240,20 @@ def _mark_optimum(axes: Axes, optimum: OptimalLength) -> None:
         )
 
 
-def _choices(axes: Axes, optimum: OptimalLength, span: float) -> None:
+def _draw_choices(axes: Axes, optimum: OptimalLength, span: float) -> None:
     """A bar for each choice; lengths that are far apart get bars of a tenth of the span at most."""
     lengths = np.array([choice.length for choice in optimum.choices])
-    chance = 100 * np.array([choice.probability_best for choice in optimum.choices])
+    probability = 100 * np.array([choice.probability_best for choice in optimum.choices])
     width = 0.5 * float(np.min(np.diff(np.unique(lengths)), initial=0.1 * span))
-    axes.bar(lengths, chance, width, color=ORANGE, edgecolor=BLACK, linewidth=0.6)
+    axes.bar(lengths, probability, width, color=ORANGE, edgecolor=BLACK, linewidth=0.6)
     axes.plot(lengths, np.zeros(len(lengths)), "|", color=BLACK, clip_on=False, markersize=5)
     if len(lengths) <= MOST_NUMBERS:
-        for length, height in zip(lengths, chance, strict=True):
+        for length, height in zip(lengths, probability, strict=True):
             axes.annotate(
-                f"{height:.0f}" if height >= LEAST_NUMBER else "", (length, height), (0, 1.5), textcoords="offset points",
+                f"{height:.0f}" if height >= SMALLEST_NUMBER else "", (length, height), (0, 1.5), textcoords="offset points",
                 ha="center", va="bottom", fontsize=6,
             )  # fmt: skip
-    axes.set_ylim(0, 1.25 * chance.max())
+    axes.set_ylim(0, 1.25 * probability.max())
     axes.set_title("Which choice is the best", loc="left", fontsize=SMALL)
     axes.set_ylabel("Probability (%)", fontsize=SMALL)
     axes.locator_params(axis="y", nbins=3)

@@ -12,29 +12,29 @@ if TYPE_CHECKING:
 
 
 @read_first
-def length(found: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
+def length(fit: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
     """The design answer: which length is best, how sure that is, and what the lengths that can be bought cost.
 
     Args:
-        found: The fit.
+        fit: The fit.
 
     Raises:
         UsageError: The description has no route to vary, or there is no posterior.
     """
-    return found.optimal_length()
+    return fit.optimal_length()
 
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:
     return Reply(f"{answer}\n", lambda: answer, csv=answer.to_csv)
 
 
-def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
+def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
     if "length" not in answers:
         return None
     from bowdenfit.results.optimal_length import OptimalLength
     from bowdenfit.results.serialization import deserialize
 
-    return _reply(deserialize(OptimalLength, answers["length"]), asked)
+    return _reply(deserialize(OptimalLength, answers["length"]), options)
 
 
 VERB = Verb(
@@ -47,5 +47,5 @@ VERB = Verb(
     """,
     csv="Print the lengths that can be bought as CSV; where none are named, the best length and the efficiency there.",
     warns=True,
-    kept=_kept,
+    kept=_reply_from_stored,
 )

@@ -12,6 +12,7 @@ from bowdenfit.plots.curves import Band, draw_band, route_limits, shade_outside
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, WRAP_ANGLE, in_paper_style
+from bowdenfit.questions import length
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -55,15 +56,13 @@ class WrapAngles:
 
 def data(fit: Record) -> WrapAngles | None:
     """What is shown; None where no contact's wrap angle is a curve."""
-    route, curves = fit.dataset.description.route, angle_curves(fit)
+    route, curves = fit.dataset.description.route, collect_angle_curves(fit)
     return WrapAngles(curves, route.label, route.range) if route is not None and curves else None
 
 
-def angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
+def collect_angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
     """The curve and the readings of each curved contact."""
-    from bowdenfit.questions.length.curves import along_route
-
-    return tuple(_angle_curve(fit, column, along_route(fit)[column]) for column in fit.model.cable.curves)
+    return tuple(_angle_curve(fit, column, length.curves_along_route(fit)[column]) for column in fit.model.cable.curves)
 
 
 def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
@@ -88,17 +87,17 @@ def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
 
 def caption(data: WrapAngles) -> str:
     """What is drawn, in plain words."""
-    read = sum(len(c.route) for c in data.curves)
+    n_read = sum(len(c.route) for c in data.curves)
     limits, unused = sum(len(c.undetected_route) for c in data.curves), sum(len(c.outside_route) for c in data.curves)
-    drawn = not data.curves[0].band.is_line
+    has_draws = not data.curves[0].band.is_line
     return " ".join(filter(None, (
         f"Wrap angle of {counted(len(data.curves), 'contact')} along the route, with the curve through the readings.",
         "Line: median; bands: the intervals that hold the curve with 50 % and 90 % probability."
-        if drawn else "Line: least squares.",
+        if has_draws else "Line: least squares.",
         "Hatched: too small to be read, so anything between zero and the triangle." if limits else "",
         "Squares: outside the range of the curve, which does not use them." if unused else "",
         describe_strip("in degrees"),
-        f"n = {counted(read, 'reading')}" + (f" and {counted(limits, 'upper limit')}." if limits else "."),
+        f"n = {counted(n_read, 'reading')}" + (f" and {counted(limits, 'upper limit')}." if limits else "."),
     )))  # fmt: skip
 
 
@@ -107,29 +106,29 @@ def draw(data: WrapAngles, width: float | None = None) -> Figure:
     """Wrap angle [deg] of each curved contact against the route, a panel each."""
     everywhere = [route for c in data.curves for route in (c.route, c.undetected_route, c.outside_route)]
     shown = route_limits(data.route_range, *everywhere)
-    names, top = [curve.contact for curve in data.curves], (0.0, _highest(data.curves))
-    made = panels_with_strips(names, [shown] * len(names), [top] * len(names), MOST_COLUMNS, HEIGHT, width)
-    for axes, strip, curve in zip(made.mains, made.strips, data.curves, strict=True):
+    names, top = [curve.contact for curve in data.curves], (0.0, _axis_top(data.curves))
+    panels = panels_with_strips(names, [shown] * len(names), [top] * len(names), MOST_COLUMNS, HEIGHT, width)
+    for axes, strip, curve in zip(panels.mains, panels.strips, data.curves, strict=True):
         draw_band(axes, curve.band)
-        _readings(axes, curve)
-        strip.plot(curve.route, _off(curve), "o", color=BLACK, markersize=3.6)
+        _draw_readings(axes, curve)
+        strip.plot(curve.route, _residuals(curve), "o", color=BLACK, markersize=3.6)
         shade_outside(strip, data.route_range, shown)
-        _undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
+        _draw_undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
         shade_outside(axes, data.route_range, shown)
         axes.locator_params(axis="y", nbins=7)
-    made.finish_strips()
-    made.label(data.route_label, WRAP_ANGLE, "deg")
-    legend_above(made.figure, made.mains, columns=4 if made.columns > 1 else 2)
-    return made.figure
+    panels.finish_strips()
+    panels.label(data.route_label, WRAP_ANGLE, "deg")
+    legend_above(panels.figure, panels.mains, columns=4 if panels.columns > 1 else 2)
+    return panels.figure
 
 
-def _off(curve: AngleCurve) -> np.ndarray:
+def _residuals(curve: AngleCurve) -> np.ndarray:
     """Readings less the curve that they follow [deg]."""
     middle = curve.band.quantiles[len(curve.band.quantiles) // 2]
     return np.asarray(curve.angle - np.interp(curve.route, curve.band.route, middle))
 
 
-def _readings(axes: Axes, curve: AngleCurve) -> None:
+def _draw_readings(axes: Axes, curve: AngleCurve) -> None:
     """The readings that the curve follows, and those that it does not."""
     axes.plot(curve.route, curve.angle, "o", color=BLACK, label="Reading")
     if len(curve.outside_route):
@@ -139,7 +138,7 @@ def _readings(axes: Axes, curve: AngleCurve) -> None:
         )  # fmt: skip
 
 
-def _undetected(axes: Axes, curve: AngleCurve, route_range: tuple[float, float], spacing: float) -> None:
+def _draw_undetected(axes: Axes, curve: AngleCurve, route_range: tuple[float, float], spacing: float) -> None:
     """Readings that may be anything between zero and their limit."""
     route, limit = curve.undetected_route, curve.limit
     if not len(route):
@@ -158,7 +157,7 @@ def _spacing(routes: list[np.ndarray], shown: tuple[float, float]) -> float:
     return float(np.min(steps)) if len(steps) else 0.02 * (shown[1] - shown[0])
 
 
-def _highest(curves: tuple[AngleCurve, ...]) -> float:
+def _axis_top(curves: tuple[AngleCurve, ...]) -> float:
     """Top of the axis: above every reading, and above every interval unless that is far above the readings."""
     readings = np.concatenate([values for c in curves for values in (c.angle, c.limit, c.outside_angle)])
     band, reading = max(c.band.quantiles.max() for c in curves), readings.max(initial=0.0)

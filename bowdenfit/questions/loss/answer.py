@@ -12,14 +12,16 @@ from jaxtyping import Float
 
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
+from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.recorded.rate import usual_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
-from bowdenfit.words import counted, listed, percent
+from bowdenfit.words import counted, listed, percent, table
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence
 _FEW = 3  # contacts after the first that a sentence names
 
 
+HEADS = ("contact", "share", "90 % interval", "probability of the largest")
 @dataclass(frozen=True)
 class ContactShare:
     """One contact.
@@ -41,7 +43,7 @@ class ContactShare:
 
 
 @dataclass(frozen=True)
-class Loss:
+class LossByContact:
     """Shares of the contacts, the largest first.
 
     Args:
@@ -49,27 +51,27 @@ class Loss:
         contacts: Each contact's share.
     """
 
-    place: str
+    position: str
     contacts: tuple[ContactShare, ...]
 
-    JSON: ClassVar = (("at", "place"), "contacts", ("in_words", "sentence"))
+    JSON: ClassVar = (("at", "position"), "contacts", ("in_words", "sentence"))
 
     def sentence(self) -> str:
         """'72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at the squeezed sheath, ...'"""
-        first, *others = self.contacts
-        low, high = (percent(of, 0) for of in (first.share.q05, first.share.q95))
-        rest = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
+        largest, *others = self.contacts
+        low, high = (percent(end, 0) for end in (largest.share.q05, largest.share.q95))
+        remaining = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
         if len(others) > _FEW:
-            rest.append(f"the rest at {counted(len(others) - _FEW, 'other')}")
-        where = f"{self.place[0].upper()}{self.place[1:]}, " if self.place else ""
+            remaining.append(f"the rest at {counted(len(others) - _FEW, 'other')}")
+        where = f"{self.position[0].upper()}{self.position[1:]}, " if self.position else ""
         return (
-            f"{where}{percent(first.share.median, 0)} of the loss sits at {first.name!r} "
-            f"(90 % interval {low.removesuffix(' %')} to {high}), {listed(rest)}."
+            f"{where}{percent(largest.share.median, 0)} of the loss sits at {largest.name!r} "
+            f"(90 % interval {low.removesuffix(' %')} to {high}), {listed(remaining)}."
         )
 
 
 @cached_per_fit
-def loss_by_contact(fit: Record) -> Loss | None:
+def loss_by_contact(fit: Record) -> LossByContact | None:
     r"""Share of each contact in the friction exponent, at the best length if there is one; None without draws or contacts.
 
     .. math:: \frac{\mu_k \theta_k}{\sum_j \mu_j \theta_j}
@@ -83,19 +85,19 @@ def loss_by_contact(fit: Record) -> Loss | None:
     laws, route = fit.model.cable.laws, fit.dataset.description.route
     if fit.sampled is None or len(laws) < 2:
         return None
-    at, place = usual_length(fit)
+    route_value, position = usual_length(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
-        at, place = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"
-    shares = _shares(fit, at)
+        route_value, position = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"
+    shares = _contact_shares(fit, route_value)
     largest = np.argmax(shares, axis=1)
     contacts = [
         ContactShare(law.contact, Interval.of(shares[:, k]), float(np.mean(largest == k))) for k, law in enumerate(laws)
     ]
-    return Loss(place, tuple(sorted(contacts, key=lambda c: -c.share.median)))
+    return LossByContact(position, tuple(sorted(contacts, key=lambda c: -c.share.median)))
 
 
-def _shares(fit: Record, at: float) -> np.ndarray:
+def _contact_shares(fit: Record, at: float) -> np.ndarray:
     """Share of each contact (columns) in each draw (rows) at a value of the route variable."""
     cable = fit.model.cable
 
@@ -104,6 +106,34 @@ def _shares(fit: Record, at: float) -> np.ndarray:
         return jnp.stack([law.exponent(values, angles[:, k])[0] for k, law in enumerate(cable.laws)])
 
     with jax.enable_x64(True):
-        found = np.asarray(for_each_value(exponents, parameter_values(fit), np.array([at])))
-    total = np.sum(found, axis=1, keepdims=True)
-    return np.where(total > 0, found / np.where(total > 0, total, 1.0), 1 / len(cable.laws))
+        exponents_by_contact = np.asarray(for_each_value(exponents, parameter_values(fit), np.array([at])))
+    total = np.sum(exponents_by_contact, axis=1, keepdims=True)
+    return np.where(total > 0, exponents_by_contact / np.where(total > 0, total, 1.0), 1 / len(cable.laws))
+
+
+def loss_text(fit: Record) -> str:
+    """A table of the contacts' shares; empty for one contact, or without draws."""
+    loss = loss_by_contact(fit)
+    return f"{loss_heading(loss)}\n{table(HEADS, loss_rows(loss))}" if loss is not None else ""
+
+
+def loss_heading(loss: LossByContact) -> str:
+    """What is said of which place."""
+    return "Where the force is lost" + (f", {loss.position}" if loss.position else "")
+
+
+def loss_rows(loss: LossByContact) -> list[tuple[str, ...]]:
+    """A row for each contact, under `HEADS`."""
+    rows = list[tuple[str, ...]]()
+    for contact in loss.contacts:
+        interval = f"{percent(contact.share.q05)} to {percent(contact.share.q95)}"
+        rows.append((contact.name, percent(contact.share.median), interval, percent(contact.probability_largest, 0)))
+    return rows
+
+
+def loss_section(fit: Record) -> PageSection | None:
+    """The share of each contact; None for one contact, or without draws."""
+    loss = loss_by_contact(fit)
+    if loss is None:
+        return None
+    return prose_section("Where the force is lost", (), [PageTable(HEADS, tuple(loss_rows(loss)), loss_heading(loss))])

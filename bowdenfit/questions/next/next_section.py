@@ -1,6 +1,6 @@
 """What to measure next, ranked, in the report."""
 
-from bowdenfit.pages.section import Section, Table, prose
+from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.words import HOW_TO_READ, ranking_sentences, ranking_table
 
@@ -8,7 +8,7 @@ TITLE = "What to measure next"
 _TOP = 10
 
 
-def ranking_section(found: NextMeasurement) -> Section:
+def ranking_section(found: NextMeasurement) -> PageSection:
     """The advice, and the best candidates in a table."""
     heads, rows = ranking_table(found, _TOP)
-    return prose(TITLE, ranking_sentences(found), [Table(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)])
+    return prose_section(TITLE, ranking_sentences(found), [PageTable(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)])

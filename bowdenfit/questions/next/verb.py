@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
-from bowdenfit.questions.writing import files_of, write_answer
+from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def next_measurement(
 def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
     from bowdenfit.questions.next.words import next_measurement_text
 
-    notes = tuple(f"Wrote {path}." for path in files_of(asked["output"], NAME)) if asked["output"] else ()
+    notes = tuple(f"Wrote {path}." for path in answer_files(asked["output"], NAME)) if asked["output"] else ()
     return Reply(next_measurement_text(found, asked["top"]), lambda: found, notes, csv=found.to_csv)
 
 

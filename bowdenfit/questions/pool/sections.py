@@ -1,6 +1,6 @@
 """A pooled fleet as a page: the answer, the population, every cable, and what is not told."""
 
-from bowdenfit.pages.section import Page, Picture, Table, prose
+from bowdenfit.pages.section import HtmlPage, PageTable, Picture, prose_section
 from bowdenfit.questions.pool.answer import Pool
 from bowdenfit.questions.pool.figures import HEADINGS, captions
 from bowdenfit.questions.pool.words import (
@@ -16,7 +16,7 @@ from bowdenfit.questions.pool.words import (
 )
 
 
-def pool_page(pool: Pool) -> Page:
+def pool_page(pool: Pool) -> HtmlPage:
     """The page of a pooled fleet.
 
     Args:
@@ -28,22 +28,26 @@ def pool_page(pool: Pool) -> Page:
     cable_heads, cables = cable_rows(pool)
     left_out = [f"{inspection.inspection}: {inspection.why}." for inspection in pool.left_out]
     sections = (
-        prose(
+        prose_section(
             "The answer",
             [*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool), *next_sentences(pool)],
             headline=headline(pool),
             pictures=(pictures["pooled-life"], pictures["pooled-wear"]),
         ),
-        prose("What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [Table(heads, tuple(rows))]),
-        prose(
+        prose_section(
+            "What cables have in common",
+            [*effect_sentences(pool), how_to_read(pool)],
+            [PageTable(heads, tuple(rows))],
+        ),
+        prose_section(
             "Every cable",
             [
                 "Drawn toward the others as far as its own inspections leave it open, or by its own inspections alone if it is "
                 "unlike the rest; median ± standard deviation."
             ],
-            [Table(cable_heads, tuple(cables))],
+            [PageTable(cable_heads, tuple(cables))],
             pictures=(pictures["pooled-coefficients"],),
         ),
-        prose("What is not told", pool.notes or ["Everything that was measured is pooled."], items=left_out),
+        prose_section("What is not told", pool.notes or ["Everything that was measured is pooled."], items=left_out),
     )
-    return Page(pool.name or "Fleet", f"Pooled by bowdenfit; seed {pool.seed}", sections)
+    return HtmlPage(pool.name or "Fleet", f"Pooled by bowdenfit; seed {pool.seed}", sections)

@@ -1,1 +1,5 @@
-"""What will the cable do at lengths or wrap angles?"""
+"""What the cable does at lengths, at wrap angles and over a gait; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -10,13 +10,13 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
-from bowdenfit.questions.predict.outside import bends_note, measured, pulled
+from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range, note_outside_bends
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import listed
 
 Row = dict[str, Any]
-Stated = tuple[float, str] | None  # a number and its unit
+StatedNumber = tuple[float, str] | None  # a number and its unit
 
 _STROKES = {"pull": 1, "return": -1}
 _FORCE, _STROKE, _PRELOAD = "--input-force", "--stroke return", "--preload"
@@ -24,7 +24,7 @@ _LIMIT, _SPRING = "--friction-limit", "--spring"
 
 
 @dataclass(frozen=True)
-class Question:
+class BendQuery:
     """What is asked at wrap angles, in internal units.
 
     Args:
@@ -48,41 +48,41 @@ class Question:
     spring: float | None = None
 
 
-def question(
+def make_query(
     fit: Record,
     wrap_angles: Sequence[tuple[float, str]] = (),
-    input_force: Stated = None,
-    output_force: Stated = None,
-    preload: Stated = None,
-    friction_limit: Stated = None,
+    input_force: StatedNumber = None,
+    output_force: StatedNumber = None,
+    preload: StatedNumber = None,
+    friction_limit: StatedNumber = None,
     stroke: str = "pull",
-    spring: Stated = None,
-) -> Question:
+    spring: StatedNumber = None,
+) -> BendQuery:
     """A question from numbers with units; wrap angles are those measured at if none is named.
 
     Raises:
         UsageError: A number is negative, or has a unit of another kind.
     """
-    angles = [_internal(angle, "angle", "--wrap-angle", 0.0) for angle in wrap_angles]
+    angles = [_to_internal(angle, "angle", "--wrap-angle", 0.0) for angle in wrap_angles]
     limit = None
     if friction_limit is not None:
         arm, unit = friction_arm(fit)
-        limit = _internal(friction_limit, "force" if unit == "N" else "torque", "--friction-limit", 0.0) / arm
-    return Question(
+        limit = _to_internal(friction_limit, "force" if unit == "N" else "torque", "--friction-limit", 0.0) / arm
+    return BendQuery(
         np.array(angles) if angles else elastic_answers(fit).measured_bends,
         elastic_answers(fit).reference_force
         if input_force is None
-        else _internal(input_force, "force", "--input-force", 1e-9),
-        None if output_force is None else _internal(output_force, "force", "--output-force", 1e-9),
+        else _to_internal(input_force, "force", "--input-force", 1e-9),
+        None if output_force is None else _to_internal(output_force, "force", "--output-force", 1e-9),
         input_force is not None,
-        None if preload is None else _internal(preload, "force", "--preload", 0.0),
+        None if preload is None else _to_internal(preload, "force", "--preload", 0.0),
         limit,
         _STROKES[stroke],
-        None if spring is None else _internal(spring, "stiffness", "--spring", 1e-9),
+        None if spring is None else _to_internal(spring, "stiffness", "--spring", 1e-9),
     )
 
 
-def _internal(stated: tuple[float, str], dimension: str, option: str, least: float) -> float:
+def _to_internal(stated: tuple[float, str], dimension: str, option: str, least: float) -> float:
     try:
         value = stated[0] * conversion_factor(stated[1], dimension)
     except DatasetError as error:
@@ -92,31 +92,31 @@ def _internal(stated: tuple[float, str], dimension: str, option: str, least: flo
     return value
 
 
-def predict_at_bends(fit: Record, quantity: str, asked: Question) -> list[Row]:
+def predict_at_wrap_angles(fit: Record, quantity: str, query: BendQuery) -> list[Row]:
     """One row a wrap angle, or one row in all for the preload window.
 
     Args:
         fit: The fit.
         quantity: One of `QUANTITIES`.
-        asked: The question.
+        query: What is asked, see `make_query`.
 
     Raises:
         UsageError: There is no posterior, no wrap angle, or the cable has not what is asked for.
     """
     fit.draws()
-    _refuse_what_changes_nothing(quantity, asked)
-    if not len(asked.wrap_angles):
+    _refuse_irrelevant_options(quantity, query)
+    if not len(query.wrap_angles):
         raise UsageError(
             "nothing was measured at a wrap angle of its own; name those to predict at, as --wrap-angle 90deg."
         )
-    return QUANTITIES[quantity].rows(fit, asked)
+    return QUANTITIES[quantity].rows(fit, query)
 
 
-def _refuse_what_changes_nothing(quantity: str, asked: Question) -> None:
+def _refuse_irrelevant_options(quantity: str, query: BendQuery) -> None:
     """Refuse what a quantity does not depend on, since who states it expects otherwise."""
     stated = {
-        _FORCE: asked.stated_force, _STROKE: asked.stroke < 0, _PRELOAD: asked.preload is not None,
-        _LIMIT: asked.friction is not None, _SPRING: asked.spring is not None,
+        _FORCE: query.stated_force, _STROKE: query.stroke < 0, _PRELOAD: query.preload is not None,
+        _LIMIT: query.friction is not None, _SPRING: query.spring is not None,
     }  # fmt: skip
     for option, is_stated in stated.items():
         if is_stated and option not in QUANTITIES[quantity].depends_on:
@@ -126,115 +126,115 @@ def _refuse_what_changes_nothing(quantity: str, asked: Question) -> None:
             )
 
 
-def _rows(fit: Record, asked: Question, columns: Mapping[str, np.ndarray], words: Sequence[str] = ()) -> list[Row]:
+def _interval_rows(fit: Record, query: BendQuery, columns: Mapping[str, np.ndarray], words: Sequence[str] = ()) -> list[Row]:
     """Median, moments and interval of the first quantity, the others with their names before; what `words` and ranges say."""
-    rows, outside = [], bends_note(fit)
-    of_load = measured(fit).notes(None, asked.input_force) if asked.stated_force else []
-    for i, angle in enumerate(np.rad2deg(asked.wrap_angles)):
+    rows, outside = [], note_outside_bends(fit)
+    of_load = measured_range(fit).notes(None, query.input_force) if query.stated_force else []
+    for i, angle in enumerate(np.rad2deg(query.wrap_angles)):
         row: Row = {"wrap_angle_deg": float(f"{angle:.9g}")}
         for k, (name, draws) in enumerate(columns.items()):
-            found, before = Interval.of(draws[:, i]), "" if k == 0 else f"{name}_"
-            row |= {name: found.median, f"{before}mean": found.mean, f"{before}sd": found.sd}
-            row |= {f"{before}q05": found.q05, f"{before}q95": found.q95}
-        notes = [*words[i : i + 1], outside(asked.wrap_angles[i]), *of_load]
+            interval, prefix = Interval.of(draws[:, i]), "" if k == 0 else f"{name}_"
+            row |= {name: interval.median, f"{prefix}mean": interval.mean, f"{prefix}sd": interval.sd}
+            row |= {f"{prefix}q05": interval.q05, f"{prefix}q95": interval.q95}
+        notes = [*words[i : i + 1], outside(query.wrap_angles[i]), *of_load]
         rows.append(row | {"note": "; ".join(note for note in notes if note)})
     return rows
 
 
-def _efficiency(fit: Record, asked: Question) -> list[Row]:
-    force, words = _force(fit, asked)
-    return _rows(fit, asked, {"efficiency": force / asked.input_force}, words)
+def _efficiency(fit: Record, query: BendQuery) -> list[Row]:
+    force, words = _output_force_draws(fit, query)
+    return _interval_rows(fit, query, {"efficiency": force / query.input_force}, words)
 
 
-def _output_force(fit: Record, asked: Question) -> list[Row]:
-    force, words = _force(fit, asked)
-    return _rows(fit, asked, {"output_force_N": force}, words)
+def _output_force(fit: Record, query: BendQuery) -> list[Row]:
+    force, words = _output_force_draws(fit, query)
+    return _interval_rows(fit, query, {"output_force_N": force}, words)
 
 
-def _force(fit: Record, asked: Question) -> tuple[np.ndarray, list[str]]:
+def _output_force_draws(fit: Record, query: BendQuery) -> tuple[np.ndarray, list[str]]:
     """Output forces of every draw: a rope is slack, and a loop is held by friction, where nothing is left."""
-    force = elastic_answers(fit).output_force(asked.wrap_angles, asked.input_force, asked.stroke, asked.preload)
-    return pulled(force, asked.input_force, "held by friction" if fit.model.cable.is_loop else "slack")
+    force = elastic_answers(fit).output_force(query.wrap_angles, query.input_force, query.stroke, query.preload)
+    return clip_to_tension(force, query.input_force, "held by friction" if fit.model.cable.is_loop else "slack")
 
 
-def _input_force(fit: Record, asked: Question) -> list[Row]:
+def _input_force(fit: Record, query: BendQuery) -> list[Row]:
     """Input force for the output force that is wanted: friction alone holds it where none is needed."""
-    assert asked.output_force is not None  # the verb refuses the question without
-    force = elastic_answers(fit).input_force(asked.wrap_angles, asked.output_force, asked.stroke, asked.preload)
-    force, words = pulled(force, asked.output_force, "held by friction alone")
-    limits = measured(fit)
+    assert query.output_force is not None  # the verb refuses the question without
+    force = elastic_answers(fit).input_force(query.wrap_angles, query.output_force, query.stroke, query.preload)
+    force, words = clip_to_tension(force, query.output_force, "held by friction alone")
+    limits = measured_range(fit)
     notes = [limits.notes(None, load) for load in np.median(force, axis=0)]
     words = ["; ".join(note for note in (word, *note) if note) for word, note in zip(words, notes, strict=True)]
-    return _rows(fit, asked, {"input_force_N": force}, words)
+    return _interval_rows(fit, query, {"input_force_N": force}, words)
 
 
-def _preload(fit: Record, asked: Question) -> list[Row]:
-    preload, slack = elastic_answers(fit).preload(asked.wrap_angles, asked.preload)
-    rows = _rows(fit, asked, {"preload_N": preload, "slack_mm": slack})
+def _preload(fit: Record, query: BendQuery) -> list[Row]:
+    preload, slack = elastic_answers(fit).preload(query.wrap_angles, query.preload)
+    rows = _interval_rows(fit, query, {"preload_N": preload, "slack_mm": slack})
     return [row | {"slack_probability": float(np.mean(slack[:, i] > 0))} for i, row in enumerate(rows)]
 
 
-def _friction(fit: Record, asked: Question) -> list[Row]:
-    felt, (arm, unit) = elastic_answers(fit).friction(asked.wrap_angles, asked.preload), friction_arm(fit)
-    return _rows(fit, asked, {f"friction_{unit.replace('*', '_')}": arm * felt})
+def _friction(fit: Record, query: BendQuery) -> list[Row]:
+    friction, (arm, unit) = elastic_answers(fit).friction(query.wrap_angles, query.preload), friction_arm(fit)
+    return _interval_rows(fit, query, {f"friction_{unit.replace('*', '_')}": arm * friction})
 
 
-def _slack_load(fit: Record, asked: Question) -> list[Row]:
-    _needs_loop(fit, "slack-load")
-    return _rows(fit, asked, {"slack_load_N": elastic_answers(fit).slack_load(asked.wrap_angles, asked.preload)})
+def _slack_load(fit: Record, query: BendQuery) -> list[Row]:
+    _require_loop(fit, "slack-load")
+    return _interval_rows(fit, query, {"slack_load_N": elastic_answers(fit).slack_load(query.wrap_angles, query.preload)})
 
 
-def _needs_loop(fit: Record, quantity: str) -> None:
+def _require_loop(fit: Record, quantity: str) -> None:
     if not fit.model.cable.is_loop:
         raise UsageError(
             f'--quantity {quantity} is asked of pull-pull loops; this cable has no kind = "loop" under [cable].'
         )
 
 
-def _position(fit: Record, asked: Question) -> list[Row]:
-    error, lost = elastic_answers(fit).position(asked.wrap_angles, asked.input_force, asked.preload)
-    columns = {"position_error_mm": error, "lost_motion_mm": lost}
+def _position(fit: Record, query: BendQuery) -> list[Row]:
+    error, lost_motion = elastic_answers(fit).position(query.wrap_angles, query.input_force, query.preload)
+    columns = {"position_error_mm": error, "lost_motion_mm": lost_motion}
     arm, unit = friction_arm(fit)
     if unit != "N":
-        columns |= {"position_error_deg": np.rad2deg(error / arm), "lost_motion_deg": np.rad2deg(lost / arm)}
-    return _rows(fit, asked, columns)
+        columns |= {"position_error_deg": np.rad2deg(error / arm), "lost_motion_deg": np.rad2deg(lost_motion / arm)}
+    return _interval_rows(fit, query, columns)
 
 
-def _stiffness(fit: Record, asked: Question) -> list[Row]:
-    stiffness = elastic_answers(fit).stiffness(asked.wrap_angles, asked.input_force, asked.preload, asked.spring)
+def _stiffness(fit: Record, query: BendQuery) -> list[Row]:
+    stiffness = elastic_answers(fit).stiffness(query.wrap_angles, query.input_force, query.preload, query.spring)
     columns = {"stiffness_N_per_mm": stiffness}
     arm, unit = friction_arm(fit)
     if unit != "N":
         columns["stiffness_N_m_per_rad"] = stiffness * arm**2 / 1000
-    return _rows(fit, asked, columns)
+    return _interval_rows(fit, query, columns)
 
 
-def _dynamic_range(fit: Record, asked: Question) -> list[Row]:
+def _dynamic_range(fit: Record, query: BendQuery) -> list[Row]:
     """Largest torque of the device over the friction felt in free motion."""
-    _needs_loop(fit, "dynamic-range")
-    if not asked.stated_force:
+    _require_loop(fit, "dynamic-range")
+    if not query.stated_force:
         raise UsageError("--quantity dynamic-range needs the largest force at the motor, as --input-force 100N.")
-    drawn = elastic_answers(fit).dynamic_range(asked.wrap_angles, asked.input_force, asked.preload)
-    return _rows(fit, asked, {"dynamic_range": drawn})
+    ratio = elastic_answers(fit).dynamic_range(query.wrap_angles, query.input_force, query.preload)
+    return _interval_rows(fit, query, {"dynamic_range": ratio})
 
 
-def _window(fit: Record, asked: Question) -> list[Row]:
-    ends = float(asked.wrap_angles.min()), float(asked.wrap_angles.max())
-    force = asked.input_force if asked.stated_force else 0.0
-    found = elastic_answers(fit).preload_window(ends, force, asked.friction)
-    row: Row = {"from_deg": found.bends[0], "to_deg": found.bends[1], "input_force_N": force}
-    row |= _quantiles("lowest", found.lowest, "N")
-    if found.highest is not None:
-        row |= _quantiles("highest", found.highest, "N")
-    row |= {"best_N": found.best} | _quantiles("felt", found.felt, found.friction_unit.replace("*", "_"))
-    return [row | {"possible": found.possible, "in_words": found.sentence()}]
+def _preload_window(fit: Record, query: BendQuery) -> list[Row]:
+    ends = float(query.wrap_angles.min()), float(query.wrap_angles.max())
+    force = query.input_force if query.stated_force else 0.0
+    window = elastic_answers(fit).preload_window(ends, force, query.friction)
+    row: Row = {"from_deg": window.bends[0], "to_deg": window.bends[1], "input_force_N": force}
+    row |= _quantiles("lowest", window.lowest, "N")
+    if window.highest is not None:
+        row |= _quantiles("highest", window.highest, "N")
+    row |= {"best_N": window.best} | _quantiles("felt", window.felt, window.friction_unit.replace("*", "_"))
+    return [row | {"possible": window.possible, "in_words": window.sentence()}]
 
 
-def _quantiles(what: str, known: Interval, unit: str) -> Row:
-    return {f"{what}_{name}_{unit}": getattr(known, name) for name in ("median", "q05", "q95")}
+def _quantiles(prefix: str, interval: Interval, unit: str) -> Row:
+    return {f"{prefix}_{name}_{unit}": getattr(interval, name) for name in ("median", "q05", "q95")}
 
 
-class _Predicted(NamedTuple):
+class _PredictedQuantity(NamedTuple):
     """A quantity.
 
     Args:
@@ -242,21 +242,21 @@ class _Predicted(NamedTuple):
         depends_on: What may be stated, besides the output force that an input force is asked for.
     """
 
-    rows: Callable[[Record, Question], list[Row]]
+    rows: Callable[[Record, BendQuery], list[Row]]
     depends_on: tuple[str, ...]
 
 
-QUANTITIES: Mapping[str, _Predicted] = MappingProxyType(
+QUANTITIES: Mapping[str, _PredictedQuantity] = MappingProxyType(
     {
-        "efficiency": _Predicted(_efficiency, (_FORCE, _STROKE, _PRELOAD)),
-        "output-force": _Predicted(_output_force, (_FORCE, _STROKE, _PRELOAD)),
-        "input-force": _Predicted(_input_force, (_STROKE, _PRELOAD)),
-        "preload": _Predicted(_preload, (_PRELOAD,)),
-        "friction": _Predicted(_friction, (_PRELOAD,)),
-        "slack-load": _Predicted(_slack_load, (_PRELOAD,)),
-        "position": _Predicted(_position, (_FORCE, _PRELOAD)),
-        "stiffness": _Predicted(_stiffness, (_FORCE, _PRELOAD, _SPRING)),
-        "dynamic-range": _Predicted(_dynamic_range, (_FORCE, _PRELOAD)),
-        "preload-window": _Predicted(_window, (_FORCE, _LIMIT)),
+        "efficiency": _PredictedQuantity(_efficiency, (_FORCE, _STROKE, _PRELOAD)),
+        "output-force": _PredictedQuantity(_output_force, (_FORCE, _STROKE, _PRELOAD)),
+        "input-force": _PredictedQuantity(_input_force, (_STROKE, _PRELOAD)),
+        "preload": _PredictedQuantity(_preload, (_PRELOAD,)),
+        "friction": _PredictedQuantity(_friction, (_PRELOAD,)),
+        "slack-load": _PredictedQuantity(_slack_load, (_PRELOAD,)),
+        "position": _PredictedQuantity(_position, (_FORCE, _PRELOAD)),
+        "stiffness": _PredictedQuantity(_stiffness, (_FORCE, _PRELOAD, _SPRING)),
+        "dynamic-range": _PredictedQuantity(_dynamic_range, (_FORCE, _PRELOAD)),
+        "preload-window": _PredictedQuantity(_preload_window, (_FORCE, _LIMIT)),
     }
 )

@@ -17,8 +17,8 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.rows import read_angle
 from bowdenfit.questions.bends.equations import bending_contact
-from bowdenfit.questions.predict.lengths import newtons
-from bowdenfit.questions.predict.outside import measured, pulled
+from bowdenfit.questions.predict.lengths import to_newtons
+from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range
 from bowdenfit.results.record import Record
 from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import counted
@@ -47,7 +47,7 @@ class Gait:
     arms: np.ndarray | None = None
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """'mean over 101 wrap angles of 'bracket edge', 0 to 45 deg'"""
         low, high = np.rad2deg([self.angles.min(), self.angles.max()])
         if self.stated == 1:
@@ -55,7 +55,7 @@ class Gait:
         return f"mean over {counted(self.stated, 'wrap angle')} of {self.name!r}, {low:.4g} to {high:.4g} deg"
 
 
-def gait_of(
+def make_gait(
     fit: Record, contact: str | None, angles: Sequence[tuple[float, str]], file: str | Path | None, column: str | None
 ) -> Gait:
     """The gait that is asked for.
@@ -80,33 +80,33 @@ def gait_of(
             "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "
             "them as --gait FILE; name one of the two."
         )
-    found, arms = (_stated(angles), None) if file is None else _read(Path(file), column)
-    if len(found) <= _MOST_ANGLES:
-        return Gait(number, contacts[number], found, len(found), arms)
-    middles = (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES * len(found) - 0.5
-    order, at = np.argsort(found, kind="stable"), np.arange(len(found))
-    shown, shorter = (None if of is None else np.interp(middles, at, of[order]) for of in (found, arms))
-    assert shown is not None
-    return Gait(number, contacts[number], shown, len(found), shorter)
+    angles_rad, arms = (_stated_angles(angles), None) if file is None else _read_gait(Path(file), column)
+    if len(angles_rad) <= _MOST_ANGLES:
+        return Gait(number, contacts[number], angles_rad, len(angles_rad), arms)
+    middles = (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES * len(angles_rad) - 0.5
+    order, ranks = np.argsort(angles_rad, kind="stable"), np.arange(len(angles_rad))
+    kept_angles, kept_arms = (None if of is None else np.interp(middles, ranks, of[order]) for of in (angles_rad, arms))
+    assert kept_angles is not None
+    return Gait(number, contacts[number], kept_angles, len(angles_rad), kept_arms)
 
 
-def _stated(angles: Sequence[tuple[float, str]]) -> np.ndarray:
+def _stated_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
     try:
-        found = np.array([value * conversion_factor(unit, "angle") for value, unit in angles])
+        angles_rad = np.array([value * conversion_factor(unit, "angle") for value, unit in angles])
     except DatasetError as error:
         raise UsageError(f"--wrap-angle: {error}.") from None
-    if np.any(found < 0) or not np.all(np.isfinite(found)):
+    if np.any(angles_rad < 0) or not np.all(np.isfinite(angles_rad)):
         raise UsageError("--wrap-angle: a wrap angle is negative; it is the sum of all bends, so write it without a sign.")
-    return found
+    return angles_rad
 
 
-def _read(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray | None]:
+def _read_gait(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray | None]:
     """Wrap angles of a table [rad], and moment arms where it has some [mm]."""
     table = read_table(path)
     named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
     columns = find_columns(table, (Quantity("wrap_angle", "angle"), Quantity("moment_arm", "length")), named)
-    found = require(table, columns, "wrap_angle", "wrap_angle_deg")
-    angles = np.array(found.each(lambda cell: read_angle(cell, found), np.nan))
+    source = require(table, columns, "wrap_angle", "wrap_angle_deg")
+    angles = np.array(source.each(lambda cell: read_angle(cell, source), np.nan))
     arms = np.array(columns["moment_arm"].numbers()) if "moment_arm" in columns else None
     table.faults.refuse()
     if not len(angles):
@@ -135,33 +135,33 @@ def predict_over_gait(
         stroke: "pull" or "return".
         output_force: Force and unit that is wanted, of which the input force is predicted.
     """
-    route, limits = fit.dataset.description.route, measured(fit)
+    route, limits = fit.dataset.description.route, measured_range(fit)
     friction = fit.model.cable.friction
-    force, per, name, none_left = friction.conditions.reference_force, 1.0, "efficiency", "slack"
+    force, divisor, name, slack_word = friction.conditions.reference_force, 1.0, "efficiency", "slack"
     if output_force is not None:
-        name, force = "input_force_N", newtons(output_force, "--output-force")
-        none_left = "held by friction alone"
+        name, force = "input_force_N", to_newtons(output_force, "--output-force")
+        slack_word = "held by friction alone"
     elif input_force is not None:
-        name, force = "output_force_N", newtons(input_force, "--input-force")
+        name, force = "output_force_N", to_newtons(input_force, "--input-force")
     else:
-        per = force
-    drawn = _forces(fit, lengths, gait, force, _STROKES[stroke], inverse=output_force is not None)
-    words = pulled(drawn["mean"], force, none_left)[1]
+        divisor = force
+    forces = _forces_over_gait(fit, lengths, gait, force, _STROKES[stroke], inverse=output_force is not None)
+    words = clip_to_tension(forces["mean"], force, slack_word)[1]
     of_load = {"at_input_force_N": force} if friction.depends_on_load and name == "efficiency" else {}
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
-        row |= _interval(name, drawn["mean"][:, i] / per)
-        mounting = np.quantile(drawn["mounted"][:, i] / per, (0.05, 0.95))
+        row |= _interval_cells(name, forces["mean"][:, i] / divisor)
+        mounting = np.quantile(forces["mounted"][:, i] / divisor, (0.05, 0.95))
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])} | of_load
         if len(gait.angles) > 1:
             for which in ("least", "most"):
-                row |= _interval(f"{which}_{name}", drawn[which][:, i] / per, f"{which}_{name}_")
+                row |= _interval_cells(f"{which}_{name}", forces[which][:, i] / divisor, f"{which}_{name}_")
         if name == "output_force_N" and gait.arms is not None:
             for which in ("", "most_"):
-                row |= _interval(f"{which}{_TORQUE}", drawn[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
-        load = None if name == "efficiency" else float(np.median(drawn["mean"][:, i])) if output_force else force
-        notes = [words[i], gait.words, *limits.notes(None if route is None else float(length), load)]
+                row |= _interval_cells(f"{which}{_TORQUE}", forces[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
+        load = None if name == "efficiency" else float(np.median(forces["mean"][:, i])) if output_force else force
+        notes = [words[i], gait.description, *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             notes.append(outside := route.outside(length))
             row["in_range"] = not outside
@@ -169,26 +169,28 @@ def predict_over_gait(
     return rows
 
 
-def _interval(name: str, draws: np.ndarray, before: str = "") -> dict[str, float]:
-    found = Interval.of(np.maximum(draws, 0.0))
-    return {name: found.median} | {f"{before}{key}": getattr(found, key) for key in ("mean", "sd", "q05", "q95")}
+def _interval_cells(name: str, draws: np.ndarray, prefix: str = "") -> dict[str, float]:
+    interval = Interval.of(np.maximum(draws, 0.0))
+    return {name: interval.median} | {f"{prefix}{key}": getattr(interval, key) for key in ("mean", "sd", "q05", "q95")}
 
 
-def _forces(fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: float, *, inverse: bool) -> dict[str, np.ndarray]:
+def _forces_over_gait(
+    fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: float, *, inverse: bool
+) -> dict[str, np.ndarray]:
     """Forces at the other end [N] of every draw (rows) at route values (columns): the mean, in a new mounting, and the ends."""
     model, cable = fit.model, fit.model.cable
     function: Callable[..., Array] = cable.input_force_bent if inverse else cable.output_force_bent
 
-    def over(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> dict[str, Array]:
+    def average_over_gait(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> dict[str, Array]:
         angles = cable.wrap_angles(values, at)
 
         def step(carry: dict[str, Array], bend: Array) -> tuple[dict[str, Array], None]:
             bent = angles.at[:, gait.contact].set(bend[0])
-            found = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting), 0.0)
-            torque = bend[1] * found
+            forces_by_draw = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting), 0.0)
+            torque = bend[1] * forces_by_draw
             return {
-                "mean": carry["mean"] + found / len(bends), "least": jnp.minimum(carry["least"], found),
-                "most": jnp.maximum(carry["most"], found), "torque": carry["torque"] + torque / len(bends),
+                "mean": carry["mean"] + forces_by_draw / len(bends), "least": jnp.minimum(carry["least"], forces_by_draw),
+                "most": jnp.maximum(carry["most"], forces_by_draw), "torque": carry["torque"] + torque / len(bends),
                 "most_torque": jnp.maximum(carry["most_torque"], torque),
             }, None  # fmt: skip
 
@@ -196,14 +198,14 @@ def _forces(fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: fl
         start = {"mean": none, "least": none + jnp.inf, "most": none, "torque": none, "most_torque": none - jnp.inf}
         return jax.lax.scan(step, start, bends)[0]
 
-    def implied(z_and_mounting: Array, at: Array, bends: Array) -> dict[str, Array]:
+    def forces_of_draw(z_and_mounting: Array, at: Array, bends: Array) -> dict[str, Array]:
         values = model.space.constrain(z_and_mounting[:-1])
-        mounted = over(values, at, bends, z_and_mounting[-1])["mean"]
-        return over(values, at, bends, jnp.zeros(())) | {"mounted": mounted}
+        mounted = average_over_gait(values, at, bends, z_and_mounting[-1])["mean"]
+        return average_over_gait(values, at, bends, jnp.zeros(())) | {"mounted": mounted}
 
     with jax.enable_x64(True):
         arms = np.zeros(len(gait.angles)) if gait.arms is None else gait.arms
         data = jnp.asarray(lengths, dtype=float), jnp.asarray(np.column_stack([gait.angles, arms]))
-        program = for_each_draw(implied, model.space.size + 1, *data, run_once=True)
-        found: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
-    return found
+        program = for_each_draw(forces_of_draw, model.space.size + 1, *data, run_once=True)
+        forces_by_draw: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
+    return forces_by_draw

@@ -11,7 +11,7 @@ from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.predict.outside import measured, pulled
+from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
 
@@ -37,20 +37,20 @@ def predict_at_lengths(
     Raises:
         UsageError: A force is not a positive force, or there is no posterior.
     """
-    route, sign, limits = fit.dataset.description.route, _STROKES[stroke], measured(fit)
-    name, force, per, asked = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
+    route, sign, limits = fit.dataset.description.route, _STROKES[stroke], measured_range(fit)
+    name, force, divisor, stated_force = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
     if input_force is not None:
-        name, force = "output_force_N", (asked := newtons(input_force, "--input-force"))
+        name, force = "output_force_N", (stated_force := to_newtons(input_force, "--input-force"))
     elif output_force is not None:
-        name, force = "input_force_N", (asked := newtons(output_force, "--output-force"))
+        name, force = "input_force_N", (stated_force := to_newtons(output_force, "--output-force"))
     else:
-        per = force
+        divisor = force
     inverse = output_force is not None
-    none_left = "held by friction alone" if inverse else "slack"
-    found = _forces(fit, lengths, force, sign, inverse)
-    (mean, words), (mounted, _) = (pulled(forces, force, none_left) for forces in found)
-    mean, mounted = mean / per, mounted / per
-    of_load = {"at_input_force_N": force} if fit.model.cable.friction.depends_on_load and asked is None else {}
+    slack_word = "held by friction alone" if inverse else "slack"
+    force_draws = _output_forces(fit, lengths, force, sign, inverse)
+    (mean, words), (mounted, _) = (clip_to_tension(forces, force, slack_word) for forces in force_draws)
+    mean, mounted = mean / divisor, mounted / divisor
+    of_load = {"at_input_force_N": force} if fit.model.cable.friction.depends_on_load and stated_force is None else {}
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
@@ -65,7 +65,7 @@ def predict_at_lengths(
         }
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
         row |= of_load
-        load = interval.median if inverse else asked
+        load = interval.median if inverse else stated_force
         notes = [words[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             notes.append(outside := route.outside(length))
@@ -75,7 +75,22 @@ def predict_at_lengths(
     return rows
 
 
-def in_unit_of(route: Route | None, lengths: Sequence[float | NumberWithUnit] | None) -> list[float]:
+def choose_route_values(fit: Record, lengths: Sequence[float | NumberWithUnit] | None) -> np.ndarray:
+    """Route values to predict at, by default those of the description; any one number without a route.
+
+    Raises:
+        UsageError: There are none, or one is no number.
+    """
+    route = fit.dataset.description.route
+    numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
+    if invalid := [number for number in numbers if not np.isfinite(number)]:
+        raise UsageError(f"{invalid[0]} is no length; name the lengths to predict at as numbers.")
+    if not lengths and route is not None and not route.choices:
+        raise UsageError("the description has no choices; name the lengths to predict at.")
+    return np.asarray(to_route_unit(route, lengths) or (route.choices if route else [0.0]), dtype=float)
+
+
+def to_route_unit(route: Route | None, lengths: Sequence[float | NumberWithUnit] | None) -> list[float]:
     """Route values in the unit of the route.
 
     Args:
@@ -85,14 +100,14 @@ def in_unit_of(route: Route | None, lengths: Sequence[float | NumberWithUnit] | 
     Raises:
         UsageError: A unit is unknown, or measures something else, or there is no route, or a length is negative.
     """
-    found = []
+    values = []
     for length in lengths or ():
         value, unit = length if isinstance(length, tuple) else (float(length), "")
         try:
-            found.append(value * route_conversion_factor(unit, route.unit) if unit and route else value)
+            values.append(value * route_conversion_factor(unit, route.unit) if unit and route else value)
         except DatasetError as error:
             raise UsageError(f"LENGTHS, {value:g} {unit}: {error}.") from None
-        if route is not None and found[-1] < 0 <= route.range[0]:
+        if route is not None and values[-1] < 0 <= route.range[0]:
             named, ends = route.variable.replace("_", " "), f"from {route.range[0]:g} to {route.range[1]:g} {route.unit}"
             raise UsageError(
                 f"LENGTHS, {value:g} {unit or route.unit}: no {named} is negative where the route goes {ends}; leave out the "
@@ -100,10 +115,10 @@ def in_unit_of(route: Route | None, lengths: Sequence[float | NumberWithUnit] | 
             )
         if unit and route is None:
             raise UsageError(f"LENGTHS, {value:g} {unit}: this cable has no route, so there are no lengths to predict at.")
-    return found
+    return values
 
 
-def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: bool) -> tuple[np.ndarray, np.ndarray]:
+def _output_forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: bool) -> tuple[np.ndarray, np.ndarray]:
     """Force at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
     route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
     if not inverse and route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
@@ -115,18 +130,18 @@ def _forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: 
     return mean, mounted
 
 
-def newtons(force: tuple[float, str], option: str) -> float:
+def to_newtons(force: tuple[float, str], option: str) -> float:
     """A positive force [N].
 
     Raises:
         UsageError: It is none.
     """
     try:
-        newtons = force[0] * conversion_factor(force[1], "force")
+        value = force[0] * conversion_factor(force[1], "force")
     except DatasetError as error:
         raise UsageError(f"{option}: {error}.") from None
-    if not newtons > 0:
+    if not value > 0:
         raise UsageError(
             f"{option} {force[0]:g}{force[1]} is not positive; write the tension as a positive force."
         )
-    return newtons
+    return value

@@ -21,20 +21,19 @@ from bowdenfit.arguments import (
     read_first,
 )  # fmt: skip
 from bowdenfit.display import csv_text
-from bowdenfit.questions.predict.words import predictions_text
+from bowdenfit.errors import UsageError
+from bowdenfit.questions import predict as room
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from bowdenfit.questions.predict.answer import Predictions
+    from bowdenfit.questions.predict.predictions import Predictions
     from bowdenfit.results.record import Record
 
-Asked = Literal[
+QuantityName = Literal[
     "efficiency", "output-force", "input-force", "preload", "friction", "slack-load", "position", "stiffness", "dynamic-range",
     "preload-window",
 ]  # fmt: skip
-_ELSEWHERE = (  # what is not kept
+_NOT_STORED = (  # what is not kept
     "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "spring", "contact", "gait", "gait_column",
 )  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
@@ -47,13 +46,13 @@ _QUANTITY = Parameter(metavar="QUANTITY", show_default="efficiency, or what --in
 
 @read_first
 def predict(
-    found: Annotated["Record", RESULTS, FIT],
+    fit: Annotated["Record", RESULTS, FIT],
     lengths: Annotated[Length | Iterable[Length] | None, Parameter("LENGTHS"), LENGTHS] = None,
     input_force: Force = None,
     stroke: Stroke = "pull",
     output_force: Force = None,
     *,
-    quantity: Annotated[Asked | None, _QUANTITY] = None,
+    quantity: Annotated[QuantityName | None, _QUANTITY] = None,
     wrap_angles: Angles = (),
     preload: Annotated[Quantity | None, Parameter(metavar="FORCE"), number_with_unit("20N")] = None,
     friction_limit: Annotated[Quantity | None, Parameter(metavar="TORQUE"), number_with_unit("50N*mm")] = None,
@@ -65,7 +64,7 @@ def predict(
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
     Args:
-        found: The fit.
+        fit: The fit.
         lengths: Route values, in the unit of the route or with another, such as 455, 455mm or 18 in; the description's choices
             if omitted.
         input_force: Force at the motor side, such as 100N.
@@ -84,47 +83,39 @@ def predict(
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
-    from bowdenfit.questions.predict.answer import Predictions
-    from bowdenfit.questions.predict.bends import predict_at_bends, question
-    from bowdenfit.questions.predict.gait import gait_of, predict_over_gait
-    from bowdenfit.questions.predict.lengths import predict_at_lengths
-
-    applied, wanted, angles = as_pair(input_force), as_pair(output_force), cast("list[NumberWithUnit]", wrap_angles)
-    quantity = _quantity(quantity, input_force, output_force)
-    over_gait = any(each is not None for each in (contact, gait, gait_column))
-    without_route = found.dataset.description.route is None and found.model.cable.is_loop
+    applied_force, wanted_force = as_pair(input_force), as_pair(output_force)
+    angles = cast("list[NumberWithUnit]", wrap_angles)
+    quantity = _choose_quantity(quantity, input_force, output_force)
+    over_gait = any(option is not None for option in (contact, gait, gait_column))
+    without_route = fit.dataset.description.route is None and fit.model.cable.is_loop
     if not over_gait and (wrap_angles or quantity not in AT_LENGTHS or without_route):
-        _refuse_both(lengths)
-        found.draws()
+        _refuse_lengths(lengths)
+        fit.draws()
         limit, stiffness = as_pair(friction_limit), as_pair(spring)
-        asked = question(found, angles, applied, wanted, as_pair(preload), limit, stroke, stiffness)
-        return Predictions(predict_at_bends(found, quantity, asked))
-    _refuse_of_bends(quantity, over_gait, preload or spring, friction_limit, input_force)
-    route = _lengths(found, cast("list[float | NumberWithUnit] | None", lengths))
+        query = room.make_query(fit, angles, applied_force, wanted_force, as_pair(preload), limit, stroke, stiffness)
+        return room.Predictions(room.predict_at_wrap_angles(fit, quantity, query))
+    _refuse_bend_options(quantity, over_gait, preload or spring, friction_limit, input_force)
+    route_values = room.choose_route_values(fit, cast("list[float | NumberWithUnit] | None", lengths))
     if over_gait:
-        bent = gait_of(found, contact, angles, gait, gait_column)
-        return Predictions(predict_over_gait(found, route, bent, applied, stroke, wanted))
-    return Predictions(predict_at_lengths(found, route, applied, stroke, wanted))
+        gait_angles = room.make_gait(fit, contact, angles, gait, gait_column)
+        return room.Predictions(room.predict_over_gait(fit, route_values, gait_angles, applied_force, stroke, wanted_force))
+    return room.Predictions(room.predict_at_lengths(fit, route_values, applied_force, stroke, wanted_force))
 
 
-def _refuse_both(lengths: object) -> None:
+def _refuse_lengths(lengths: object) -> None:
     """Refuse lengths where wrap angles are asked for."""
-    from bowdenfit.errors import UsageError
-
     if lengths:
         raise UsageError("predict at lengths or at wrap angles, not at both; leave one of them out.")
 
 
-def _refuse_of_bends(
-    quantity: Asked,
+def _refuse_bend_options(
+    quantity: QuantityName,
     over_gait: bool,
     preload: Quantity | None,
     friction_limit: Quantity | None,
     input_force: Quantity | None,
 ) -> None:
     """Refuse at lengths what is predicted at wrap angles alone."""
-    from bowdenfit.errors import UsageError
-
     of_bends = preload is not None or friction_limit is not None
     if over_gait and (quantity not in AT_LENGTHS or of_bends):
         raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
@@ -138,34 +129,12 @@ def _refuse_of_bends(
         )
 
 
-def _lengths(found: "Record", lengths: Sequence[float | NumberWithUnit] | None) -> "np.ndarray":
-    """Route values to predict at, by default those of the description; any one number without a route.
-
-    Raises:
-        UsageError: There are none, or one is no number.
-    """
-    import numpy as np
-
-    from bowdenfit.errors import UsageError
-    from bowdenfit.questions.predict.lengths import in_unit_of
-
-    route = found.dataset.description.route
-    numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
-    if odd := [number for number in numbers if not np.isfinite(number)]:
-        raise UsageError(f"{odd[0]} is no length; name the lengths to predict at as numbers.")
-    if not lengths and route is not None and not route.choices:
-        raise UsageError("the description has no choices; name the lengths to predict at.")
-    return np.asarray(in_unit_of(route, lengths) or (route.choices if route else [0.0]), dtype=float)
-
-
-def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Quantity | None) -> Asked:
+def _choose_quantity(named: QuantityName | None, input_force: Quantity | None, output_force: Quantity | None) -> QuantityName:
     """What is asked for, where it is not named: what the stated force tells of the other end.
 
     Raises:
         UsageError: Forces of both ends are stated, or one that the quantity does not follow from.
     """
-    from bowdenfit.errors import UsageError
-
     if input_force is not None and output_force is not None:
         raise UsageError(
             "--input-force asks for the force at the load side, --output-force for that at the motor; leave one of them out."
@@ -180,17 +149,21 @@ def _quantity(named: Asked | None, input_force: Quantity | None, output_force: Q
 
 
 def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
-    return Reply(predictions_text(rows), lambda: rows, csv=lambda: csv_text(rows))
+    return Reply(room.predictions_text(rows), lambda: rows, csv=lambda: csv_text(rows))
 
 
-def _kept(answers: Mapping[str, Any], asked: Mapping[str, Any]) -> Reply | None:
+def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
     """Efficiencies while pulling, at lengths that can be bought."""
-    known = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
-    other = any(asked[name] not in (None, (), []) for name in _ELSEWHERE)
-    lengths = asked["lengths"] or tuple(known)
-    if other or (asked["quantity"], asked["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")} or not lengths:
+    stored_rows = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
+    other_options = any(options[name] not in (None, (), []) for name in _NOT_STORED)
+    lengths = options["lengths"] or tuple(stored_rows)
+    if (
+        other_options
+        or (options["quantity"], options["stroke"]) not in {(None, "pull"), (AT_LENGTHS[0], "pull")}
+        or not lengths
+    ):
         return None
-    if (rows := [known[length] for length in lengths if length in known]) and len(rows) == len(lengths):
+    if (rows := [stored_rows[length] for length in lengths if length in stored_rows]) and len(rows) == len(lengths):
         return _reply(rows)
     return None
 
@@ -233,5 +206,5 @@ VERB = Verb(
     """,
     csv="Print as CSV, with mean, sd and quantiles.",
     warns=True,
-    kept=_kept,
+    kept=_reply_from_stored,
 )

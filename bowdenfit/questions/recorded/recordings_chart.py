@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from bowdenfit.pages.chart import Chart, Group, Series, Span
+from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
 from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.plots.panels import extremes
 from bowdenfit.plots.style import LEAST_SQUARES, WIDE_INTERVAL
@@ -46,7 +46,7 @@ def _chart(recording: OverTime, most: int) -> Chart:
         return np.insert(values[keep].astype(float), gaps, np.nan)
 
     places = np.insert(time[keep], gaps, 0.5 * (time[keep][gaps - 1] + time[keep][gaps]))
-    lines = Group(places, tuple(_series(recording, broken)))
+    lines = SeriesGroup(places, tuple(_series(recording, broken)))
     names = LOOP_PHASES if recording.loop else tuple(name for _, name, _ in PHASES)
     spans = tuple(
         Span(name, _COLORS[value], start, stop)
@@ -69,11 +69,11 @@ def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> 
     yield Series("Output fitted", "line", "vermillion", broken(recording.fitted))
 
 
-def _left_out_group(recording: OverTime) -> Iterator[Group]:
+def _left_out_group(recording: OverTime) -> Iterator[SeriesGroup]:
     """Output force of samples that were left out, where they have one."""
     finite = np.flatnonzero(np.isfinite(recording.flagged_output))
     if not len(finite):
         return
     chosen = np.array(choose_evenly(finite.tolist(), _MAX_LEFT_OUT))
     time, first = np.unique(recording.flagged_time[chosen] - start_of(recording), return_index=True)
-    yield Group(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[chosen][first]),))
+    yield SeriesGroup(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[chosen][first]),))

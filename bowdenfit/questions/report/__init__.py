@@ -1,1 +1,5 @@
-"""Everything that was found, on one page to hand on."""
+"""Everything that a fit says, on one HTML page to hand on; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -69,14 +69,18 @@ class Coefficient:
 
 def data(fit: Record) -> tuple[Coefficient, ...] | None:
     """The parameters that belong to friction, constant angles or sensors; None where none was sampled."""
-    drawn, estimates, found = fit.sampled, fit.least_squares.estimates, []
-    if drawn is None:
+    posterior, estimates, coefficients = fit.sampled, fit.least_squares.estimates, []
+    if posterior is None:
         return None
     for p in (p for role in ROLES for p in fit.model.space.free if p.role == role):
         estimate = estimates.get(p.name)
-        value, error = (estimate.value, estimate.standard_error) if estimate else (float("nan"), float("nan"))
-        found.append(Coefficient(p.symbol, p.unit, drawn.values[p.name], drawn.prior[p.name], value, error, p.meaning))
-    return tuple(found) or None
+        value, standard_error = (estimate.value, estimate.standard_error) if estimate else (float("nan"), float("nan"))
+        coefficients.append(
+            Coefficient(
+                p.symbol, p.unit, posterior.values[p.name], posterior.prior[p.name], value, standard_error, p.meaning
+            )
+        )
+    return tuple(coefficients) or None
 
 
 def caption(parameters: tuple[Coefficient, ...]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.diagnostics import describe_convergence_shortfalls
+from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommend_sampler
 from bowdenfit.kinds import readings_called
@@ -15,13 +16,12 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.groups.answer import contrast_groups
-from bowdenfit.questions.identify.confounding import confounded_pairs
-from bowdenfit.questions.identify.contradiction import agreement_page
+from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.recorded.stick_slip import stick_slip
-from bowdenfit.questions.summary.verdict import verdict
+from bowdenfit.questions.summary.verdict import agreement_page, assess_fit
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.results.serialization import plain_data, values_by_key
@@ -37,9 +37,9 @@ class Summary(Display, dict[str, Any]):
         text: Gives the same for people.
     """
 
-    def __init__(self, page: dict[str, Any], text: Callable[[], str]) -> None:
+    def __init__(self, page: dict[str, Any], make_text: Callable[[], str]) -> None:
         super().__init__(page)
-        self._text = text
+        self._text = make_text
 
     def __str__(self) -> str:
         return self._text()
@@ -55,16 +55,19 @@ def summarize(fit: Record) -> dict[str, Any]:
     Args:
         fit: The fit.
     """
-    found = verdict(fit)
+    fit_verdict = assess_fit(fit)
     page: dict[str, Any] = {
         "schema": SCHEMA,
         "name": fit.name,
         "geometry": fit.dataset.description.geometry,
         "verdict": {
-            "converged": fit.converged, "trusted": found.trusted, "reasons": list(found.reasons), "doubts": list(found.doubts),
+            "converged": fit.converged,
+            "trusted": fit_verdict.trusted,
+            "reasons": list(fit_verdict.reasons),
+            "doubts": list(fit_verdict.doubts),
         },
-        "parameters": {p.name: _parameter(fit, p.name) for p in fit.model.space.parameters},
-        "curves": {name: _curve_coefficient(fit, name) for name in curve_coefficients(fit)},
+        "parameters": {p.name: _parameter_row(fit, p.name) for p in fit.model.space.parameters},
+        "curves": {name: _curve_row(fit, name) for name in curve_coefficients(fit)},
         "least_squares": {
             "residual_sd": fit.least_squares.residual_sd,
             "condition_number": fit.least_squares.condition_number,
@@ -97,7 +100,7 @@ def summarize(fit: Record) -> dict[str, Any]:
     if (falls := stick_slip(fit)) is not None:
         page["stick_slip"] = falls
     if fit.sampled is not None:
-        page["sampler"] = _sampler(fit, fit.posterior)
+        page["sampler"] = _sampler_page(fit, fit.posterior)
         if fit.posterior.agreement is not None:
             page["samplers"] = fit.posterior.agreement
         if fit.dataset.description.route is not None:
@@ -106,24 +109,24 @@ def summarize(fit: Record) -> dict[str, Any]:
     return everything
 
 
-def _sampler(fit: Record, posterior: Draws) -> dict[str, Any]:
+def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:
     """How the draws came about, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
-    short = describe_convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
+    shortfalls = describe_convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
     page = {
         "method": posterior.sampler,
         "ensembles": posterior.n_ensembles,
         "walkers": len(posterior.z) // posterior.n_ensembles,
         "steps": posterior.steps,
         "acceptance": posterior.acceptance,
-        "recommendation": recommend_sampler(posterior.sampler, fit.model.space.size, bool(short)),
+        "recommendation": recommend_sampler(posterior.sampler, fit.model.space.size, bool(shortfalls)),
     }
     if posterior.trajectories is not None:
         page |= {k: v for k, v in values_by_key(posterior.trajectories).items() if k != "statistics"}
     return page
 
 
-def _parameter(fit: Record, name: str) -> dict[str, Any]:
+def _parameter_row(fit: Record, name: str) -> dict[str, Any]:
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
     if parameter.scaled_by:
@@ -151,12 +154,10 @@ def contraction(fit: Record, name: str) -> float:
 
 def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
     """Unit and symbol of each derived curve coefficient."""
-    from bowdenfit.inference.draws import derived_units
-
     return derived_units(fit.model)
 
 
-def _curve_coefficient(fit: Record, name: str) -> dict[str, Any]:
+def _curve_row(fit: Record, name: str) -> dict[str, Any]:
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.sampled is not None:
         ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated

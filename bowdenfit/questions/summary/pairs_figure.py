@@ -20,14 +20,14 @@ from bowdenfit.plots.layout import (
     wrap_words,
 )
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
-from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
+from bowdenfit.questions.summary.sampled_quantities import SampledQuantity, optimum_quantities, sampled_quantities
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
 HEADING = "Which unknowns hang together"
-MOST = 8
+MOST_QUANTITIES = 8
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
@@ -51,8 +51,8 @@ def data(fit: Record) -> Pairs | None:
 
     None where there are no two to draw against each other.
     """
-    answer, route = optimum(fit), fit.dataset.description.route
-    quantities = sampled_quantities(fit, ROLES)[: MOST - len(answer)] + answer
+    answer, route = optimum_quantities(fit), fit.dataset.description.route
+    quantities = sampled_quantities(fit, ROLES)[: MOST_QUANTITIES - len(answer)] + answer
     best = route.variable.replace("_", " ") if route is not None and answer else ""
     return Pairs(quantities, best) if len(quantities) > 1 else None
 
@@ -72,7 +72,7 @@ def caption(data: Pairs) -> str:
 def draw(data: Pairs, width: float | None = None) -> Figure:
     """Return the corner plot of coefficients, noise and optimum."""
     page = width or WIDE
-    quantities = _with_room(data, int((page - LEFT - GAP) / SMALLEST))
+    quantities = _select_quantities(data, int((page - LEFT - GAP) / SMALLEST))
     n = len(quantities)
     size = (page - LEFT - GAP) / n
     size = size if width else min(LARGEST, size)
@@ -87,17 +87,17 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
         axes.xaxis.set_visible(row == n - 1)
         axes.yaxis.set_visible(row > column == 0)
         if row == column:
-            _marginal(axes, quantities[row])
+            _draw_marginal(axes, quantities[row])
         else:
             axes.set_ylim(quantities[row].limits(SHARE))
-            _regions(axes, quantities[column], quantities[row])
+            _draw_credible_regions(axes, quantities[column], quantities[row])
     for i, quantity in enumerate(quantities):
-        _label(figure, panels[n - 1, i], panels[i, 0] if i else None, quantity.label, size)
-    _key(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - LEFT - size - GAP - MARK - EDGE)
+        _label_axes(figure, panels[n - 1, i], panels[i, 0] if i else None, quantity.label, size)
+    _draw_legend(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - LEFT - size - GAP - MARK - EDGE)
     return figure
 
 
-def _marginal(axes: Axes, quantity: SampledQuantity) -> None:
+def _draw_marginal(axes: Axes, quantity: SampledQuantity) -> None:
     """Draw the histogram of a quantity, with its median and 90 % interval."""
     n_bins = round(2 * quantity.draws.size ** (1 / 3))  # Rice's rule
     axes.hist(
@@ -107,7 +107,7 @@ def _marginal(axes: Axes, quantity: SampledQuantity) -> None:
         axes.axvline(value, color=BLUE, linewidth=0.7, linestyle="--")
 
 
-def _regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:
+def _draw_credible_regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:
     """Fill the smallest areas that hold 68 % and 95 % of the draws of two quantities."""
     from corner import hist2d
 
@@ -130,7 +130,7 @@ def _regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:
     )
 
 
-def _label(figure: Figure, below: Axes, left: Axes | None, label: str, size: float) -> None:
+def _label_axes(figure: Figure, below: Axes, left: Axes | None, label: str, size: float) -> None:
     """Write numbers and a name below a column of panels, and left of a row."""
     label = wrap_words(label, size - 0.2 * GAP, most=2)
     number_below(below)
@@ -152,14 +152,14 @@ def _remarks(data: Pairs, shown: int) -> list[str]:
     return remarks
 
 
-def _key(first: Axes, remarks: list[str], room: float) -> None:
+def _draw_legend(first: Axes, remarks: list[str], room: float) -> None:
     """Write the key into the empty corner right of the first panel."""
     entries = [area_entry(f"{100 * share:.0f} % probability", color) for share, color in FILLS.items()]
     entries += [line_entry(wrap_words(remark, room)) for remark in remarks]
     first.legend(handles=entries, loc="upper left", bbox_to_anchor=(1.1, 1.0), borderaxespad=0, labelspacing=0.25)
 
 
-def _with_room(data: Pairs, most: int) -> list[SampledQuantity]:
+def _select_quantities(data: Pairs, most: int) -> list[SampledQuantity]:
     """So many quantities at most, the optimum among them."""
     every, last = data.quantities, 2 if data.best and most > 2 else 0
     return every if len(every) <= most else every[: most - last] + every[len(every) - last :]

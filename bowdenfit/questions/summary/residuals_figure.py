@@ -21,7 +21,8 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
-from bowdenfit.questions.length.efficiency_points import EfficiencyPoints, efficiency_points
+from bowdenfit.questions import length
+from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -44,17 +45,17 @@ class Residuals:
 
 def data(fit: Record) -> Residuals | None:
     """What is shown; None where no efficiency was measured."""
-    points = efficiency_points(fit)
+    points = length.efficiency_points(fit)
     return Residuals(points) if points else None
 
 
 def caption(data: Residuals) -> str:
     """What is drawn, in plain words."""
-    n, drawn = sum(len(points.labels) for points in data.points), len(data.points[0].predicted) > 1
+    n, has_draws = sum(len(points.labels) for points in data.points), len(data.points[0].predicted) > 1
     bars = (
         "bars: where a reading would lie with 50 % and 90 % probability if it were taken anew, on a new mounting where "
         "readings are runs; about one reading in ten may lie outside the longer one."
-        if drawn else "the line is the least-squares prediction."
+        if has_draws else "the line is the least-squares prediction."
     )  # fmt: skip
     return (
         f"Left: every measured efficiency beside its prediction; {bars} Right: measured less predicted, in percentage points. "
@@ -66,7 +67,7 @@ def caption(data: Residuals) -> str:
 def draw(data: Residuals, width: float | None = None) -> Figure:
     """Efficiencies by label beside their predictive intervals, and measured less predicted."""
     page = width or WIDE
-    labels = _labels(data.points, LABELS * page)
+    labels = _shorten_labels(data.points, LABELS * page)
     inner = float(np.clip(ROW * len(labels), LEAST, MOST))
     figure = empty_page(page, inner + BELOW + ABOVE)
     left = EDGE + 0.08 + max(map(text_width, labels))
@@ -74,8 +75,8 @@ def draw(data: Residuals, width: float | None = None) -> Figure:
     main = axes_at(figure, left, BELOW, (1 - STRIP) * room, inner)
     strip = axes_at(figure, left + (1 - STRIP) * room + GAP, BELOW, STRIP * room, inner, sharey=main)
     what = f"predicted {MEDIAN.lower()}" if len(data.points[0].predicted) > 1 else LEAST_SQUARES.lower()
-    _rows(main, data.points, residual=False)
-    _rows(strip, data.points, residual=True)
+    _draw_rows(main, data.points, residual=False)
+    _draw_rows(strip, data.points, residual=True)
     main.set_xlabel("Efficiency (%)")
     strip.set_xlabel(f"Measured less {what}\n(percentage points)" if page > WIDE / 2 else "Residual\n(percentage points)")
     every = -(-len(labels) // int(inner / (0.85 * ROW)))
@@ -86,16 +87,16 @@ def draw(data: Residuals, width: float | None = None) -> Figure:
     return figure
 
 
-def _labels(tables: tuple[EfficiencyPoints, ...], room: float) -> list[str]:
+def _shorten_labels(tables: tuple[EfficiencyPoints, ...], room: float) -> list[str]:
     """The labels, their beginning left out where they are too long."""
-    every = [label for points in tables for label in points.labels]
+    labels = [label for points in tables for label in points.labels]
     longest = LONGEST
-    while longest > 4 and max(text_width(shorten_name(label, longest)) for label in every) > room:
+    while longest > 4 and max(text_width(shorten_name(label, longest)) for label in labels) > room:
         longest -= 1
-    return [shorten_name(label, longest) for label in every]
+    return [shorten_name(label, longest) for label in labels]
 
 
-def _rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> None:
+def _draw_rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> None:
     """One row a measurement, the first on top."""
     measured = 100 * np.concatenate([t.measured for t in tables])
     predicted = 100 * np.concatenate([t.predicted for t in tables], axis=1)
@@ -108,11 +109,11 @@ def _rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> N
         axes.hlines(row, lower, upper, color=BLUE, linewidth=4, alpha=0.45, label=f"Predicted, {NARROW_INTERVAL}")
     elif not residual:
         axes.plot(center, row, "|", color=BLUE, markersize=7, label=f"Predicted, {LEAST_SQUARES.lower()}")
-    off = measured - zero
-    axes.plot(off[inside], row[inside], "o", color=BLACK, markersize=3.6, label="Measured")
+    offset = measured - zero
+    axes.plot(offset[inside], row[inside], "o", color=BLACK, markersize=3.6, label="Measured")
     if not inside.all():
         axes.plot(
-            off[~inside], row[~inside], "o", color=BLACK, markersize=3.6, markerfacecolor="white",
+            offset[~inside], row[~inside], "o", color=BLACK, markersize=3.6, markerfacecolor="white",
             label="Outside the range of the curves",
         )  # fmt: skip
     if residual:

@@ -19,7 +19,7 @@ from bowdenfit.plots.layout import (
     wrap_words,
 )
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
-from bowdenfit.questions.summary.quantities import SampledQuantity, optimum, sampled_quantities
+from bowdenfit.questions.summary.sampled_quantities import SampledQuantity, optimum_quantities, sampled_quantities
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -36,22 +36,22 @@ PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width
 
 
 @dataclass(frozen=True)
-class Paths:
+class Traces:
     """Draws (walkers, ordered by ensemble, first) of every sampled parameter and of the optimal length."""
 
     quantities: list[SampledQuantity]
     n_ensembles: int
 
 
-def data(fit: Record) -> Paths | None:
+def data(fit: Record) -> Traces | None:
     """What is shown; None where no walker has a path."""
-    quantities = sampled_quantities(fit) + optimum(fit)[:1]
+    quantities = sampled_quantities(fit) + optimum_quantities(fit)[:1]
     if fit.sampled is None or all(q.draws.shape[1] == 1 for q in quantities):
         return None
-    return Paths(quantities, fit.posterior.n_ensembles)
+    return Traces(quantities, fit.posterior.n_ensembles)
 
 
-def caption(data: Paths) -> str:
+def caption(data: Traces) -> str:
     """What is drawn, in plain words."""
     return (
         "Whether the sampling can be relied on: the path of every unknown through the sampling, a color for each "
@@ -62,7 +62,7 @@ def caption(data: Paths) -> str:
 
 
 @in_paper_style
-def draw(data: Paths, width: float | None = None) -> Figure:
+def draw(data: Traces, width: float | None = None) -> Figure:
     """Return trace plots: median and 90 % of the walkers of each ensemble against the draw, and its marginal.
 
     A chain that has no other walkers is summarized over stretches of its path.
@@ -71,7 +71,7 @@ def draw(data: Paths, width: float | None = None) -> Figure:
     columns = 2 if page >= 2 * LEAST_COLUMN and len(quantities) > 1 else 1
     rows = -(-len(quantities) // columns)
     chains = len(quantities[0].draws) == data.n_ensembles
-    key = wrap_words(_key(chains), page - 2 * EDGE)
+    key = wrap_words(_legend_title(chains), page - 2 * EDGE)
     figure = empty_page(page, TOP + KEY_ROW * key.count("\n") + BOTTOM + rows * ROW - (ROW - PANEL))
     for i, quantity in enumerate(quantities):
         column, row = divmod(i, rows)
@@ -82,21 +82,21 @@ def draw(data: Paths, width: float | None = None) -> Figure:
         marginal = axes_at(figure, left + inner + 0.04, bottom, MARGINAL - 0.06, PANEL, sharey=trace)
         marginal.set_axis_off()
         for number, draws in enumerate(np.split(quantity.draws, data.n_ensembles)):
-            _ensemble(trace, marginal, quantity, draws, number)
-        _label(figure, trace, quantity.label, last=row == rows - 1 or i == len(quantities) - 1)
-    _legend(figure, data.n_ensembles, key)
+            _draw_ensemble(trace, marginal, quantity, draws, number)
+        _label_axes(figure, trace, quantity.label, last=row == rows - 1 or i == len(quantities) - 1)
+    _draw_legend(figure, data.n_ensembles, key)
     return figure
 
 
-def _ensemble(trace: Axes, marginal: Axes, quantity: SampledQuantity, draws: np.ndarray, number: int) -> None:
+def _draw_ensemble(trace: Axes, marginal: Axes, quantity: SampledQuantity, draws: np.ndarray, number: int) -> None:
     """Draw one ensemble in the panel of a quantity, and the density of its draws beside it."""
     style = _style(number)
-    at, together = _together(draws)
-    low, median, high = np.quantile(together, (0.05, 0.5, 0.95), axis=0)
-    trace.fill_between(at, low, high, facecolor=style["color"], alpha=0.07 if len(draws) > 1 else 0.03, linewidth=0)
+    steps, grouped = _group_draws(draws)
+    low, median, high = np.quantile(grouped, (0.05, 0.5, 0.95), axis=0)
+    trace.fill_between(steps, low, high, facecolor=style["color"], alpha=0.07 if len(draws) > 1 else 0.03, linewidth=0)
     if len(draws) > 1:
-        trace.plot(at, low, at, high, linewidth=0.5, **style)
-    trace.plot(at, median, linewidth=1.0, **style)
+        trace.plot(steps, low, steps, high, linewidth=0.5, **style)
+    trace.plot(steps, median, linewidth=1.0, **style)
     grid = np.linspace(*trace.get_ylim(), GRID)
     marginal.plot(quantity.density(grid, draws), grid, linewidth=1.0, **style)
 
@@ -106,18 +106,18 @@ def _style(number: int) -> dict[str, Any]:
     return {"color": SERIES_COLORS[number % len(SERIES_COLORS)], "linestyle": SERIES_LINES[number % len(SERIES_LINES)]}
 
 
-def _together(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _group_draws(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where along the path, and which draws are summarized there (columns): all walkers', or a stretch of one chain."""
     n_walkers, n = draws.shape
     if n_walkers > 1 or n < 2 * STRETCHES:
-        shown = np.arange(0, n, -(-n // MOST_DRAWS))
-        return 1.0 + shown, draws[:, shown]
+        steps = np.arange(0, n, -(-n // MOST_DRAWS))
+        return 1.0 + steps, draws[:, steps]
     length = n // STRETCHES
     stretches = draws[0, : STRETCHES * length].reshape(STRETCHES, length)
     return 1.0 + length * (np.arange(STRETCHES) + 0.5), stretches.T
 
 
-def _label(figure: Figure, trace: Axes, label: str, last: bool) -> None:
+def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
     """Write numbers and the name of a quantity left of its panel, and below it where no panel follows."""
     trace.grid(visible=False)
     number_left(trace)
@@ -137,14 +137,14 @@ def _in_two_lines(label: str) -> str:
     return "\n".join([first, *(between + last for last in others[-1:])])
 
 
-def _key(chains: bool) -> str:
+def _legend_title(chains: bool) -> str:
     """What lines and bands are."""
     if chains:
         return f"Line: median of each {STRETCHES}th of the steps; shaded: its {WIDE_INTERVAL}; right of each panel: density"
     return f"Thick: median of the values at a step; thin: their {WIDE_INTERVAL}; right of each panel: density"
 
 
-def _legend(figure: Figure, n_ensembles: int, key: str) -> None:
+def _draw_legend(figure: Figure, n_ensembles: int, key: str) -> None:
     """Write what lines and bands are, and one entry a start."""
     most = min(MOST_NAMES, int((figure.get_size_inches()[0] - EDGE) / NAME))
     named = n_ensembles if n_ensembles <= most else most - 1

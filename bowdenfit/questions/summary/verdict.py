@@ -1,26 +1,59 @@
 """Whether a fit may be trusted, and if not, why; whatever the summary says is wrong is wrong here too."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.kinds import reading_called
+from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
+from bowdenfit.kinds import reading_called, readings_called
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import describe_copied_readings
 from bowdenfit.questions.check.impossible import describe_implausible_friction, describe_impossible_efficiencies
 from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
+from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths
+from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.too_coarse import describe_coarse_readings
 from bowdenfit.questions.check.words import describe_misfits
-from bowdenfit.questions.identify.contradiction import contradiction
-from bowdenfit.questions.identify.judgment import say_what_is_not_determined
+from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
+from bowdenfit.questions.next.candidates import can_be_ranked
+from bowdenfit.questions.summary.answer import outlying_readings
 from bowdenfit.results.record import Record, cached_per_fit
-from bowdenfit.words import few
+from bowdenfit.results.serialization import values_by_key
+from bowdenfit.words import decimals, few, filled, listed
 
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 COPIED, COARSE = "made of copied readings", "finer than its readings"
 
 
+_PROBLEMS = {
+    NOT_CONVERGED: "the computation has not settled",
+    CONTRADICTORY: "the measurements contradict each other",
+    IMPOSSIBLE: "some of the readings cannot be",
+    COPIED: "some of the readings are copies of others",
+    COARSE: "the readings are too coarse for such intervals",
+    NOT_DESCRIBED: "the model does not describe these readings",
+    NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
+}
+_TRUSTED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
+_IN_DOUBT = (
+    "The computation has settled, and nothing speaks clearly against the model, but {}, by more than chance does in one fit of "
+    "a hundred. You can trust this once you know why."
+)
+_LEAST_SQUARES_ONLY = (
+    "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
+    "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
+)
+_NOT_YET_CONVERGED = (
+    "The numbers still move, and may be far off. Let it go on with the same command and --resume; if that does not end it, "
+    "state what you know of the coefficients in cable.toml."
+)
+_NO_MINIMUM = (
+    "Least squares have found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
+    "sampling needs none."
+)
+_COMPARABLE = 0.8  # of the largest conflict: beyond that either table may be the odd one out
 @dataclass(frozen=True, repr=False)
 class Verdict(Display):
     """Of one fit.
@@ -51,30 +84,156 @@ class Verdict(Display):
 
 
 @cached_per_fit
-def verdict(fit: Record) -> Verdict:
+def assess_fit(fit: Record) -> Verdict:
     """The verdict on a fit."""
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
-        NOT_IDENTIFIABLE: _sentences(say_what_is_not_determined(fit)),
-        CONTRADICTORY: _sentences(contradiction(fit)),
+        NOT_IDENTIFIABLE: _sentences(describe_unidentified(fit)),
+        CONTRADICTORY: _sentences(describe_contradiction(fit)),
         IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
         COPIED: describe_copied_readings(fit.dataset),
         COARSE: describe_coarse_readings(fit),
         NOT_DESCRIBED: describe_lack_of_fit(fit),
     }
-    said = {kind: sentences for kind, sentences in troubles.items() if sentences}
-    return Verdict(said, fit.sampled is not None, _doubts(fit))
+    by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
+    return Verdict(by_kind, fit.sampled is not None, _doubts(fit))
 
 
 def _doubts(fit: Record) -> tuple[str, ...]:
     """Readings that lie far off, and tables that scatter otherwise than the fit says."""
-    found = checks_of(fit)
-    if found is None:
+    checks = checks_of(fit)
+    if checks is None:
         return ()
-    off = [reading_called(each.table, each.label) for each in found.outliers]
-    far = [f"{few(off)} {'lies' if len(off) == 1 else 'lie'} far from what the others say"] if off else []
-    return (*far, *describe_misfits(found))
+    outliers = [reading_called(reading.table, reading.label) for reading in checks.outliers]
+    sentences = [f"{few(outliers)} {'lies' if len(outliers) == 1 else 'lie'} far from what the others say"] if outliers else []
+    return (*sentences, *describe_misfits(checks))
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:
     return (sentence,) if sentence else ()
+
+
+def verdict_text(verdict_on_fit: Verdict) -> str:
+    """Whether a fit may be trusted, and if not, why."""
+    sentences = (
+        [distrust_warning(verdict_on_fit), *reasons_against(verdict_on_fit)]
+        if verdict_on_fit.troubles
+        else [_trusted_sentence(verdict_on_fit) if verdict_on_fit.sampled else _LEAST_SQUARES_ONLY.format("")]
+    )
+    return "\n".join(filled(sentence) for sentence in sentences)
+
+
+def distrust_warning(fit_verdict: Verdict) -> str:
+    """The first line of a fit that is not to be trusted; empty of one that is."""
+    kinds = [words for kind, words in _PROBLEMS.items() if kind in fit_verdict.troubles]
+    return f"DO NOT USE THESE NUMBERS: {listed(kinds)}." if kinds else ""
+
+
+def reasons_against(fit_verdict: Verdict) -> list[str]:
+    """Why not, without what only says how the computation went."""
+    sentences = [sentence for kind in _PROBLEMS if kind != NOT_CONVERGED for sentence in fit_verdict.troubles.get(kind, ())]
+    if NOT_CONVERGED in fit_verdict.troubles:
+        sentences.append(_NOT_YET_CONVERGED if fit_verdict.sampled else _NO_MINIMUM)
+    return sentences
+
+
+def reasons_to_trust(fit: Record) -> list[str]:
+    """What speaks for a fit that may be trusted, and what to keep in mind."""
+    if fit.sampled is None:
+        best = ", without a best length" if fit.dataset.description.route is not None else ""
+        return [_LEAST_SQUARES_ONLY.format(best)]
+    return [_trusted_sentence(assess_fit(fit))] + [
+        sentence
+        for sentence in (_prior_driven_sentence(fit), _correlation_sentence(fit), _prior_conflict_sentence(fit))
+        if sentence
+    ]
+
+
+def _trusted_sentence(fit_verdict: Verdict) -> str:
+    """Of a fit that may be trusted, and what speaks a little against it."""
+    return _IN_DOUBT.format(listed(fit_verdict.doubts)) if fit_verdict.doubts else _TRUSTED
+
+
+def suggest_next_step(fit: Record) -> str:
+    """What to do next with a fit that may be trusted; empty where there is nothing."""
+    checks, outliers = checks_of(fit), outlying_readings(fit)
+    if checks is None:
+        return ""
+    if outliers:
+        return f"Next: look at how {_reading_name(outliers[0])} was measured and written down: it is far off (see below)."
+    if describe_misfits(checks):
+        return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
+    influential = few(map(_reading_name, checks.influential), most=2)  # how far on each differs from one seed to the next
+    remeasure = f"; in doubt, measure again what the fit leans on: {influential}" if influential else ""
+    if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
+        return f"Next: nothing needs to be measured{remeasure}. bowdenfit next says what would narrow it."
+    if not can_be_ranked(fit):
+        return f"Next: any measurement of another kind or at other bends would tell more{remeasure}."
+    return f"Next: bowdenfit next says which measurement would tell most{remeasure}."
+
+
+def _reading_name(reading: CheckedReading) -> str:
+    return reading_called(reading.table, reading.label)
+
+
+def interval_width_caveat(fit: Record) -> str:
+    """That few readings leave it to a prior how wide intervals are; empty where they do not."""
+    checks = checks_of(fit)
+    return describe_assumed_widths(checks) if checks else ""
+
+
+def _prior_driven_sentence(fit: Record) -> str:
+    """Coefficients of friction that no measurement tells, because they were stated."""
+    friction = assess_identifiability(fit).groups.get("friction")
+    names = friction.resting if friction is not None else []
+    return f"Hardly measured, mostly as assumed beforehand: {listed(names)}." if names else ""
+
+
+def _correlation_sentence(fit: Record) -> str:
+    """The two parameters that are told apart least."""
+    pairs = confounded_pairs(fit)
+    if not pairs:
+        return ""
+    pair = pairs[0]
+    return f"{pair.first} and {pair.second} are hardly told apart; {pair.combination} is known much better than each."
+
+
+def _prior_conflict_sentence(fit: Record) -> str:
+    """Parameters about which readings and prior contradict each other."""
+    checks = checks_of(fit)
+    pulled = [s.parameter for s in checks.conflicts] if checks else []
+    names = dict.fromkeys(pulled + [f.parameter for f in checks.prior_conflicts] if checks else [])
+    return f"The readings contradict what was assumed of {listed(list(names))} beforehand; check its unit." if names else ""
+
+
+def agreement_page(fit: Record) -> list[dict[str, Any]]:
+    """How well each table agrees with everything else, the odd one out first."""
+    disagreements = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
+    return [values_by_key(d) | {"unit": _unit(fit, d)} for d in disagreements]
+
+
+def describe_contradiction(fit: Record) -> str:
+    """The table that is the odd one out, in a sentence; empty where all agree."""
+    worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
+    if worst is None or worst.sds < NOTICEABLE_SDS:
+        return ""
+    unit, digits = _unit(fit, worst), decimals(worst.others_sd)
+    name, *others = (
+        readings_called(d.table).table
+        for d in (worst, *(d for d in fit.least_squares.disagreements if d is not worst))
+        if d.conflict > _COMPARABLE * worst.conflict
+    )
+    or_else = f" (or {' or '.join(f'that of {other}' for other in others)})" if others else ""
+    together = f"{worst.together:z.{digits}f}{unit}"
+    return (
+        f"The table of {name}{or_else} disagrees with everything else by {worst.sds:.1f} standard deviations: "
+        f"without it {worst.parameter} would be {worst.others:z.{digits}f} ± {worst.others_sd:z.{digits}f}{unit}, with it the "
+        f"fit is at {together}. Look at the units and wrap angles of that table and at how it was measured: the numbers below "
+        "are a compromise between readings that cannot all be right."
+    )
+
+
+def _unit(fit: Record, disagreement: Disagreement) -> str:
+    """Unit of the parameter, with a blank before it."""
+    unit = next(p.unit for p in fit.model.space.free if p.name == disagreement.parameter)
+    return "" if unit == "1" else f" {unit}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, read_first
-from bowdenfit.questions.writing import files_of, write_answer
+from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def teleoperate(
 def _reply(answer: "Teleoperation", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.teleoperate.words import teleoperation_text
 
-    notes = tuple(f"Wrote {path}." for path in files_of(options["output"], NAME)) if options["output"] else ()
+    notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
     return Reply(teleoperation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 
 

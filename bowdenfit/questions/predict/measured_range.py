@@ -13,11 +13,11 @@ from bowdenfit.words import percent
 
 _ROUNDING = 1e-6  # of an end of a range, by which a number may miss it
 _SURELY, _HARDLY = 0.995, 0.005  # shares of the draws
-Span = tuple[float, float] | None
+Range = tuple[float, float] | None
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRange:
     """What a cable was measured at, from the lowest to the highest; None where it was not.
 
     Args:
@@ -26,8 +26,8 @@ class Measured:
         unit: Unit of the route.
     """
 
-    lengths: Span
-    loads: Span
+    lengths: Range
+    loads: Range
     unit: str
 
     def notes(self, length: float | None, input_force: float | None) -> list[str]:
@@ -37,13 +37,13 @@ class Measured:
             length: Route value; None without a route.
             input_force: Force that was asked for [N]; None where the fit's own counts.
         """
-        said = [_note(length, self.lengths, "lengths", self.unit)]
+        notes = [_note_outside(length, self.lengths, "lengths", self.unit)]
         if input_force is not None:
-            said.append(_note(input_force, self.loads, "loads", "N") if self.loads else "no table says at which loads")
-        return [note for note in said if note]
+            notes.append(_note_outside(input_force, self.loads, "loads", "N") if self.loads else "no table says at which loads")
+        return [note for note in notes if note]
 
 
-def measured(fit: Record) -> Measured:
+def measured_range(fit: Record) -> MeasuredRange:
     """What the tables of a fit were measured at."""
     measurements, route = fit.dataset.measurements, fit.dataset.description.route
     tables = list(each_table(measurements))
@@ -51,16 +51,16 @@ def measured(fit: Record) -> Measured:
     lengths = [np.ravel(getattr(table, "route", ())) for kind, table in tables if not isinstance(kind, FrictionKind)]
     lengths += [kind.conditions(table).route for kind, table in friction]
     loads = [np.abs(kind.forces(table)) for kind, table in friction]
-    return Measured(_span(lengths), _span(loads), route.unit if route else "")
+    return MeasuredRange(_finite_range(lengths), _finite_range(loads), route.unit if route else "")
 
 
-def bends_note(fit: Record) -> Callable[[float], str]:
+def note_outside_bends(fit: Record) -> Callable[[float], str]:
     """Function of a wrap angle [rad] that says that nothing was measured there; empty where something was."""
-    span = _span([np.rad2deg(elastic_answers(fit).measured_bends)])
-    return lambda angle: _note(float(np.rad2deg(angle)), span, "wrap angles", "deg")
+    span = _finite_range([np.rad2deg(elastic_answers(fit).measured_bends)])
+    return lambda angle: _note_outside(float(np.rad2deg(angle)), span, "wrap angles", "deg")
 
 
-def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[np.ndarray, list[str]]:
+def clip_to_tension(force: np.ndarray, input_force: float, slack_word: str = "slack") -> tuple[np.ndarray, list[str]]:
     """Forces of a rope, which pulls or is slack but never pushes, and for each column what is said of it.
 
     Args:
@@ -69,17 +69,20 @@ def pulled(force: np.ndarray, input_force: float, word: str = "slack") -> tuple[
         word: What a rope is that does not pull.
     """
     share = np.mean(force <= _ROUNDING * input_force, axis=0)
-    words = [word if s > _SURELY else f"{word} with {percent(s, 0)} probability" if s > _HARDLY else "" for s in share]
+    words = [
+        slack_word if s > _SURELY else f"{slack_word} with {percent(s, 0)} probability" if s > _HARDLY else ""
+        for s in share
+    ]
     return np.maximum(force, 0.0), words
 
 
-def _span(parts: list[np.ndarray]) -> Span:
-    every = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
-    known = every[np.isfinite(every)]
+def _finite_range(parts: list[np.ndarray]) -> Range:
+    values = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
+    known = values[np.isfinite(values)]
     return (float(np.min(known)), float(np.max(known))) if len(known) else None
 
 
-def _note(value: float | None, span: Span, what: str, unit: str) -> str:
+def _note_outside(value: float | None, span: Range, what: str, unit: str) -> str:
     if value is None or span is None:
         return ""
     slack = _ROUNDING * max(abs(span[0]), abs(span[1]))

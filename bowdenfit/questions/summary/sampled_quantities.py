@@ -39,21 +39,21 @@ class SampledQuantity:
 
 def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
     """The sampled parameters, of the given roles in the given order, or all; none without draws."""
-    from bowdenfit.cable.load_cells import RUN_SCATTER  # whoever draws again what was kept needs no model
+    from bowdenfit.description.shares import RUN_SCATTER  # loads pydantic, which drawing stored data does without
 
     if fit.sampled is None:
         return []
     free, values = fit.model.space.free, fit.sampled.values
     wanted = [p for role in roles for p in free if p.role == role] if roles else free
-    found = []
+    quantities = []
     for p in wanted:
         words = BETWEEN_MOUNTINGS if p.name == RUN_SCATTER else p.meaning
         bounds = support(values[p.name]), np.inf
-        found.append(SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], bounds, p.symbol, words))
-    return found
+        quantities.append(SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], bounds, p.symbol, words))
+    return quantities
 
 
-def optimum(fit: Record) -> list[SampledQuantity]:
+def optimum_quantities(fit: Record) -> list[SampledQuantity]:
     """The optimal length and the efficiency there [%], where there are such."""
     from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 

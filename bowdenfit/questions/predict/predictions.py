@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from bowdenfit.display import Display, Rows
 from bowdenfit.words import decimals, few, filled, narrow_table, percent, significant
 
 Row = Mapping[str, Any]
@@ -21,13 +22,13 @@ def predictions_text(rows: Sequence[Row]) -> str:
     if "in_words" in rows[0]:
         return filled(rows[0]["in_words"]) + "\n"
     several = len(rows) > 1
-    blocks = [filled(_extremes(rows)) if several else "\n".join(filled(line) for line in _one(rows[0]))]
-    blocks += [_table(rows)] if several else []
-    blocks += ["\n".join(filled(note) for note in _notes(rows))]
+    blocks = [filled(_highest_and_lowest(rows)) if several else "\n".join(filled(line) for line in _single_prediction(rows[0]))]
+    blocks += [_prediction_table(rows)] if several else []
+    blocks += ["\n".join(filled(note) for note in _note_lines(rows))]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def units_of(row: Row) -> dict[str, str]:
+def column_units(row: Row) -> dict[str, str]:
     """Units of the columns, "1" of numbers without one; moments and quantiles have that of what stands before them."""
     units, unit = dict[str, str](), "1"
     for name, value in row.items():
@@ -44,13 +45,13 @@ def _quantities(row: Row) -> list[str]:
     return [names[names.index("mean") - 1], *(name for name in names if f"{name}_mean" in row)]
 
 
-def _place(row: Row) -> str | None:
+def _position_name(row: Row) -> str | None:
     """Name of where it is predicted; None where a cable has just one place."""
     first = next(iter(row))
     return first if first != _quantities(row)[0] else None
 
 
-def _unit(name: str) -> tuple[str, str]:
+def _name_and_unit(name: str) -> tuple[str, str]:
     """A column's name in words, and its unit; efficiencies are shown in percent."""
     if name.endswith("efficiency"):
         return name.replace("_", " "), "%"
@@ -61,77 +62,92 @@ def _unit(name: str) -> tuple[str, str]:
     return words.replace("_", " "), unit
 
 
-def _at(row: Row) -> str:
+def _position_text(row: Row) -> str:
     """'470 mm'"""
-    name = _place(row)
-    return f"{row[name]:.6g} {_unit(name)[1]}" if name is not None else "the nominal wrap angles"
+    name = _position_name(row)
+    return f"{row[name]:.6g} {_name_and_unit(name)[1]}" if name is not None else "the nominal wrap angles"
 
 
-def _known(row: Row, name: str, of: str = "") -> tuple[str, str]:
+def _format_value(row: Row, name: str, variant: str = "") -> tuple[str, str]:
     """Median and interval of a quantity, to the digits that the interval has; or of it in one mounting."""
-    before = "" if name == _quantities(row)[0] else f"{name}_"
-    scale = 100.0 if _unit(name)[1] == "%" else 1.0
-    value, low, high = (scale * row[key] for key in (name, f"{of or before}q05", f"{of or before}q95"))
+    prefix = "" if name == _quantities(row)[0] else f"{name}_"
+    scale = 100.0 if _name_and_unit(name)[1] == "%" else 1.0
+    value, low, high = (scale * row[key] for key in (name, f"{variant or prefix}q05", f"{variant or prefix}q95"))
     if not high > low:
         return f"{value:.4g}", f"{low:.4g} to {high:.4g}"
     digits = decimals(high - low)
     return f"{value:z.{digits}f}", f"{low:z.{digits}f} to {high:z.{digits}f}"
 
 
-def _one(row: Row) -> list[str]:
+def _single_prediction(row: Row) -> list[str]:
     """The predictions of one place in sentences."""
     lines = []
     for name in _quantities(row):
-        (words, unit), (value, interval) = _unit(name), _known(row, name)
-        lines.append(f"{words[0].upper()}{words[1:]} at {_at(row)}: {value} {unit} (90 % interval {interval} {unit}).")
+        (words, unit), (value, interval) = _name_and_unit(name), _format_value(row, name)
+        lines.append(
+            f"{words[0].upper()}{words[1:]} at {_position_text(row)}: {value} {unit} (90 % interval {interval} {unit})."
+        )
     if f"{_MOUNTING}_q05" in row:
         name = _quantities(row)[0]
-        lines.append(f"Any one mounting of the cable: {_known(row, name, f'{_MOUNTING}_')[1]} {_unit(name)[1]}.")
+        lines.append(
+            f"Any one mounting of the cable: {_format_value(row, name, f'{_MOUNTING}_')[1]} {_name_and_unit(name)[1]}."
+        )
     lines += [f"Probability that it is slack: {percent(row[name], 0)}." for name in row if name.endswith(_PROBABILITY)]
     return lines
 
 
-def _extremes(rows: Sequence[Row]) -> str:
+def _highest_and_lowest(rows: Sequence[Row]) -> str:
     """Where the first quantity is highest and where lowest; of places outside the curves only where all are."""
     name, inside = _quantities(rows[0])[0], [row for row in rows if row.get("in_range", True)]
-    words, unit = _unit(name)
+    words, unit = _name_and_unit(name)
     which = "" if len(inside) == len(rows) else ", inside the curves" if inside else ", all outside the curves"
     high, low = (choose(inside or rows, key=lambda row: row[name]) for choose in (max, min))
-    said = f"{words[0].upper()}{words[1:]}{which}: "
+    sentence = f"{words[0].upper()}{words[1:]}{which}: "
     if high is low:
-        said += f"{_known(high, name)[0]} {unit} at {_at(high)}"
+        sentence += f"{_format_value(high, name)[0]} {unit} at {_position_text(high)}"
     else:
-        said += f"highest {_known(high, name)[0]} {unit} at {_at(high)}, lowest {_known(low, name)[0]} {unit} at {_at(low)}"
-    return f"{said}. 90 % intervals are in brackets."
+        sentence += f"highest {_format_value(high, name)[0]} {unit} at {_position_text(high)}, "
+        sentence += f"lowest {_format_value(low, name)[0]} {unit} at {_position_text(low)}"
+    return f"{sentence}. 90 % intervals are in brackets."
 
 
-def _table(rows: Sequence[Row]) -> str:
+def _prediction_table(rows: Sequence[Row]) -> str:
     """All places."""
     name = next(iter(rows[0]))  # of several places it is there
-    words, unit = _unit(name)
-    heads, *cells = zip([f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], *_columns(rows), strict=True)
+    words, unit = _name_and_unit(name)
+    heads, *cells = zip([f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], *_table_columns(rows), strict=True)
     return narrow_table(heads, cells)
 
 
-def _columns(rows: Sequence[Row]) -> Iterator[list[str]]:
+def _table_columns(rows: Sequence[Row]) -> Iterator[list[str]]:
     """Columns with their headings."""
     for name in _quantities(rows[0]):
-        words, unit = _unit(name)
-        known = [_known(row, name) for row in rows]
+        words, unit = _name_and_unit(name)
+        known = [_format_value(row, name) for row in rows]
         yield [f"{words} ({unit})", *(f"{value} ({interval})" for value, interval in known)]
     if f"{_MOUNTING}_q05" in rows[0]:
         name = _quantities(rows[0])[0]
-        yield ["in any one mounting", *(_known(row, name, f"{_MOUNTING}_")[1] for row in rows)]
+        yield ["in any one mounting", *(_format_value(row, name, f"{_MOUNTING}_")[1] for row in rows)]
     for name in rows[0]:
         if name.endswith(_PROBABILITY):
             yield [f"{name.removesuffix(_PROBABILITY)}, probability", *(percent(row[name], 0) for row in rows)]
 
 
-def _notes(rows: Sequence[Row]) -> list[str]:
+def _note_lines(rows: Sequence[Row]) -> list[str]:
     """What holds of all, and what lies outside where."""
     of_load = rows[0].get("at_input_force_N")
-    said = [] if of_load is None else [f"At an input force of {significant(of_load)} N, because friction depends on the load."]
+    notes = [] if of_load is None else [f"At an input force of {significant(of_load)} N, because friction depends on the load."]
     for note in dict.fromkeys(row["note"] for row in rows if row["note"]):
-        where = [_at(row) for row in rows if row["note"] == note]
-        said.append(f"{'Everywhere' if len(where) == len(rows) > 1 else few(where, 4)}: {note}.")
-    return said
+        where = [_position_text(row) for row in rows if row["note"] == note]
+        notes.append(f"{'Everywhere' if len(where) == len(rows) > 1 else few(where, 4)}: {note}.")
+    return notes
+
+
+class Predictions(Display, list[dict[str, Any]]):
+    """What `predict` answers; units of forces, lengths and angles stand in the names of the columns."""
+
+    def __str__(self) -> str:
+        return predictions_text(self).strip()
+
+    def _table(self) -> Rows:
+        return self, column_units(self[0] if self else {})

@@ -2,15 +2,16 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 from bowdenfit.kinds import each_table
-from bowdenfit.pages.section import Section
+from bowdenfit.kinds.terms import term_kind
+from bowdenfit.pages.section import PageSection
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.summary.sampler_words import sampler_text
-from bowdenfit.questions.summary.verdict import verdict
-from bowdenfit.questions.summary.words import counts_in_words
+from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.results.serialization import values_by_key
+from bowdenfit.words import listed
 
 REFERENCES = {
     "capstan": "L. Euler, Remarques sur l'effet du frottement dans l'équilibre, Mémoires de l'académie des sciences de Berlin "
@@ -38,29 +39,50 @@ REFERENCES = {
 _CITED = re.compile(rf"\[({'|'.join(REFERENCES)})\]")
 
 
-def section(fit: Record) -> Section:
+def methods_section(fit: Record) -> PageSection:
     """The paragraphs with numbers in place of the keys of `REFERENCES`, and the references by these numbers."""
-    paragraphs = [" ".join(filter(None, [_data(fit), _model(fit), _inference(fit)])), _priors(fit)]
+    paragraphs = [
+        " ".join(filter(None, [_data_sentence(fit), _model_sentences(fit), _inference_sentences(fit)])),
+        _prior_sentence(fit),
+    ]
     keys = list(dict.fromkeys(_CITED.findall(paragraphs[0])))
     paragraphs[0] = _CITED.sub(lambda cited: f"[{keys.index(cited[1]) + 1}]", paragraphs[0])
     versions = fit.provenance.versions
     context = {
-        "trusted": verdict(fit).trusted,
+        "trusted": assess_fit(fit).trusted,
         "paragraphs": [p for p in paragraphs if p],
         "references": [REFERENCES[key].format(jax=versions.get("jax", "")) for key in keys],
     }
-    return Section("Methods, to cite", Path(__file__).with_name("methods.html"), context)
+    return PageSection("Methods, to cite", Path(__file__).with_name("methods.html"), context)
 
 
-def _data(fit: Record) -> str:
+def describe_counts(fit: Record) -> str:
+    """What was fitted to: '17 wrap angles and 4 efficiencies'."""
+    description, tables = fit.dataset.description, fit.dataset.measurements
+    entered = [term_kind(term.name).count_readings(term, description) for term in fit.model.terms]
+    read = [kind.count_readings(table) for kind, table in each_table(tables)]
+    return listed([count for count in (*entered, *read) if count])
+
+
+def describe_fitted_data(fit: Record) -> str:
+    """What was fitted to, and by which model where it is not the usual one, in a sentence."""
+    description = fit.dataset.description
+    geometry = f"; {description.geometry} geometry" if description.curved else ""
+    model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
+    laws = f"; {description.laws_in_words}" if description.laws_in_words else ""
+    noise = f"; {description.noise_in_words}" if description.noise != "normal" else ""
+    return f"Fitted to {describe_counts(fit)}{geometry}{laws}{model}{noise}."
+
+
+def _data_sentence(fit: Record) -> str:
     version = fit.provenance.versions.get("bowdenfit", "")
-    return f"{counts_in_words(fit)} of the cable were fitted jointly with bowdenfit {version}.".strip()
+    return f"{describe_counts(fit)} of the cable were fitted jointly with bowdenfit {version}.".strip()
 
 
-def _model(fit: Record) -> str:
+def _model_sentences(fit: Record) -> str:
     """Equations and scatter."""
     description = fit.dataset.description
-    said = [
+    sentences = [
         "Friction at the contacts in series followed F_out = F_in exp(-s sum_k mu_k theta_k), with s = +1 while pulling and -1 "
         "while returning, friction coefficients mu_k and wrap angles theta_k [capstan]"
         + (f", and {description.laws_in_words}" if description.laws_in_words else "")
@@ -70,10 +92,10 @@ def _model(fit: Record) -> str:
         *(kind.methods_sentence for kind, _ in each_table(fit.dataset.measurements)),
         f"Readings scattered with {description.noise_in_words}.",
     ]
-    return " ".join(dict.fromkeys(filter(None, said)))
+    return " ".join(dict.fromkeys(filter(None, sentences)))
 
 
-def _inference(fit: Record) -> str:
+def _inference_sentences(fit: Record) -> str:
     """How values and intervals came about."""
     squares = (
         "Least squares by Levenberg and Marquardt's method [optimistix], with profile intervals, on the same likelihood in JAX "
@@ -82,39 +104,78 @@ def _inference(fit: Record) -> str:
     if fit.sampled is None:
         return f"Values are those of least squares: {squares[0].lower()}{squares[1:]}. No posterior was sampled."
     return " ".join([
-        f"The joint posterior of {fit.model.space.size} parameters was sampled with {_sampler(fit.posterior)}.",
-        _convergence(fit, fit.posterior),
+        f"The joint posterior of {fit.model.space.size} parameters was sampled with {_sampler_phrase(fit.posterior)}.",
+        _convergence_sentence(fit, fit.posterior),
         "Values are medians with central 90 % intervals. Each reading was held against its prediction from all the others by "
-        f"Pareto-smoothed importance sampling [left-out]{_refitted(fit)}.",
+        f"Pareto-smoothed importance sampling [left-out]{_refitted_phrase(fit)}.",
         f"{squares}, served as a comparison. Diagnostics were computed with ArviZ [arviz]. All random numbers follow from the "
         f"seed {fit.provenance.seed}.",
     ])  # fmt: skip
 
 
-def _refitted(fit: Record) -> str:
+def _refitted_phrase(fit: Record) -> str:
     """What more was done for readings of which the weights cannot tell."""
-    found = checks_of(fit)
-    n = sum(int(table.refitted.sum()) for table in found.tables) if found else 0
+    checks = checks_of(fit)
+    n = sum(int(table.refitted.sum()) for table in checks.tables) if checks else 0
     return f", {n} of them against that of a fit without it" if n else ""
 
 
-def _sampler(drawn: Draws) -> str:
-    trajectories = values_by_key(drawn.trajectories) if drawn.trajectories else {}
-    page = {"method": drawn.sampler, "ensembles": drawn.n_ensembles, "walkers": len(drawn.z) // drawn.n_ensembles}
-    page |= {"steps": drawn.steps} | {key: value for key, value in trajectories.items() if key != "statistics"}
+def _sampler_phrase(posterior: Draws) -> str:
+    trajectories = values_by_key(posterior.trajectories) if posterior.trajectories else {}
+    page = {
+        "method": posterior.sampler,
+        "ensembles": posterior.n_ensembles,
+        "walkers": len(posterior.z) // posterior.n_ensembles,
+    }
+    page |= {"steps": posterior.steps} | {key: value for key, value in trajectories.items() if key != "statistics"}
     words = sampler_text(page)
-    return f"{words} [nuts] [blackjax]" if drawn.sampler == "nuts" else f"emcee [emcee], {words}"
+    return f"{words} [nuts] [blackjax]" if posterior.sampler == "nuts" else f"emcee [emcee], {words}"
 
 
-def _convergence(fit: Record, drawn: Draws) -> str:
+def _convergence_sentence(fit: Record, posterior: Draws) -> str:
     settings = fit.dataset.description.sampler
-    r_hat = "rank-normalized R-hat [r-hat]" if drawn.sampler == "nuts" else "rank-normalized, nested R-hat [r-hat] [nested]"
+    r_hat = "rank-normalized R-hat [r-hat]" if posterior.sampler == "nuts" else "rank-normalized, nested R-hat [r-hat] [nested]"
     limits = f"{r_hat} below {settings.target_r_hat:g} and effective sample sizes of at least {settings.target_ess}"
     if not fit.converged:
         return f"Convergence, which is {limits} for every parameter, was NOT reached."
     return f"It was sampled until every parameter had a {limits}."
 
 
-def _priors(fit: Record) -> str:
+def _prior_sentence(fit: Record) -> str:
     shown = "; ".join(f"{p.name} {p.prior_text}" for p in fit.model.space.free)
     return f"Priors: {shown}." if fit.sampled is not None and shown else ""
+
+
+def sampler_text(sampler: dict[str, Any]) -> str:
+    """The sampler in a few words.
+
+    Args:
+        sampler: The page "sampler" of summary.json.
+    """
+    if sampler["method"] == "nuts":
+        return f"NUTS, {sampler['ensembles']} chains of {sampler['steps']} draws after {sampler['warm_up']} of warm-up"
+    return f"{sampler['ensembles']} ensembles of {sampler['walkers']} walkers, {sampler['steps']} steps"
+
+
+def sampler_sentences(page: dict[str, Any]) -> list[str]:
+    """How trajectories went, whether a second sampler agrees, and which to try instead; empty of most fits.
+
+    Args:
+        page: What summary.json holds.
+    """
+    sampler, sentences = page.get("sampler", {}), []
+    if sampler.get("method") == "nuts":
+        sentences.append(_trajectories(sampler))
+    if page.get("samplers", {}).get("agree"):  # a disagreement stands among the reasons
+        sentences.append(page["samplers"]["sentence"])
+    return [*sentences, *filter(None, [sampler.get("recommendation")])]
+
+
+def _trajectories(sampler: dict[str, Any]) -> str:
+    diverged = f"{sampler['diverged']} of {sampler['drawn']} trajectories diverged" if sampler["diverged"] else ""
+    if sampler["diverged"] and not sampler["fine_diverged"]:
+        diverged += f", none of the {sampler['fine']} of fine steps that reach where the others break off"
+    mixing = sampler["energy_mixing"]
+    energy = f"energy mixing (E-BFMI) {mixing:.2f}" if mixing is not None else "energy mixing could not be computed"
+    long = f"; {sampler['saturated']} were cut off at their longest" if sampler["saturated"] else ""
+    return f"NUTS: {diverged or 'no trajectory diverged'}; {energy} (0.3 or more is good){long}."

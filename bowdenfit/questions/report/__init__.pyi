@@ -1,0 +1,2 @@
+from .page import report_page as report_page
+from .page import write_report as write_report

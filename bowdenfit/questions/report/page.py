@@ -1,0 +1,111 @@
+"""The figures of a fit on its report: the answer first, what is for statisticians folded, two to zoom into."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from bowdenfit.errors import UsageError
+from bowdenfit.pages.section import Chart, HtmlPage, PageSection, Picture, prose_section
+from bowdenfit.plots.write import PNG
+from bowdenfit.questions.bends.bends_section import section as bends_section
+from bowdenfit.questions.figures import (
+    FIGURES,
+    collect_figure_data,
+    figure_caption,
+    read_figure_data,
+    warning_mark,
+    write_figure_files,
+)
+from bowdenfit.questions.length.efficiency_chart import efficiency_chart
+from bowdenfit.questions.loss.answer import loss_section
+from bowdenfit.questions.next.answer import NextMeasurement
+from bowdenfit.questions.next.next_section import ranking_section
+from bowdenfit.questions.next.ranking import next_measurement
+from bowdenfit.questions.recorded.recordings_chart import recordings_charts
+from bowdenfit.questions.summary.methods import methods_section
+from bowdenfit.questions.summary.sections import (
+    answer_section,
+    checks_section,
+    coefficients_section,
+    measured_section,
+    next_step_section,
+    provenance_section,
+)
+from bowdenfit.questions.summary.verdict import assess_fit
+from bowdenfit.questions.writing import write_page
+from bowdenfit.results.folder import REPORT, file_to_write
+from bowdenfit.results.record import Record
+from bowdenfit.results.store import load
+
+ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, bends_section)
+BELOW_FIGURES = (methods_section, provenance_section)
+FIRST = ("efficiency",)  # the answer
+FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
+CHARTS: dict[str, Callable[[Any], tuple[Chart, ...]]] = {
+    "efficiency": efficiency_chart,
+    "recordings": recordings_charts,
+}
+
+
+def figures_section(figures: dict[str, Any]) -> PageSection | None:
+    """The figures of a fit; None without any.
+
+    Args:
+        figures: Data by name.
+    """
+    names = sorted(figures, key=lambda name: (name in FOLDED, name not in FIRST))
+    pictures = tuple(_figure_picture(name, figures[name]) for name in names)
+    return prose_section("Figures", (), pictures=pictures) if pictures else None
+
+
+def _figure_picture(name: str, data: Any) -> Picture:
+    charts = CHARTS[name](data) if name in CHARTS else ()
+    return Picture(name, FIGURES[name].HEADING, figure_caption(name, data), charts, name in FOLDED)
+
+
+def report_page(fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None) -> HtmlPage:
+    """The report of a fit.
+
+    Args:
+        fit: The fit.
+        figures: Data of the figures that are on it, by name.
+        ranking: What to measure next; a sentence says how to ask if omitted.
+    """
+    above, below = ([make_section(fit) for make_section in group] for group in (ABOVE_FIGURES, BELOW_FIGURES))
+    following = next_step_section(fit) if ranking is None else ranking_section(ranking)
+    sections = [*above, figures_section(figures), checks_section(fit), following, *below]
+    when = f", {fit.provenance.created[:10]}" if fit.provenance.created else ""
+    subtitle = f"Report of a fit by bowdenfit {fit.provenance.versions.get('bowdenfit', '')}{when}"
+    return HtmlPage(fit.name, subtitle, tuple(section for section in sections if section is not None))
+
+
+def write_report(fit: Record | str | Path, output: str | Path | None, rank_next: bool = False) -> Path:
+    """Write the report of a fit to one HTML file.
+
+    Args:
+        fit: The fit, or its results folder.
+        output: The file, or a folder for report.html; the results folder if None.
+        rank_next: Whether to rank what could be measured next.
+
+    Returns:
+        The file written.
+
+    Raises:
+        UsageError: A fit is given without a file.
+        StoreError: The results folder is missing or damaged, or the file cannot be written.
+    """
+    figures = dict[str, Any]()
+    if isinstance(fit, str | Path):
+        folder = Path(fit)
+        output, fit, figures = output or folder / REPORT, load(folder), read_figure_data(folder)
+    if output is None:
+        raise UsageError("a fit by itself has no folder; name a file for the report.")
+    ranking = next_measurement(fit) if rank_next else None
+    figures, path, mark = figures or dict(collect_figure_data(fit)), Path(output), warning_mark(assess_fit(fit).troubles)
+    path = path / REPORT if path.is_dir() else path
+    with file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
+        for name, data in figures.items():
+            write_figure_files(name, data, Path(figures_folder), (PNG,), fit.name, mark=mark)
+        write_page(report_page(fit, figures, ranking), Path(figures_folder), temporary)
+    return path

@@ -1,0 +1,353 @@
+"""The whole summary (`details.txt`): verdict, coefficients, measured beside predicted, the design answer."""
+
+from math import isfinite
+from typing import Any
+
+from bowdenfit.cable.curves import Curve
+from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.least_squares import KINKED, Estimate
+from bowdenfit.kinds import readings_called
+from bowdenfit.kinds.recordings.kind import recordings_text
+from bowdenfit.parameters.space import Parameter
+from bowdenfit.questions.bends.words import describe_elastic
+from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.words import describe_checks
+from bowdenfit.questions.groups.words import groups_text
+from bowdenfit.questions.identify.answer import describe_identified
+from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
+from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
+from bowdenfit.questions.loss.answer import loss_text
+from bowdenfit.questions.recorded.lost_force import lost_force
+from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
+from bowdenfit.questions.recorded.stick_slip import stick_slip
+from bowdenfit.questions.summary.methods import describe_fitted_data, sampler_sentences, sampler_text
+from bowdenfit.questions.summary.page import summarize
+from bowdenfit.questions.summary.verdict import (
+    COARSE,
+    CONTRADICTORY,
+    COPIED,
+    IMPOSSIBLE,
+    NOT_CONVERGED,
+    NOT_DESCRIBED,
+    Verdict,
+    assess_fit,
+)
+from bowdenfit.recordings.recording import Recordings
+from bowdenfit.results.record import Record
+from bowdenfit.words import decimals, filled, listed, percent, significant, table
+
+_UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
+_PRIOR_DRIVEN = 0.2  # contraction below which a parameter is said to rest on its prior alone
+
+
+_HEADS = (
+    "parameter", "median", "90 % interval", "mean ± sd", "least squares ± s.e.", "90 % profile interval", "prior", "unit",
+)  # fmt: skip
+_ALWAYS = (0, 4, 6)  # columns that are shown even where they are empty
+_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
+def details_text(fit: Record) -> str:
+    """Everything that a fit says, for people."""
+    page = summarize(fit)
+    blocks = [
+        _title_block(fit),
+        _verdict_block(fit, page),
+        parameters_text(fit),
+        groups_text(fit),
+        _identified_sentence(fit),
+        _prior_driven_sentence(page),
+        _curve_block(fit, page),
+    ]
+    blocks += [
+        _residual_sentence(page),
+        _mounting_scatter_block(fit, page),
+        _recordings_block(fit),
+        _measured_block(fit, page),
+        describe_checks(checks_of(fit)),
+        _friction_model_block(fit),
+        describe_elastic(fit),
+        loss_text(fit),
+        _design_answer(fit),
+    ]
+    blocks.append(_origin_sentence(page))
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _title_block(fit: Record) -> str:
+    remarks = [filled(remark) for remark in fit.dataset.measurements.remarks]
+    return "\n".join([fit.name, "=" * len(fit.name), filled(describe_fitted_data(fit)), *remarks])
+
+
+def _verdict_block(fit: Record, page: dict[str, Any]) -> str:
+    fit_verdict = assess_fit(fit)
+    if fit.sampled is None:
+        state = "least squares only; no posterior, no design answer" if fit_verdict.trusted else _problem_headline(fit_verdict)
+    else:
+        state = "converged" if fit_verdict.trusted else _problem_headline(fit_verdict)
+        sampler = page["sampler"]
+        state += f" ({sampler_text(sampler)})"
+    lines = [f"Verdict: {state}."]
+    lines += [filled(f"- {reason}", indent="  ") for reason in fit_verdict.reasons]
+    lines += [filled(sentence) for sentence in sampler_sentences(page)]
+    if NOT_IDENTIFIABLE not in fit_verdict.troubles:  # which says so of the same parameters
+        lines += [filled(c.sentence()) for c in confounded_pairs(fit)]
+    return "\n".join(lines)
+
+
+def _problem_headline(fit_verdict: Verdict) -> str:
+    """What is wrong, in capitals that nobody overlooks."""
+    kinds = {
+        NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
+        CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
+        IMPOSSIBLE: "IMPOSSIBLE READINGS",
+        COPIED: "COPIED READINGS",
+        COARSE: "READINGS TOO COARSE",
+        NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
+    }
+    if NOT_CONVERGED in fit_verdict.troubles:
+        return "NOT CONVERGED; do not use these numbers"
+    return f"{listed([kinds[kind] for kind in fit_verdict.troubles])}; do not use these numbers before reading why"
+
+
+def _identified_sentence(fit: Record) -> str:
+    """Which coefficients the measurements determine, in a sentence."""
+    friction = assess_identifiability(fit).groups.get("friction") if fit.sampled is not None else None
+    return filled(describe_identified(friction, measured=True)) if friction is not None else ""
+
+
+def _prior_driven_sentence(page: dict[str, Any]) -> str:
+    names = [
+        n
+        for n, p in page["parameters"].items()
+        if p.get("contraction") is not None and p["contraction"] < _PRIOR_DRIVEN
+    ]
+    if not names:
+        return ""
+    verb = "rests" if len(names) == 1 else "rest"
+    return filled(f"Hardly informed by the measurements: {listed(names)} {verb} on the prior almost alone.")
+
+
+def _curve_block(fit: Record, page: dict[str, Any]) -> str:
+    """Derived quantities of the curves, a table for each family."""
+    if fit.sampled is None:
+        return ""
+    families: dict[type[Curve], list[str]] = {}
+    for curve in fit.model.cable.curves.values():
+        families.setdefault(type(curve), []).extend(curve.derived_units())
+    return "\n\n".join(_curve_family_lines(family, names, page["curves"]) for family, names in families.items() if names)
+
+
+def _curve_family_lines(family: type[Curve], names: list[str], page: dict[str, Any]) -> str:
+    lines, note = [f"{family.heading}, median (90 % interval):"], False
+    for name in names:
+        c = page[name]
+        unlimited = bool(family.not_limited) and any(
+            c[q] is None or abs(c[q]) > _UNLIMITED for q in ("q05", "median", "q95")
+        )
+        interval = "not limited" if unlimited else f"{c['median']:.4g} ({c['q05']:.4g} to {c['q95']:.4g}) {c['unit']}"
+        lines.append(f"  {name:<30} {interval}")
+        note = note or unlimited
+    return "\n".join([*lines, *([filled(f"Not limited: {family.not_limited}", indent="  ")] if note else [])])
+
+
+def _residual_sentence(page: dict[str, Any]) -> str:
+    deviations = [(readings_called(name), sd) for name, sd in page["least_squares"]["residual_sd"].items() if sd is not None]
+    parts = [
+        f"{called.name.replace('_', ' ')} {called.shown_scale * sd:.2f} {called.scatter_unit}"
+        for called, sd in deviations
+        if called.scatter_unit
+    ]
+    return filled(f"Residual standard deviation of least squares: {listed(parts)}.") if parts else ""
+
+
+def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
+    """The scatter from mounting to mounting, in words."""
+    tau, runs = (
+        page["parameters"].get(RUN_SCATTER, {}),
+        {r["label"] for r in page["measured"] if readings_called(r["table"]).are_runs},
+    )
+    if "median" not in tau or not runs:
+        return ""
+    shown = (f"{100 * tau[q]:.1f}" for q in ("median", "q05", "q95"))
+    median, low, high = shown
+    heavy = (
+        " That is the scale of a Student-t, not a standard deviation: about six mountings in ten lie within it, and now and "
+        "then one lies far outside."
+        if fit.dataset.description.noise == "student"
+        else ""
+    )
+    return filled(
+        f"From one mounting of the cable to the next the efficiency scatters by {median} % of itself (90 % interval {low} to "
+        f"{high} %). All samples of a run share what its mounting did, so longer runs do not make the coefficients surer; "
+        f"more runs do.{heavy}"
+    )
+
+
+def _recordings_block(fit: Record) -> str:
+    recordings = fit.dataset.measurements.table(Recordings)
+    return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
+
+
+def _friction_model_block(fit: Record) -> str:
+    """What the options of the friction model found."""
+    friction = fit.model.cable.friction
+    if not friction.options:
+        return ""
+    conditions, lines = friction.conditions, []
+    if friction.depends_on_load:
+        lines.append(
+            f"Coefficients, efficiency curves and the best length are stated for an input force of "
+            f"{conditions.reference_force:g} N, because friction depends on the load; measured efficiencies hold at the force "
+            "that stands beside them."
+        )
+        lost = lost_force(fit)
+        lines += [lost.explanation()] if lost is not None else []
+    if friction.depends_on_stroke:
+        lines.append(
+            "Coefficients are the mean of pulling and returning; efficiencies and the best length are those of pulling."
+        )
+    if friction.depends_on_rate:
+        unit, scale = SHOWN_SPEED[conditions.velocity_unit]
+        speed = f"{significant(scale * conditions.reference_speed)} {unit}"
+        lines.append(
+            f"Coefficients and efficiencies are stated for a speed of {speed}, because friction may depend on speed."
+        )
+    effect = rate_effect(fit)
+    if effect is not None:
+        lines.append(effect.sentence())
+    if (falls := stick_slip(fit)) is not None:
+        lines.append(falls.sentence())
+    return "\n".join(filled(line) for line in lines)
+
+
+def _measured_block(fit: Record, page: dict[str, Any]) -> str:
+    if not page["measured"]:
+        return ""
+    has_draws = fit.sampled is not None
+    load_head = ["at input"] if any("input_force_N" in row for row in page["measured"]) else []
+    heads = ["measured at", *load_head, "measured", "predicted", *(["90 % interval"] if has_draws else [])]
+    heads += ["measured/predicted - 1"]
+    rows = []
+    for row in page["measured"]:
+        interval = [f"{percent(row['q05'], 2)} to {percent(row['q95'], 2)}"] if has_draws else []
+        what = "run " if readings_called(row["table"]).are_runs else ""
+        rows.append(
+            [
+                what + row["label"],
+                *([f"{significant(row['input_force_N'])} N"] if load_head else []),
+                percent(row['measured'], 2),
+                percent(row['predicted'], 2),
+                *interval,
+                percent(row['relative_error'], 2, "+"),
+            ]
+        )
+    return "Efficiency, measured and predicted\n" + table(heads, rows)
+
+
+def _design_answer(fit: Record) -> str:
+    if fit.sampled is None or fit.dataset.description.route is None:
+        return ""
+    return str(fit.optimal_length())
+
+
+def _origin_sentence(page: dict[str, Any]) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
+    return filled(f"Seed {page['seed']}; {versions}.")
+
+
+def parameters_text(fit: Record) -> str:
+    """Every parameter, and remarks on least squares."""
+    estimates, intervals = fit.least_squares.estimates, posterior_intervals(fit)
+    rows = [_row(p, intervals.get(p.name), estimates.get(p.name), bool(intervals)) for p in fit.model.space.parameters]
+    keep = [i for i in range(len(_HEADS)) if i in _ALWAYS or any(row[i] for row in rows)]
+    shown = table([_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows])
+    notes = [
+        filled(f"{name} is {_describe_problem(estimate)}: {estimate.remark}.")
+        for name, estimate in estimates.items()
+        if not estimate.identified
+    ]
+    condition = fit.least_squares.condition_number
+    number = f"{condition:.3g}" if isfinite(condition) else "infinite"
+    notes.append(f"Condition number of the least-squares problem: {number}.")
+    kinked = [] if intervals else [name for name, estimate in estimates.items() if estimate.remark == KINKED]
+    if kinked:
+        why = f"{'have' if kinked[1:] else 'has'} {KINKED}. Sampling gets past kinks: fit without --no-mcmc."
+        notes.append(filled(f"{listed(kinked)} {why}"))
+    wide = [] if intervals else [name for name, estimate in estimates.items() if _is_wide(estimate)]
+    if wide:
+        notes.append(
+            filled(
+                f"The intervals of {listed(wide)} are wider than their standard errors suggest: hardly more readings than "
+                "unknowns leave little to tell the scatter from, or the sum of squares is lopsided."
+            )
+        )
+    by = [f"{p.name} by {p.scaled_by}" for p in fit.model.space.parameters if p.scaled_by]
+    notes += [filled(f"Priors that follow the measurements: {'; '.join(by)}.")] if by else []
+    return "\n".join([shown, *notes])
+
+
+def posterior_intervals(fit: Record) -> dict[str, Interval]:
+    """Of every parameter that was sampled; empty without draws."""
+    return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
+
+
+def _row(parameter: Parameter, interval: Interval | None, estimate: Estimate | None, sampled: bool) -> tuple[str, ...]:
+    posterior_cells = _format_moments(interval) if interval is not None else ("", "", "")
+    # Beside a posterior's intervals there is no room for others; those are in summary.json.
+    profiled = "" if sampled or estimate is None else _format_profile_interval(estimate)
+    least_squares = "" if estimate is None else _format_estimate(estimate)
+    if parameter.fixed is not None:
+        least_squares = f"{parameter.fixed * parameter.shown_scale:.4g} (fixed)"
+    return parameter.name, *posterior_cells, least_squares, profiled, parameter.prior_text, _unit(parameter)
+
+
+def _unit(parameter: Parameter) -> str:
+    return "" if parameter.unit == "1" else parameter.unit
+
+
+def _format_moments(interval: Interval) -> tuple[str, str, str]:
+    """Median, interval, and mean with standard deviation."""
+    median, low, high, mean, sd = (
+        f"{value:z.{decimals(interval.sd)}f}"
+        for value in (interval.median, interval.q05, interval.q95, interval.mean, interval.sd)
+    )
+    return median, f"{low} to {high}", f"{mean} ± {sd}"
+
+
+def _format_estimate(estimate: Estimate) -> str:
+    if not estimate.identified:
+        return _say_why_missing(estimate)
+    digits = _digits(estimate, abs(estimate.value) / 1000)
+    return f"{estimate.value:z.{digits}f} ± {estimate.standard_error:z.{digits}f}"
+
+
+def _say_why_missing(estimate: Estimate) -> str:
+    return "at bound" if estimate.at_bound else "not identified"
+
+
+def _digits(estimate: Estimate, otherwise: float) -> int:
+    """Decimals that go with its standard error, where there is one."""
+    error = estimate.standard_error
+    return decimals(error if isfinite(error) and error else otherwise)
+
+
+def _format_profile_interval(estimate: Estimate) -> str:
+    """Profile interval of least squares; empty where it was not computed."""
+    finite = [limit for limit in (estimate.lower, estimate.upper) if isfinite(limit)]
+    if not finite:
+        return "not limited" if estimate.open else ""
+    digits = _digits(estimate, (finite[-1] - finite[0]) / 3 or 1.0)
+    shown = [f"{limit:z.{digits}f}" for limit in finite]
+    if estimate.open:
+        return f"{shown[0]} or more" if "upper" in estimate.open else f"{shown[0]} or less"
+    return " to ".join(shown)
+
+
+def _is_wide(estimate: Estimate) -> bool:
+    """Whether the interval is much wider than the standard error says."""
+    width, error = estimate.upper - estimate.lower, estimate.standard_error
+    return estimate.identified and isfinite(width) and isfinite(error) and width > 2 * _WIDE * error
+
+
+def _describe_problem(estimate: Estimate) -> str:
+    return "at its bound in least squares" if estimate.at_bound else "not identified by least squares"

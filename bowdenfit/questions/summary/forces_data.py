@@ -1,0 +1,118 @@
+"""Data of the figure of a table of forces: readings at each bend beside the fitted law, from the model and its draws."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.inference.interval import NORMAL_90
+from bowdenfit.kinds.forces.mountings import group_numbers
+from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.plots.curves import choose_evenly
+from bowdenfit.questions.bends.curves import evaluate_curves, quantiles_of_draws
+from bowdenfit.questions.summary.forces_figure import ONE_BEND, STROKES, ForcesAtBend, ForcesData
+from bowdenfit.questions.summary.verdict import assess_fit
+from bowdenfit.results.record import Record
+
+MOST_PLACES, MOST_READINGS = 6, 1000
+POINTS = 61  # of a line
+_LEAST_ANGLE = np.deg2rad(1.0)  # below which there is no apparent coefficient to speak of
+_WIDE = 20.0  # ratio of the largest to the smallest load from which axes are logarithmic
+
+
+def collect_forces(fit: Record) -> ForcesData | None:
+    """Readings and law; None without a table of forces."""
+    table = fit.dataset.measurements.table(ForceTable)
+    if table is None:
+        return None
+    rows = np.array(choose_evenly(range(len(table.run)), MOST_READINGS))
+    group, first, labels, shown = _group_rows(fit, table, rows)
+    low, high = table.input_force[rows].min(), table.input_force[rows].max()
+    logarithmic = bool(high > _WIDE * low)
+    load = np.geomspace(0.9 * low, 1.1 * high, POINTS) if logarithmic else np.linspace(0.02 * high, 1.05 * high, POINTS)
+    draws = _predict_forces(fit, table, rows, rows[first], load)
+    bends = [_forces_at_bend(table, rows, group == i, label, load, draws, i, i in shown) for i, label in enumerate(labels)]
+    fit_verdict = assess_fit(fit)
+    spread = _spread(fit, load, draws) if fit.sampled is not None else np.zeros(0)
+    count = len(table.run) if len(rows) < len(table.run) else 0
+    reason = next(iter(fit_verdict.reasons), "")
+    model = fit.dataset.description.friction_model
+    return ForcesData(tuple(bends), load, spread, model, fit_verdict.trusted, reason, logarithmic, count)
+
+
+def _group_rows(fit: Record, table: ForceTable, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str], set[int]]:
+    """Place of each row, first row of each place, places in words, and which are shown in color."""
+    route = fit.dataset.description.route
+    angle = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
+    bend = ONE_BEND * np.round(angle / ONE_BEND) if len(np.unique(angle.round(1))) > MOST_PLACES else angle.round(1)
+    names = list(dict.fromkeys(table.group))
+    group = np.array([names.index(table.group[row]) for row in rows]) if names else np.zeros(len(rows))
+    keys = np.column_stack([np.nan_to_num(table.route[rows]), bend, group])
+    distinct, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    place, labels = place.ravel(), []
+    for i, (at, _, number) in enumerate(distinct):
+        length = f"{at:.4g} {route.unit}" if route is not None else ""
+        own = f"{np.mean(angle[place == i]):.3g} deg" if np.isfinite(table.own.angle).any() else ""
+        labels.append(", ".join(part for part in (names[int(number)] if names else "", length, own) if part))
+    return place, first, labels, set(choose_evenly(range(len(distinct)), MOST_PLACES))
+
+
+def _predict_forces(
+    fit: Record, table: ForceTable, rows: np.ndarray, first: np.ndarray, load: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Law at each place, expected output of each row, and wrap angles, of some draws or of least squares alone."""
+    cable, friction = fit.model.cable, fit.model.cable.friction
+    arrays = row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
+    arrays |= {"group": group_numbers(friction.groups, table.group, len(table.run))}
+    least, velocity = friction.conditions.least_force, table.velocity
+
+    def output(values: Mapping[str, Any], which: np.ndarray, force: Any, stroke: Any) -> tuple[Any, Any]:
+        data = {name: jnp.asarray(array[which]) for name, array in arrays.items()}
+        angles, _ = resolve_angles(cable, values, data)
+        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(values, jnp.asarray(velocity[which]))
+        cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
+        read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
+        return cells.shown_output(read, least), jnp.sum(angles, axis=-1)
+
+    strokes = np.array(STROKES, dtype=float)[None, :, None]
+    grid = np.broadcast_to(load, (len(first), len(STROKES), len(load)))
+
+    def curves(values: Mapping[str, Any]) -> dict[str, Any]:
+        law, angle = output(values, first, jnp.asarray(grid), jnp.asarray(strokes))
+        at_rows, bend = output(values, rows, jnp.asarray(table.input_force[rows]), jnp.asarray(table.stroke[rows]))
+        apparent = strokes * jnp.log(grid / law) / jnp.maximum(angle, _LEAST_ANGLE)[:, None, None]
+        return {"law": law, "apparent": apparent, "rows": at_rows, "bend": bend}
+
+    return evaluate_curves(fit, curves)
+
+
+def _forces_at_bend(
+    table: ForceTable, rows: np.ndarray, selected: np.ndarray, label: str, load: np.ndarray, draws: Mapping[str, np.ndarray],
+    number: int, shown: bool,
+) -> ForcesAtBend:  # fmt: skip
+    """Readings at one place, and the law there."""
+    force_in, force_out = table.input_force[rows[selected]], table.output_force[rows[selected]]
+    stroke = table.stroke[rows[selected]]
+    expected, bend = (np.median(draws[name][:, selected], axis=0) for name in ("rows", "bend"))
+    slides = stroke != 0
+    off = np.where(slides, 100 * (force_out / expected - 1), np.nan)
+    bent = np.where(slides & (bend > _LEAST_ANGLE), bend, np.nan)
+    apparent = stroke * np.log(force_in / force_out) / bent
+    weight = np.where(np.isfinite(apparent), 1 / (force_in**-2 + force_out**-2), 0.0)
+    capstan = float(weight @ np.nan_to_num(apparent) / weight.sum()) if weight.sum() else float("nan")
+    law, apparent_law = (quantiles_of_draws(draws[name][:, number]) for name in ("law", "apparent"))
+    lines = load, law, apparent_law, capstan, shown
+    return ForcesAtBend(label, force_in, force_out, stroke, off, apparent, *lines, np.rad2deg(bend))
+
+
+def _spread(fit: Record, load: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+    """How far single readings scatter from the law, by their mountings and by the noise of the load cells."""
+    values = {name: float(np.median(sampled)) for name, sampled in fit.draws().values.items()}
+    fixed = {p.name: float(p.fixed or 0.0) for p in fit.model.space.fixed}
+    tau, noise = ((values | fixed)[name] for name in (RUN_SCATTER, FORCE_NOISE))
+    ratio, output = fit.dataset.description.sensors.noise_ratio, np.median(draws["law"][:, :, 0], axis=(0, 1))
+    return np.asarray(100 * NORMAL_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + 1 / output**2)))

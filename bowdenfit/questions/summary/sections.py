@@ -1,0 +1,103 @@
+"""The answer and whether to trust it, at the top of the report."""
+
+from pathlib import Path
+
+from bowdenfit.kinds import each_table
+from bowdenfit.pages.section import PageSection, PageTable, prose_section
+from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.words import describe_checks
+from bowdenfit.questions.groups.words import groups_text
+from bowdenfit.questions.next.next_section import TITLE
+from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
+from bowdenfit.questions.summary.brief import READING_HEADS, format_reading, say_no_outliers
+from bowdenfit.questions.summary.details import details_text, parameters_text
+from bowdenfit.questions.summary.methods import describe_fitted_data
+from bowdenfit.questions.summary.verdict import (
+    assess_fit,
+    distrust_warning,
+    interval_width_caveat,
+    reasons_against,
+    reasons_to_trust,
+    suggest_next_step,
+)
+from bowdenfit.results.record import Record
+
+
+def answer_section(fit: Record) -> PageSection:
+    """What to do or what the coefficients are; of a fit that is not to be trusted that first, and why."""
+    fit_verdict, (first, *others) = assess_fit(fit), summary_sentences(fit)
+    choices: tuple[PageTable, ...] = ()
+    if fit.sampled is not None and fit.dataset.description.route is not None:
+        best = fit.optimal_length()
+        choices = (PageTable(best.heads, tuple(best.rows), "Lengths that can be bought"),) if best.choices else ()
+    context = {
+        "trusted": fit_verdict.trusted,
+        "doubtful": bool(fit_verdict.doubts) or not fit_verdict.sampled,
+        "first": first,
+        "others": others,
+        "warning": distrust_warning(fit_verdict),
+        "why": [each for each in (*reasons_to_trust(fit), interval_width_caveat(fit)) if each]
+        if fit_verdict.trusted
+        else reasons_against(fit_verdict),
+        "choices": choices,
+    }
+    return PageSection("The answer", Path(__file__).with_name("answer.html"), context)
+
+
+def measured_section(fit: Record) -> PageSection:
+    """Every table, as `bowdenfit check` has it."""
+    data = fit.dataset
+    described = [(kind, kind.describe(table, data.description)) for kind, table in each_table(data.measurements)]
+    items = [line for kind, lines in described if not kind.heading for line in lines]
+    longer = [(kind.heading, "\n".join(lines)) for kind, lines in described if kind.heading]
+    return prose_section(
+        "What was measured", [describe_fitted_data(fit), *data.measurements.remarks], items=items, folded=longer
+    )
+
+
+_HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
+
+
+def coefficients_section(fit: Record) -> PageSection | None:
+    """Coefficients of friction and of the rope; None where every one is stated."""
+    rows = tuple((q.name, q.value, q.interval, q.unit, q.description) for q in key_quantities(fit))
+    folded = [("Every parameter, with what was assumed beforehand", parameters_text(fit)), ("Groups", groups_text(fit))]
+    return prose_section("Coefficients", (), [PageTable(_HEADS, rows, left=(0, 3, 4))], folded=folded) if rows else None
+
+
+_MOST_READINGS = 400  # readings in a table that someone may look through
+
+
+def checks_section(fit: Record) -> PageSection | None:
+    """Readings that are off; folded, all readings and what the checks say in full. None without draws."""
+    outliers, readings = outlying_readings(fit), checked_readings(fit)
+    if not readings:
+        return None
+    heads = ("reading", *READING_HEADS)
+    outlier_table = PageTable(heads, tuple(map(format_reading, outliers)), f"Off: {len(outliers)} of {len(readings)} readings")
+    all_readings = PageTable(heads, tuple(map(format_reading, readings[:_MOST_READINGS])))
+    heading = "All readings" if len(readings) <= _MOST_READINGS else f"The first {_MOST_READINGS} of {len(readings)} readings"
+    folded: list[tuple[str, str | PageTable]] = [
+        (f"{heading} beside what all the others say of each", all_readings),
+        ("What the checks say, with their numbers", describe_checks(checks_of(fit))),
+    ]
+    return prose_section("Checks", [say_no_outliers(readings) if not outliers else ""], [outlier_table], folded=folded)
+
+
+def next_step_section(fit: Record) -> PageSection | None:
+    """The next step with a fit that may be trusted; of another the reasons say it."""
+    sentence = suggest_next_step(fit) if assess_fit(fit).trusted else ""
+    return prose_section(TITLE, [sentence]) if sentence else None
+
+
+def provenance_section(fit: Record) -> PageSection:
+    """What it takes to make the same fit again."""
+    made, files = fit.provenance, fit.dataset.sha256
+    versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
+    when = f", finished {made.created}" if made.created else ""
+    return prose_section(
+        "Where the numbers come from",
+        [f"Seed {made.seed}{when}. The same files, versions and seed give the same numbers.", f"{versions}."],
+        [PageTable(("input file", "SHA-256"), tuple(files.items()), left=(0, 1))],
+        folded=[("Everything that the fit says", details_text(fit))],
+    )

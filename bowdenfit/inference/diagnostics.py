@@ -128,12 +128,12 @@ def describe_convergence_shortfalls(
     for name, d in diagnostics.items():
         if not d.r_hat < target_r_hat:
             wider, most = percent(d.r_hat - 1), percent(target_r_hat - 1)
-            reasons.append(f"{name} spreads {wider} wider over all starts than within one, and should less than {most}")
+            reasons.append(f"{name} spreads {wider} wider over all starts than within one (R-hat), and the limit is {most}")
         if not d.drift < MAXIMUM_DRIFT:
-            reasons.append(f"{name} still drifts while it is sampled, by {percent(d.drift, 0)} of its spread")
+            reasons.append(f"{name} still drifts during sampling, by {percent(d.drift, 0)} of its spread")
         low = min(d.ess_bulk, d.ess_tail)
         if not low >= target_ess:
-            part = "middle" if d.ess_bulk <= d.ess_tail else "ends"
+            part = "middle" if d.ess_bulk <= d.ess_tail else "tails"
             reasons.append(describe_low_ess(f"the {part} of {name}", low, target_ess))
     return tuple(reasons)
 
@@ -146,7 +146,7 @@ def describe_low_ess(quantity: str, ess: float, target: int) -> str:
         ess: Its effective sample size.
         target: The least effective sample size that is acceptable.
     """
-    return f"for {quantity} the samples are worth {ess:.0f} independent ones, and should be worth at least {target}"
+    return f"the effective sample size for {quantity} is {ess:.0f}, and should be at least {target}"
 
 
 @dataclass(frozen=True)
@@ -201,8 +201,8 @@ def describe_trajectory_shortfalls(trajectories: Trajectories) -> tuple[str, ...
     ):
         if diverged > most * total:
             reasons.append(
-                f"{diverged} of {total} trajectories{kind} diverged, and 1 in {1 / most:.0f} is the most: a narrow corner of "
-                "what is likely may be missing; raise sampler.target_acceptance, or state what is known as priors"
+                f"{diverged} of {total} trajectories{kind} diverged, and at most 1 in {1 / most:.0f} may: a narrow region of "
+                "the posterior may be missing; raise sampler.target_acceptance, or state what is known as priors"
             )
     if not trajectories.energy_mixing >= LEAST_ENERGY_MIXING:
         reasons.append(

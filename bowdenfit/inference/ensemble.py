@@ -184,6 +184,6 @@ def _summarize(request: SamplingRequest, backend: emcee.backends.Backend) -> Cha
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored
     chain = request.make_chain(z, request.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
-    too_short = f"the sampling took {stored * THIN} steps, and {_FIRST_CHECK * THIN} are the least that can be judged"
+    too_short = f"the sampling took {stored * THIN} steps, and convergence can only be judged after {_FIRST_CHECK * THIN}"
     first = (too_short,) if stored < _FIRST_CHECK else ()
     return replace(chain, reasons=(*first, *chain.reasons, *describe_stuck_walkers(z)))

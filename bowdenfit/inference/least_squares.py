@@ -109,7 +109,7 @@ class LeastSquares(Display):
     def sentences(self) -> list[str]:
         """How many parameters are identified."""
         identified = [name for name, estimate in self.estimates.items() if estimate.identified]
-        sentence = f"Least squares tell {len(identified)} of {len(self.estimates)} parameters"
+        sentence = f"Least squares determine {len(identified)} of {len(self.estimates)} parameters"
         return [f"{sentence}." if self.converged else f"{sentence}, but did not converge: {self.message}."]
 
     def _table(self) -> Rows:

@@ -184,7 +184,7 @@ def recommend_sampler(sampler: str, n_parameters: int, short: bool) -> str:
         return ""
     if short:
         return (
-            "The ensembles of walkers did not get there. NUTS copes better with posteriors that are narrow, curved or of many "
+            "The ensembles of walkers have not converged. NUTS copes better with posteriors that are narrow, curved or of many "
             "parameters: fit again with --sampler nuts."
         )
     if n_parameters > MANY_PARAMETERS:

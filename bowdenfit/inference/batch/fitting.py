@@ -285,7 +285,7 @@ def estimate_sd_errors(draws: Mapping[str, np.ndarray]) -> dict[str, float]:
 def describe_uncertain_sds(errors: Mapping[str, float], most: float) -> tuple[str, ...]:
     """Describe standard deviations that are not known well enough; empty if all are."""
     return tuple(
-        f"the standard deviation of {name} is known to {percent(error)} and should be to {percent(most)}"
+        f"the standard deviation of {name} is known to {percent(error)} and should be known to {percent(most)}"
         for name, error in errors.items()
         if not error <= most
     )

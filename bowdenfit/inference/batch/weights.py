@@ -194,8 +194,8 @@ class WeightedDraws:
         reasons = []
         if not self.is_reliable:
             reasons.append(
-                f"the weights of the draws are too uneven, Pareto k {self.pareto_k:.2f} where "
-                f"{reliable_k(len(self.z)):.2f} is the most"
+                f"the importance weights are too uneven: Pareto k is {self.pareto_k:.2f}, and at most "
+                f"{reliable_k(len(self.z)):.2f} can be trusted"
             )
         for name, d in diagnostics.items():
             low = min(d.ess_bulk, d.ess_tail)

@@ -162,7 +162,7 @@ class PopulationDensity:
             coefficient_names: Names of the coefficients; numbered from 1 where empty.
         """
         every = coefficient_names or [f"coefficient {i + 1}" for i in range(self.coefficients)]
-        wear = ("the wear", "the difference of wear between cables") if self.wears else ()
+        wear = ("the wear", "the difference in wear between cables") if self.wears else ()
         effects = {"lubrication": "the effect of lubrication", "per_degree": "the effect of temperature"}
         middles, spreads = ([f"{what} of {name}" for name in every] for what in ("the typical value", "the spread"))
         return (*middles, *spreads, *wear, *(effects[name] for name in self.effects))

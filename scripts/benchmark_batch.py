@@ -37,10 +37,10 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.acceptable_tables import refusal
+from bowdenfit.questions.calibrate.acceptable_tables import why_implausible
 from bowdenfit.questions.fleet.fitting import SETTINGS
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
-from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 from bowdenfit.results.fleet_folder import FLEET_PAGE
 
 CONTACTS = ("sheath", "clamp", "edge")
@@ -148,9 +148,9 @@ def cables(number: int) -> list[LogDensity]:
     while len(found) < number:
         seed = next(seeds)
         of_truth, of_readings = jax.random.split(jax.random.key(seed))
-        values = true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
+        values = draw_true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
         made = simulate(description, design, values, of_readings)
-        if not refusal(made, made):
+        if not why_implausible(made, made):
             found.append(LogDensity(build_model(made)))
     return found
 

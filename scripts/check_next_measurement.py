@@ -44,9 +44,9 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.next.simulated_readings import simulated_readings
+from bowdenfit.questions.next.simulated_readings import simulate_readings
 from bowdenfit.questions.next.variance_reduction import explained_share
-from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 from bowdenfit.results.along_route import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
@@ -130,12 +130,12 @@ class Bench:
     def cable(self, seed: int, n_outcomes: int) -> Outcome:
         """One cable."""
         of_truth, of_readings, of_refits = jax.random.split(jax.random.key(seed), 3)
-        truth = true_values(self.description, empty_tables(self.description, DESIGN), {}, of_truth)
+        truth = draw_true_values(self.description, empty_tables(self.description, DESIGN), {}, of_truth)
         dataset = simulate(self.description, DESIGN, truth, of_readings)
         posterior = LogDensity(build_model(dataset))
         z = self._draws(posterior, seed)
         length = self._program(posterior, "optimum", self._optimum)(z)[0]
-        readings = simulated_readings(posterior.model, dataset.measurements, CANDIDATES, z, seed)
+        readings = simulate_readings(posterior.model, dataset.measurements, CANDIDATES, z, seed)
         expected = np.array([explained_share(reading[:, 0], length).share for reading in readings])
         generator = np.random.default_rng(seed)
         draws, base = generator.choice(len(z), OUTCOMES, replace=False), generator.choice(len(z), BASE, replace=False)

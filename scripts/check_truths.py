@@ -31,12 +31,12 @@ from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import design_of, parse_description
-from bowdenfit.questions.calibrate.findings import findings
-from bowdenfit.questions.calibrate.quantities import quantities_of
-from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
+from bowdenfit.questions.calibrate.findings import summarize_replications
+from bowdenfit.questions.calibrate.quantities import list_quantities
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, BatchFitter
 from bowdenfit.questions.calibrate.replication import RankedTruth
-from bowdenfit.questions.calibrate.truths import StatedTruth, stated_truths
-from bowdenfit.questions.calibrate.workbench import Plan, Workbench
+from bowdenfit.questions.calibrate.truths import StatedTruth, parse_truths
+from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
@@ -47,7 +47,7 @@ LENGTHS = tuple(np.linspace(400.0, 600.0, 15))
 COLUMNS = ("free_angle", "squeezed_angle")
 FEWEST = 30  # effective draws of which a rank is taken
 # More draws than a rank needs, for weights that leave few of them.
-MORE = replace(RANKS, sampler=RANKS.sampler.model_copy(update={"target_ess": 800}), n_kept=8192)
+MORE = replace(RANK_SETTINGS, sampler=RANK_SETTINGS.sampler.model_copy(update={"target_ess": 800}), n_kept=8192)
 
 
 @dataclass(frozen=True)
@@ -119,14 +119,14 @@ REPLACED: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Keeping(Laboratory):
+class Keeping(BatchFitter):
     """Keeps what it fitted, in order."""
 
     found: list[BatchFit] = field(default_factory=list)
 
     def fits(self, posteriors: Sequence[LogDensity], seeds: Sequence[int]) -> list[BatchFit]:
         """See `Laboratory`."""
-        done = super().fits(posteriors, seeds)
+        done = super().fit_all(posteriors, seeds)
         self.found.extend(done)
         return done
 
@@ -144,21 +144,21 @@ class Held:
     width: float
 
 
-def plan_of(name: str, bench: Bench, seed: int) -> Plan:
+def plan_of(name: str, bench: Bench, seed: int) -> CalibrationPlan:
     """What is replicated."""
     dataset = bench.dataset()
     with jax.enable_x64(True):
-        plan = Plan(dataset, dataset, seed)
-        return replace(plan, truths=stated_truths(bench.truths(), Workbench(plan).stated.space, name))
+        plan = CalibrationPlan(dataset, dataset, seed)
+        return replace(plan, truths=parse_truths(bench.truths(), Replicator(plan).stated.space, name))
 
 
 def rows_of(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[str, ...]]:
     """What the intervals of one bench held, by quantity."""
     plan = plan_of(name, bench, seed)
     with jax.enable_x64(True):
-        known = quantities_of(plan)
-    made = Workbench(plan, Laboratory()).replications(range(replications))
-    found = findings(list(made), known, truths=tuple(truth.text for truth in plan.truths), seed=seed)
+        known = list_quantities(plan)
+    made = Replicator(plan, BatchFitter()).replicate(range(replications))
+    found = summarize_replications(list(made), known, truths=tuple(truth.text for truth in plan.truths), seed=seed)
     return [
         (name, q.name, *(f"{c.rate:.1%} ({c.low:.0%} to {c.high:.0%})" for c in q.coverage),
          f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{found.ranked}", q.fault)
@@ -169,8 +169,8 @@ def rows_of(name: str, bench: Bench, replications: int, seed: int) -> list[tuple
 def apart(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[str, ...]]:
     """What the intervals of one bench hold with priors replaced by the ranges of truths, by what is replaced and quantity."""
     plan, laboratory = plan_of(name, bench, seed), Keeping(MORE)
-    workbench = Workbench(plan, laboratory)
-    made = list(workbench.replications(range(replications)))
+    workbench = Replicator(plan, laboratory)
+    made = list(workbench.replicate(range(replications)))
     kept = [(each, fit) for each, fit in zip(made, laboratory.found, strict=True) if not each.reasons]
     space, held = workbench.stated.space, dict[tuple[str, str], list[Held | None]]()
     with jax.enable_x64(True):
@@ -195,10 +195,10 @@ def of_range(truth: StatedTruth, z: np.ndarray) -> np.ndarray:
 
     def even(at: jax.Array) -> jax.Array:
         value = jnp.asarray(prior.constrain(at)) * scale
-        return jnp.log(value) if truth.by_factors else value
+        return jnp.log(value) if truth.log_uniform else value
 
     value, slope = (np.asarray(part) for part in jax.vmap(jax.value_and_grad(even))(jnp.asarray(z)))
-    low, high = np.log([truth.low, truth.high]) if truth.by_factors else (truth.low, truth.high)
+    low, high = np.log([truth.low, truth.high]) if truth.log_uniform else (truth.low, truth.high)
     inside = (value >= low) & (value <= high) & (slope > 0)
     return np.where(inside, np.log(np.where(inside, slope, 1.0)) + z**2 / 2, -np.inf)
 

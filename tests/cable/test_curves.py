@@ -239,7 +239,7 @@ def test_comparing_the_families_finds_the_shape_of_the_route(fits):
     assert found.best == "gaussian"
     assert found.verdict("line") == found.verdict("logistic") == "clear"
     assert len(found.readings) == len(LENGTHS) + 9
-    assert [found.described[name].rpartition(", ")[2] for name in CURVES] == [f"{name} curves" for name in CURVES]
+    assert [found.descriptions[name].rpartition(", ")[2] for name in CURVES] == [f"{name} curves" for name in CURVES]
     assert "The data prefer gaussian over" in comparison_text(found)
 
 

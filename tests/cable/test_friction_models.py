@@ -17,7 +17,13 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, play_operator, rate_factor
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 
 REFERENCE = 50.0
 FORCES = np.geomspace(0.5, 200.0, 60)
@@ -158,7 +164,7 @@ def _law(name):
     model = FrictionModel(options, Conditions(REFERENCE, 20.0, (1.0, 40.0), "mm/s"))
     named = {key: jnp.asarray(value) for key, value in values.items()}
     bench = BenchSettings(rate=500.0)
-    return model, named, simulate_recording(LAMBDA, friction, PROFILE, bench, Faults(), np.random.default_rng(0))
+    return model, named, simulate_recording(LAMBDA, friction, PROFILE, bench, LoadCellFaults(), np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("name", LAWS)

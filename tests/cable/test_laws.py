@@ -15,8 +15,8 @@ from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
-from bowdenfit.questions.next.target import answer_of
-from bowdenfit.questions.simulate.simulation import true_values
+from bowdenfit.questions.next.target import choose_target
+from bowdenfit.questions.simulate.simulation import draw_true_values
 from bowdenfit.questions.summary import coefficients_figure, pairs_figure
 
 MU, WOBBLE = 0.13, np.deg2rad(35.0)
@@ -166,7 +166,7 @@ def test_figures_show_the_parameter_of_a_law(fitted):
 
 def test_identifiability_and_the_next_measurement_know_the_parameter_of_a_law(fitted):
     assert {p.name for p in fitted.known.groups["friction"].parameters} == {"mu", "wobble_sheath"}
-    assert answer_of(fitted, "wobble_sheath").unit == "deg"
+    assert choose_target(fitted, "wobble_sheath").unit == "deg"
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_a_law_s_parameter_is_fixed_measured_or_given_a_prior_like_any_other(set
 @pytest.mark.extended
 def test_a_simulation_s_truth_may_state_a_law_s_parameter_in_its_unit():
     dataset = lawful()
-    values = true_values(dataset.description, dataset.measurements, {"wobble_contact_1": 20.0}, jax.random.key(0))
+    values = draw_true_values(dataset.description, dataset.measurements, {"wobble_contact_1": 20.0}, jax.random.key(0))
     assert values["wobble_contact_1"] == pytest.approx(np.deg2rad(20.0))
 
 

@@ -15,7 +15,7 @@ from IPython.lib.pretty import pretty
 
 import bowdenfit as bf
 from bowdenfit.display import Display, as_html, shorten_lines
-from bowdenfit.questions.calibrate.answer import Calibration, Checked, Coverage
+from bowdenfit.questions.calibrate.answer import Calibration, CheckedQuantity, Coverage
 from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
 from bowdenfit.results.record import Record
@@ -291,7 +291,7 @@ def test_stretch_and_preload_have_a_table(least_squares_of):
 
 def test_a_calibration_begins_with_its_verdict():
     held = (Coverage(0.5, 0.51, 0.4, 0.6), Coverage(0.9, 0.88, 0.8, 0.97))
-    checked = Checked("mu", r"$\mu$", (0.5,) * 30, 0.4, 0.8, held, 0.02, 0.1, 0.9)
+    checked = CheckedQuantity("mu", r"$\mu$", (0.5,) * 30, 0.4, 0.8, held, 0.02, 0.1, 0.9)
     found = Calibration("Bench", (), 1, 30, (checked,), {}, {}, 0.1)
     look_at(found)
     assert repr(found).startswith("CALIBRATED: ") and found.to_frame()["held_90"][0] == 0.88

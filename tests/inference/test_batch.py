@@ -16,7 +16,7 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import RANKS
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS
 
 pytestmark = pytest.mark.extended
 
@@ -96,7 +96,7 @@ def test_small_scatters_are_drawn_as_often_as_quadrature_says():
     """
     posterior = LogDensity(build_model(of_rows(RIDGE @ np.array([0.1, 0.15, 0.12]), RIDGE)))
     levels = np.array([0.02, 0.05, 0.5, 0.95])
-    fits = fit_batch(posterior, [posterior.data] * 16, range(16), RANKS)
+    fits = fit_batch(posterior, [posterior.data] * 16, range(16), RANK_SETTINGS)
     shares = np.array([[np.mean(fit.z[:, -1] < at) for at in quantiles_of_scatter(posterior, levels)] for fit in fits])
     errors = shares.std(axis=0, ddof=1) / np.sqrt(len(fits))
     assert not any(fit.reasons for fit in fits)

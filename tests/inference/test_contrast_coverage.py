@@ -13,7 +13,7 @@ from scipy import stats
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
+from bowdenfit.questions.calibrate.refit import BatchFitter, replace_data
 
 pytestmark = pytest.mark.extended
 
@@ -53,8 +53,8 @@ def test_contrasts_hold_the_truth_as_often_as_they_say(tmp_path, laboratory, cou
     truths = np.array([_table(tmp_path / str(seed), laboratory, seed) for seed in range(count)])
     datasets = [load_dataset(tmp_path / str(seed)) for seed in range(count)]
     model = build_model(datasets[0])
-    posteriors = [LogDensity(with_parameters_of(model, dataset)) for dataset in datasets]
-    fits = Laboratory().fits(posteriors, range(count))
+    posteriors = [LogDensity(replace_data(model, dataset)) for dataset in datasets]
+    fits = BatchFitter().fit_all(posteriors, range(count))
     assert all(fit.reasons == () for fit in fits)
     new, old = (model.space.index[f"mu[{group}]"] for group in ("new", "old"))
     inside = 0

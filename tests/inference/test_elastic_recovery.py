@@ -28,7 +28,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.kinds.tables import AngleTable, Measurements, StretchTable
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 
 pytestmark = pytest.mark.extended
 
@@ -215,8 +215,8 @@ def stretched_on_body(on_body):
         description = parse_description(raw | ({"stretch": {"friction": friction}} if friction else {}))
         truth = {name: TRUTH[name] for name in ROPE} | ({friction: 0.085} if friction else {})
         design = design_of(angles=(450.0, 500.0), efficiencies=(470.0,), **ELASTIC)
-        values = true_values(description, empty_tables(description, design), truth, jax.random.key(1), once=True)
-        rows = simulate(description, design, values, jax.random.key(2), once=True).measurements.table(StretchTable)
+        values = draw_true_values(description, empty_tables(description, design), truth, jax.random.key(1), run_once=True)
+        rows = simulate(description, design, values, jax.random.key(2), run_once=True).measurements.table(StretchTable)
         return Dataset(description, alone.measurements.with_tables(rows), {})
 
     return alone, joined
@@ -268,8 +268,8 @@ def mixture(tables: tuple[str, ...]) -> Dataset:
     empty = empty_tables(description, design)
     names = {p.name for p in build_model(Dataset(description, empty, {})).space.parameters}
     truth = {name: value for name, value in (TRUTH | CABLE_TRUTH).items() if name in names}
-    values = true_values(description, empty, truth, jax.random.key(len(tables)), once=True)
-    return simulate(description, design, values, jax.random.key(7), once=True)
+    values = draw_true_values(description, empty, truth, jax.random.key(len(tables)), run_once=True)
+    return simulate(description, design, values, jax.random.key(7), run_once=True)
 
 
 @pytest.mark.parametrize(

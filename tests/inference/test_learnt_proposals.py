@@ -14,7 +14,7 @@ from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.batch.weights import BLOCK, LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import RANKS, _kind
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, _compilation_key
 
 pytestmark = pytest.mark.extended
 
@@ -57,9 +57,11 @@ def test_student_ts_move_to_where_draws_are():
 @pytest.fixture(scope="module")
 def bent():
     """Two coefficients that four rows tell about, where all follows; and places of draws of the prior."""
-    posterior = LogDensity(build_model(of_rows(ANGLES @ np.array([0.1, 0.15]) + np.array([0.01, -0.01, 0.02, 0.0]), ANGLES)))
+    posterior = LogDensity(
+        build_model(of_rows(ANGLES @ np.array([0.1, 0.15]) + np.array([0.01, -0.01, 0.02, 0.0]), ANGLES))
+    )
     with jax.enable_x64(True):
-        programs = BatchPrograms(posterior, RANKS)
+        programs = BatchPrograms(posterior, RANK_SETTINGS)
         places = programs.evaluate_points
 
     def evaluate(given: np.ndarray, is_z: np.ndarray) -> ProposedPoints:
@@ -88,7 +90,9 @@ def proposal_of(bent) -> LearntProposal:
     evaluate, first, friction = bent
     at = evaluate(*first.draw(np.random.default_rng(6), BLOCK))
     weights = np.exp(at.log_density - first.log_density(at) - np.max(at.log_density - first.log_density(at)))
-    return learn_proposal(first, at.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction)
+    return learn_proposal(
+        first, at.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction
+    )
 
 
 def test_what_is_learnt_is_drawn_with_its_density(bent):
@@ -120,9 +124,11 @@ def test_what_is_learnt_is_nearer_than_what_is_about_the_maxima(bent):
 def test_programs_serve_data_of_the_same_priors_and_of_no_others():
     loss = ANGLES @ np.array([0.1, 0.15])
     first, again = (LogDensity(build_model(of_rows(loss + off, ANGLES))) for off in (0.0, 0.01))
-    assert _kind(first) == _kind(again)
+    assert _compilation_key(first) == _compilation_key(again)
     _ = first.model.space.index  # what is worked out once and kept is no part of it
-    assert _kind(first) == _kind(again)
+    assert _compilation_key(first) == _compilation_key(again)
     (mu, *others), space = again.model.space.parameters, again.model.space
     wider = replace(mu, prior=replace(mu.prior, log_sd=2 * PriorDefaults().friction.log_sd))
-    assert _kind(replace(again, model=replace(again.model, space=replace(space, parameters=(wider, *others))))) != _kind(first)
+    assert _compilation_key(
+        replace(again, model=replace(again.model, space=replace(space, parameters=(wider, *others))))
+    ) != _compilation_key(first)

@@ -22,7 +22,7 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import with_readings
+from bowdenfit.questions.simulate.simulation import replace_readings
 
 
 def fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:
@@ -101,7 +101,7 @@ def _experiments(description, n: int) -> Iterator[Dataset]:
     one_cable, values = build_model(dataset).cable, {name: jnp.asarray(value) for name, value in truth.items()}
     draw = jax.jit(lambda key: drawn_readings(one_cable, dataset.measurements, values, key))
     for seed in range(n):
-        yield with_readings(dataset, draw(jax.random.key(seed)))
+        yield replace_readings(dataset, draw(jax.random.key(seed)))
 
 
 def _many_fits(description, n: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -32,7 +32,7 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,
-    Faults,
+    LoadCellFaults,
     MotorProfile,
     SimulatedRecording,
     simulate_recording,
@@ -51,7 +51,7 @@ BLOCK_SCALE = 0.97  # N; about what the default prior makes of such recordings
 STATED = f'delay = {{ value = {1e3 * DELAY}, unit = "ms", sd = {1e3 * DELAY_SD} }}'
 ESTIMATED = 'delay = "estimated"'
 TOTAL = "total exponent"
-FAULTS = Faults(input_noise=0.5, output_noise=0.5, bits=12, input_range=(0.0, 500.0), output_range=(0.0, 500.0))
+FAULTS = LoadCellFaults(input_noise=0.5, output_noise=0.5, bits=12, input_range=(0.0, 500.0), output_range=(0.0, 500.0))
 BENCH = BenchSettings(rate=250.0)
 PROFILE = MotorProfile(speed=1.2, stroke=45.0, cycles=4, lead_in=0.5)
 

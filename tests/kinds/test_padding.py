@@ -13,7 +13,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import rounded_up
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import simulated_again
+from bowdenfit.questions.simulate.simulation import resimulate
 
 pytestmark = pytest.mark.extended
 
@@ -67,7 +67,7 @@ def test_tables_with_other_angles_too_small_to_detect_are_padded_to_one_shape():
     for seed in range(4):
         z = 0.5 * jax.random.normal(jax.random.key(seed), (model.space.size,))
         values = {name: float(value) for name, value in model.space.constrain(z).items()}
-        again = LogDensity(build_model(simulated_again(dataset, values, jax.random.key(seed))))
+        again = LogDensity(build_model(resimulate(dataset, values, jax.random.key(seed))))
         shapes.add(str(jax.tree.map(np.shape, again.data)))
         padded.add(str(jax.tree.map(np.shape, again.padded)))
     assert len(shapes) > 1

@@ -27,7 +27,13 @@ from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import measured_cable
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -228,7 +234,7 @@ def test_bins_of_the_load_do_not_take_the_change_of_friction_within_a_bin_for_no
 
 AS_READ = Preparation(delay="none", saturation="kept", dropouts=False, spikes=False, block="none")
 SHORT = MotorProfile(speed=2.0, lead_in=0.5, cycles=1)
-CAPSTAN, NO_FAULTS = BenchFriction(), Faults()
+CAPSTAN, NO_FAULTS = BenchFriction(), LoadCellFaults()
 
 
 def _recorded(
@@ -259,7 +265,7 @@ def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored, 1.0), of_all.runs)
 
 
-NOISY = Faults(input_noise=0.2, output_noise=0.2)
+NOISY = LoadCellFaults(input_noise=0.2, output_noise=0.2)
 BLOCK = {"mu": MU, "tau": 0.02, "sigma_block": 0.1}
 
 
@@ -287,7 +293,7 @@ def test_without_anything_that_changes_the_scale_whole_recordings_are_sums_over_
 @pytest.mark.parametrize("late", [-0.004, 0.004])
 def test_an_output_that_comes_later_than_it_was_shifted_back_by_has_a_positive_error_of_its_delay(likelihood, late):
     """The bench shifts the whole output in time; forces that change by 2 to 300 % a second tell 4 ms to a tenth."""
-    recording = _recorded(1.5, faults=Faults(delay=late), profile=SHORT, rate=200.0)
+    recording = _recorded(1.5, faults=LoadCellFaults(delay=late), profile=SHORT, rate=200.0)
     recordings = Recordings(("angle",), (recording,), "mm/s", delay_sd=0.01)
     model = _model([recording], likelihood)
     (term,) = model.terms if likelihood == "runs" else (_whole(model, recordings.each),)
@@ -331,7 +337,7 @@ def test_gradients_of_whole_recordings_agree_with_finite_differences_in_every_pa
 def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
     """Against quadrature over the operator itself, which is linear in m but for changes of contact and the bent scale."""
     drag, gain, of_input, of_output = (0.0, 0.0, 0.0, 0.0) if name == "capstan" else (3.0, 0.01, 0.4, -0.3)
-    faults = Faults(0.2, 0.2, None, gain, of_input, of_output)
+    faults = LoadCellFaults(0.2, 0.2, None, gain, of_input, of_output)
     recording = _recorded(2.5, BenchFriction(drag=drag), faults, 3, m=0.02)
     more = {} if name == "capstan" else {"friction_model": "drag", "sensors": GAIN | OFFSET}
     model = _model([recording], **more)
@@ -381,7 +387,7 @@ def test_a_saturated_block_speaks_against_whatever_would_have_shown_less():
 def test_saturated_blocks_that_are_left_out_do_not_pull_the_coefficient(cell, likelihood, model):
     """Whichever load cell was at the end of its range: the operator must not remember an input that the cell did not show."""
     limits = {f"{cell}_range": (-500.0, 75.0)}
-    faults = Faults(input_noise=0.02, output_noise=0.02, **limits)
+    faults = LoadCellFaults(input_noise=0.02, output_noise=0.02, **limits)
     recordings = [_recorded(angle, BenchFriction(drag=4.0 * (model == "drag")), faults, int(angle), settings=FLAGGING)
                   for angle in (1.0, 2.0, 3.0)]  # fmt: skip
     assert all(r.blocks.saturated.sum() > 40 for r in recordings)

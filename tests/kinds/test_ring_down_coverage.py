@@ -14,7 +14,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.calibrate.refit import RANKS
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS
 
 pytestmark = pytest.mark.extended
 
@@ -111,7 +111,7 @@ def test_ranks_of_truths_among_draws_are_uniform(tmp_path):
     """Three quantities of 120 cables; one seed in 300 would fail by chance."""
     truth, found = posteriors(tmp_path, 120, 6)
     space = found[0].model.space
-    fits = fit_batch(found[0], [posterior.data for posterior in found], list(range(120)), RANKS)
+    fits = fit_batch(found[0], [posterior.data for posterior in found], list(range(120)), RANK_SETTINGS)
     settled = [i for i, fit in enumerate(fits) if not fit.reasons]
     assert len(settled) >= 110
     for name in NAMES[1:]:

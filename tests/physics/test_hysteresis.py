@@ -9,7 +9,13 @@ from scipy.optimize import minimize_scalar
 
 from bowdenfit.description import Preparation
 from bowdenfit.physics.friction import play_operator
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.play import play
 
@@ -182,7 +188,7 @@ AS_READ = Preparation(delay="none", saturation="kept", dropouts=False, spikes=Fa
 
 
 def _noisy(noise):
-    faults = Faults(input_noise=noise, output_noise=noise)
+    faults = LoadCellFaults(input_noise=noise, output_noise=noise)
     profile, bench = MotorProfile(speed=2.0, lead_in=0.5, cycles=2), BenchSettings(rate=1000.0)
     return simulate_recording(BAND, BenchFriction(), profile, bench, faults, np.random.default_rng(1))
 

@@ -11,7 +11,13 @@ from conftest import ROOT
 from raw_recordings import to_raw
 
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 from bowdenfit.questions.simulate.recordings.making import make_recordings
 from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
 from bowdenfit.questions.simulate.recordings.writing import write_recordings
@@ -22,7 +28,7 @@ PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 EXPONENT = 0.25
 PROFILE = MotorProfile(speed=2.0, lead_in=0.5, cycles=2)
 BENCH = BenchSettings(rate=500.0)
-CAPSTAN, NO_FAULTS = BenchFriction(), Faults()
+CAPSTAN, NO_FAULTS = BenchFriction(), LoadCellFaults()
 FRICTIONS = {
     "capstan": CAPSTAN,
     "drag": BenchFriction(drag=5.0),
@@ -133,8 +139,8 @@ def test_contact_changes_tell_the_state_of_every_sample():
 
 
 def test_noise_has_its_standard_deviation_white_or_filtered():
-    white = recorded(faults=Faults(input_noise=0.5, output_noise=2.0))
-    slow = recorded(faults=Faults(input_noise=0.5, noise_cutoff=20.0))
+    white = recorded(faults=LoadCellFaults(input_noise=0.5, output_noise=2.0))
+    slow = recorded(faults=LoadCellFaults(input_noise=0.5, noise_cutoff=20.0))
     clean = recorded()
     n = len(clean.time)
     for reading, force, sd in (
@@ -154,17 +160,17 @@ def correlation(error):
 
 
 def test_gain_and_offsets_have_the_signs_of_the_model():
-    clean, faulty = recorded(), recorded(faults=Faults(gain_error=0.03))
+    clean, faulty = recorded(), recorded(faults=LoadCellFaults(gain_error=0.03))
     ratio = np.log(faulty.input_force / faulty.output_force) - np.log(clean.input_force / clean.output_force)
     np.testing.assert_allclose(ratio, 0.03, atol=1e-12)
-    shifted = recorded(faults=Faults(input_offset=1.5, output_offset=-2.0))
+    shifted = recorded(faults=LoadCellFaults(input_offset=1.5, output_offset=-2.0))
     np.testing.assert_allclose(shifted.input_force - clean.input_force, 1.5, atol=1e-12)
     np.testing.assert_allclose(shifted.output_force - clean.output_force, -2.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("samples", [1, 7, -3])
 def test_delay_of_whole_samples_shifts_the_output_alone(samples):
-    clean, late = recorded(), recorded(faults=Faults(delay=samples / 500))
+    clean, late = recorded(), recorded(faults=LoadCellFaults(delay=samples / 500))
     np.testing.assert_array_equal(late.input_force, clean.input_force)
     at, by = (
         (slice(samples, None), slice(None, -samples)) if samples > 0 else (slice(None, samples), slice(-samples, None))
@@ -175,18 +181,18 @@ def test_delay_of_whole_samples_shifts_the_output_alone(samples):
 
 @pytest.mark.parametrize("delay", [0.02, 0.3])
 def test_a_late_channel_shows_the_rest_before_the_start_first(delay):
-    late = recorded(faults=Faults(delay=delay))
+    late = recorded(faults=LoadCellFaults(delay=delay))
     np.testing.assert_allclose(late.output_force[late.time < delay], recorded().output_force[0])
 
 
 def test_delay_between_samples_is_exact():
-    late = recorded(faults=Faults(delay=0.0005))
+    late = recorded(faults=LoadCellFaults(delay=0.0005))
     fine = recorded(bench=BenchSettings(rate=2000.0))
     np.testing.assert_allclose(late.output_force[1:], fine.output_force[3::4][: len(late.time) - 1], atol=1e-9)
 
 
 def test_saturation_clips_and_nothing_else_changes():
-    clean, clipped = recorded(), recorded(faults=Faults(input_range=(0.0, 80.0), output_range=(30.0, 70.0)))
+    clean, clipped = recorded(), recorded(faults=LoadCellFaults(input_range=(0.0, 80.0), output_range=(30.0, 70.0)))
     assert clean.input_force.max() > 80 and clean.output_force.max() > 70 and clean.output_force.min() < 30
     np.testing.assert_array_equal(clipped.input_force, np.minimum(clean.input_force, 80))
     np.testing.assert_array_equal(clipped.output_force, np.clip(clean.output_force, 30, 70))
@@ -194,7 +200,7 @@ def test_saturation_clips_and_nothing_else_changes():
 
 def test_quantization_has_the_step_of_its_bits():
     clean = recorded()
-    coarse = recorded(faults=Faults(input_range=(-100.0, 500.0), output_range=(0.0, 255.0), bits=8))
+    coarse = recorded(faults=LoadCellFaults(input_range=(-100.0, 500.0), output_range=(0.0, 255.0), bits=8))
     np.testing.assert_allclose(coarse.output_force, np.round(coarse.output_force), atol=1e-9)
     step = 600 / 255
     levels = (coarse.input_force + 100) / step
@@ -204,8 +210,8 @@ def test_quantization_has_the_step_of_its_bits():
 
 def test_gaps_are_missing_or_frozen_for_their_length():
     clean = recorded()
-    missing = recorded(faults=Faults(dropouts=60.0, dropout_length=0.05))
-    frozen = recorded(faults=Faults(dropouts=60.0, dropout_length=0.05, dropout_kind="frozen"))
+    missing = recorded(faults=LoadCellFaults(dropouts=60.0, dropout_length=0.05))
+    frozen = recorded(faults=LoadCellFaults(dropouts=60.0, dropout_length=0.05, dropout_kind="frozen"))
     gap = np.isnan(missing.input_force)
     assert gap.sum() >= 25 and not np.array_equal(gap, np.isnan(missing.output_force))
     np.testing.assert_array_equal(missing.input_force[~gap], clean.input_force[~gap])
@@ -215,7 +221,7 @@ def test_gaps_are_missing_or_frozen_for_their_length():
 
 
 def test_spikes_are_single_readings_of_their_size():
-    clean, spiked = recorded(), recorded(faults=Faults(spikes=120.0, spike_size=30.0))
+    clean, spiked = recorded(), recorded(faults=LoadCellFaults(spikes=120.0, spike_size=30.0))
     off = spiked.input_force - clean.input_force
     hit = np.flatnonzero(np.abs(off) > 1e-9)
     duration = clean.time[-1] / 60
@@ -225,14 +231,17 @@ def test_spikes_are_single_readings_of_their_size():
 
 
 def test_one_fault_does_not_change_the_random_numbers_of_another():
-    noisy, both = Faults(input_noise=0.5), Faults(input_noise=0.5, spikes=100.0, dropouts=20.0, output_noise=1.0)
+    noisy, both = (
+        LoadCellFaults(input_noise=0.5),
+        LoadCellFaults(input_noise=0.5, spikes=100.0, dropouts=20.0, output_noise=1.0),
+    )
     few, many = recorded(faults=noisy).input_force, recorded(faults=both).input_force
     assert np.mean(few == many) > 0.9
 
 
 def test_cells_show_only_their_offsets_before_the_preload_is_put_on():
     quiet = recorded(
-        replace(PROFILE, unloaded=0.3), faults=Faults(input_offset=1.0, output_offset=-1.0, gain_error=0.1)
+        replace(PROFILE, unloaded=0.3), faults=LoadCellFaults(input_offset=1.0, output_offset=-1.0, gain_error=0.1)
     )
     before = quiet.time < 0.3 - 1e-9
     assert np.all(quiet.input_force[before] == 1.0) and np.all(quiet.output_force[before] == -1.0)
@@ -258,11 +267,11 @@ def test_friction_that_pushes_is_refused():
 @pytest.mark.parametrize(
     ("profile", "faults", "words"),
     [
-        (replace(PROFILE, unloaded=1.0), Faults(), "longer than lead_in"),
-        (replace(PROFILE, partial_reversals=((60.0, 5.0),)), Faults(), "does not fit"),
-        (replace(PROFILE, partial_reversals=((10.0, 12.0),)), Faults(), "does not fit"),
-        (PROFILE, Faults(bits=12), "needs input_range"),
-        (PROFILE, Faults(input_range=(5.0, 5.0)), "is empty"),
+        (replace(PROFILE, unloaded=1.0), LoadCellFaults(), "longer than lead_in"),
+        (replace(PROFILE, partial_reversals=((60.0, 5.0),)), LoadCellFaults(), "does not fit"),
+        (replace(PROFILE, partial_reversals=((10.0, 12.0),)), LoadCellFaults(), "does not fit"),
+        (PROFILE, LoadCellFaults(bits=12), "needs input_range"),
+        (PROFILE, LoadCellFaults(input_range=(5.0, 5.0)), "is empty"),
     ],
 )
 def test_settings_that_contradict_one_another_are_refused(profile, faults, words):
@@ -313,7 +322,7 @@ def test_the_paper_s_efficiencies_come_out(plan):
     with jax.enable_x64(True):
         made = make_recordings(plan, 1, noise=False)
     expected = {440: 0.77, 470: 0.785, 510: 0.753, 550: 0.678}
-    for recording in made.each:
+    for recording in made.recordings:
         simulated = recording.simulated
         pulling = simulated.stroke == 1
         efficiency = np.mean(simulated.output_force[pulling] / simulated.input_force[pulling])
@@ -326,7 +335,7 @@ def test_run_effects_have_the_scatter_of_the_truth_and_belong_to_mountings():
     raw["recordings"]["also"] = [{"length": 470, "run": f"mounting {i // 2}"} for i in range(60)]
     raw["recordings"]["profile"] |= {"stroke": 1, "cycles": 1}
     with jax.enable_x64(True):
-        made = make_recordings(parse_recordings_plan(raw, ""), 3).each[4:]
+        made = make_recordings(parse_recordings_plan(raw, ""), 3).recordings[4:]
     effects = np.array([m.run_effect for m in made])
     np.testing.assert_array_equal(effects[::2], effects[1::2])
     assert np.std(effects[::2]) == pytest.approx(0.01, abs=4 * 0.01 / np.sqrt(60))
@@ -373,7 +382,7 @@ def test_rows_of_the_files_are_the_readings(plan, tmp_path):
     with jax.enable_x64(True):
         made = make_recordings(plan, 9)
     write_recordings(made, tmp_path)
-    recording = made.each[0]
+    recording = made.recordings[0]
     table = np.genfromtxt(tmp_path / recording.planned.file, delimiter=",", names=True)
     assert table.dtype.names == ("time_s", "input_force_N", "output_force_N", "motor_speed_rpm")
     np.testing.assert_allclose(table["time_s"], recording.simulated.time, atol=1e-6)

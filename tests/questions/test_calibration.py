@@ -33,19 +33,19 @@ from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
-from bowdenfit.questions.calibrate.acceptable_tables import refusal
-from bowdenfit.questions.calibrate.answer import Calibration, Quantity
+from bowdenfit.questions.calibrate.acceptable_tables import why_implausible
+from bowdenfit.questions.calibrate.answer import Calibration, QuantityLabel
 from bowdenfit.questions.calibrate.figures import draw_calibration
-from bowdenfit.questions.calibrate.findings import findings
-from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
-from bowdenfit.questions.calibrate.refit import Laboratory
+from bowdenfit.questions.calibrate.findings import summarize_replications
+from bowdenfit.questions.calibrate.pieces import CalibrationJob, run_piece, split_into_pieces
+from bowdenfit.questions.calibrate.refit import BatchFitter
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.calibrate.sections import calibration_page
-from bowdenfit.questions.calibrate.store import keep, open_replications
+from bowdenfit.questions.calibrate.store import append_replication, open_replications
 from bowdenfit.questions.calibrate.uniformity import UniformRanks
 from bowdenfit.questions.calibrate.words import calibration_text, details_text
-from bowdenfit.questions.calibrate.workbench import Plan, Workbench
-from bowdenfit.questions.simulate.simulation import empty_tables, simulated_again, with_readings
+from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
+from bowdenfit.questions.simulate.simulation import empty_tables, replace_readings, resimulate
 from bowdenfit.questions.writing import write_page
 from bowdenfit.recordings.recording import Recordings
 
@@ -72,14 +72,14 @@ def plausible_values(dataset: Dataset) -> dict[str, float]:
 
 
 def drawn_anew(dataset: Dataset, values: dict[str, float], scale: float = 1.0) -> Dataset:
-    """What `simulated_again` gives, compiled in one piece, which is quicker for one draw of many operations."""
+    """What `resimulate` gives, compiled in one piece, which is quicker for one draw of many operations."""
     cable, tables = build_model(dataset).cable, dataset.measurements
 
     def readings(values, key):
         return drawn_readings(cable, tables, values, key, scale)
 
     arguments = {name: jnp.asarray(value) for name, value in values.items()}, jax.random.key(1)
-    return with_readings(dataset, compile_program(readings, *arguments, run_once=True)(*arguments))
+    return replace_readings(dataset, compile_program(readings, *arguments, run_once=True)(*arguments))
 
 
 # Tables drawn anew -------------------------------------------------------------------------------------------------
@@ -114,7 +114,7 @@ def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
 
 def test_angles_outside_the_range_of_the_curves_stay_as_measured(on_body):
     dataset = load_dataset(on_body)
-    again = simulated_again(dataset, plausible_values(dataset), jax.random.key(1))
+    again = resimulate(dataset, plausible_values(dataset), jax.random.key(1))
     table, drawn = dataset.measurements.table(AngleTable), again.measurements.table(AngleTable)
     outside = table.route > 530
     np.testing.assert_array_equal(table.angle[outside], drawn.angle[outside])
@@ -173,7 +173,7 @@ def test_held_readings_slip_as_often_as_their_likelihood_says():
     for count, p in zip(held, probability, strict=True):
         assert stats.binomtest(int(count), 2000, float(p)).pvalue > 1e-4
     drawn = drawn_readings(model.cable, dataset.measurements, named, jax.random.key(1))
-    forces = with_readings(dataset, drawn).measurements.table(ForceTable)
+    forces = replace_readings(dataset, drawn).measurements.table(ForceTable)
     np.testing.assert_array_equal(forces.input_force, dataset.measurements.table(ForceTable).input_force)
 
 
@@ -206,7 +206,7 @@ def test_recordings_with_clipped_readings_are_refused():
 @pytest.mark.parametrize("name", DATA_SETS)
 def test_measured_tables_pass_the_rule_that_simulated_ones_must_pass(name):
     dataset = data_set(name)
-    assert refusal(dataset, dataset) == ""
+    assert why_implausible(dataset, dataset) == ""
 
 
 def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
@@ -234,7 +234,7 @@ def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
 )  # fmt: skip
 def test_tables_that_no_bench_would_hand_in_are_drawn_again(name, table, column, change, why):
     dataset = data_set(name)
-    assert why in refusal(dataset, changed(dataset, table, **{column: change}))
+    assert why in why_implausible(dataset, changed(dataset, table, **{column: change}))
 
 
 # Ranks -------------------------------------------------------------------------------------------------------------
@@ -247,7 +247,7 @@ def test_p_values_of_uniform_ranks_are_uniform_and_agree_with_the_band():
     rejected, outside = 0, 0
     for _ in range(400):
         sample = generator.uniform(size=100)
-        share = by_chance.below(sample) / 100
+        share = by_chance.count_below(sample) / 100
         out = bool(np.any((share < low) | (share > high)))
         p = by_chance.p_value(sample)
         rejected, outside = rejected + (p <= 0.05), outside + out
@@ -285,7 +285,7 @@ def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad
 
 def test_right_intervals_are_called_calibrated():
     """By chance, ranks or coverage of the one quantity are called wrong once in fifty seeds or less."""
-    found = findings(replications(200), {"mu": Quantity(r"$\mu$")})
+    found = summarize_replications(replications(200), {"mu": QuantityLabel(r"$\mu$")})
     (mu,) = found.quantities
     assert found.is_calibrated
     assert mu.shrinkage == pytest.approx(1 - 0.09)
@@ -298,7 +298,7 @@ def test_right_intervals_are_called_calibrated():
     [(0.5, 0.0, "intervals too narrow"), (2.0, 0.0, "intervals too wide"), (1.0, 0.7, "estimated too high")],
 )  # fmt: skip
 def test_wrong_intervals_are_said_to_be_wrong_in_their_direction(sd, shift, fault):
-    found = findings(replications(200, sd, shift), {})
+    found = summarize_replications(replications(200, sd, shift), {})
     assert not found.is_calibrated
     assert fault in found.faults["mu"]
     text = calibration_text(found)
@@ -307,25 +307,25 @@ def test_wrong_intervals_are_said_to_be_wrong_in_their_direction(sd, shift, faul
 
 
 def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_leave_nothing_judged():
-    found = findings(replications(100, bad=5), {})
+    found = summarize_replications(replications(100, bad=5), {})
     assert found.ranked == 95
-    assert found.is_judged
+    assert found.is_conclusive
     assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(found)
     assert "they would change nothing." in " ".join(calibration_text(found).split())
     spoiled = [
         replace(each, ranked={"mu": replace(each.ranked["mu"], rank=0.01)}) for each in replications(100, bad=10)[:10]
     ]
-    suspect = findings([*spoiled, *replications(100, bad=10)[10:]], {})
+    suspect = summarize_replications([*spoiled, *replications(100, bad=10)[10:]], {})
     assert not suspect.faults
     assert suspect.faults_with_all == {"mu": "ranks are not uniform"}
     assert "wrong would be mu (ranks are not uniform)" in " ".join(calibration_text(suspect).split())
-    worse = findings(replications(100, bad=30), {})
+    worse = summarize_replications(replications(100, bad=30), {})
     assert not worse.is_calibrated
     assert "NOT JUDGED: 70 of 100" in calibration_text(worse)
 
 
 def test_a_calibration_s_figures_show_every_quantity():
-    found = findings(replications(50, 0.5), {"mu": Quantity(r"$\mu$")})
+    found = summarize_replications(replications(50, 0.5), {"mu": QuantityLabel(r"$\mu$")})
     for file in (ranks_figure, coverage_figure, sharpness_figure):
         figure = file.draw(found)
         figure.canvas.draw()
@@ -343,11 +343,11 @@ def test_replications_are_kept_one_by_one_and_a_torn_line_is_made_again(tmp_path
     made = replications(3)
     assert open_replications(folder, FINGERPRINT, resume=False, force=False) == {}
     for each in made:
-        keep(folder, each)
+        append_replication(folder, each)
     file = folder / "replications.jsonl"
     file.write_text(file.read_text()[:-20])
     assert open_replications(folder, FINGERPRINT, resume=True, force=False) == {0: made[0], 1: made[1]}
-    keep(folder, made[2])
+    append_replication(folder, made[2])
     assert open_replications(folder, FINGERPRINT, resume=True, force=False)[2] == made[2]
 
 
@@ -355,7 +355,7 @@ def test_another_seed_or_a_folder_of_something_else_is_refused(tmp_path):
     open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="the seed changed"):
         open_replications(tmp_path / "c", FINGERPRINT | {"seed": 4}, resume=True, force=False)
-    keep(tmp_path / "c", replications(1)[0])
+    append_replication(tmp_path / "c", replications(1)[0])
     with pytest.raises(StoreError, match="--resume, or start over with --force"):
         open_replications(tmp_path / "c", FINGERPRINT, resume=False, force=False)
     with pytest.raises(StoreError, match="holds no calibration to resume"):
@@ -386,9 +386,9 @@ FRICTION = {"prior": {"lognormal": {"median": 0.12, "log_sd": 0.4}}}
 SMALL_NOISE = {"sigma_F": {"prior": {"half_normal": {"sd": 0.3}}}}
 
 
-def calibrated(plan: Plan, n: int, **changes: object) -> Calibration:
-    bench = Workbench(plan, Laboratory(BatchSettings(QUICK, target_sd_error=np.inf)), **changes)
-    return findings(list(bench.replications(range(n))), {})
+def calibrated(plan: CalibrationPlan, n: int, **changes: object) -> Calibration:
+    bench = Replicator(plan, BatchFitter(BatchSettings(QUICK, target_sd_error=np.inf)), **changes)
+    return summarize_replications(list(bench.replicate(range(n))), {})
 
 
 def designed(description: Description, design: Design) -> Dataset:
@@ -409,7 +409,7 @@ def two_coefficients(**prior: object) -> Dataset:
 def test_a_small_calibration_of_the_right_likelihood_passes():
     """Of forces with a run effect, twelve times; it fails by chance for one seed in fifty or less."""
     dataset = two_coefficients()
-    found = calibrated(Plan(dataset, dataset, 5), 12)
+    found = calibrated(CalibrationPlan(dataset, dataset, 5), 12)
     assert not found.faults, found.faults
     assert {q.name for q in found.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
 
@@ -421,7 +421,7 @@ def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
     A right likelihood would be rejected once in a hundred seeds.
     """
     wrong = two_coefficients(tau={"fixed": 1e-6})
-    found = calibrated(Plan(two_coefficients(), wrong, 5), 12)
+    found = calibrated(CalibrationPlan(two_coefficients(), wrong, 5), 12)
     assert found.quantities
     assert {"mu_edge", "mu_clamp"} & set(found.faults)
     assert "too narrow" in " ".join(found.faults.values())
@@ -439,18 +439,18 @@ def angles_alone(undetected: str) -> Dataset:
 @pytest.mark.slow
 def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():
     """Zeros pull the curve down: eight replications reject a parameter at 0.01; a right likelihood, one seed in a hundred."""
-    found = calibrated(Plan(angles_alone("censored"), angles_alone("zero"), 5), 8)
+    found = calibrated(CalibrationPlan(angles_alone("censored"), angles_alone("zero"), 5), 8)
     assert found.quantities
     assert found.faults
 
 
 def test_a_replication_depends_on_its_number_alone():
     dataset = data_set("yarn-on-cylinder")
-    plan = Plan(dataset, dataset, 3)
-    bench = Workbench(plan)
-    _, second, _ = bench.replications(range(3))
-    (piece,) = pickle.loads(pickle.dumps(pieces_of(Asked(plan), [1], workers=2)))
-    for (alone,) in (Workbench(plan, bench.laboratory).replications([1]), replicated(piece)):
+    plan = CalibrationPlan(dataset, dataset, 3)
+    bench = Replicator(plan)
+    _, second, _ = bench.replicate(range(3))
+    (piece,) = pickle.loads(pickle.dumps(split_into_pieces(CalibrationJob(plan), [1], workers=2)))
+    for (alone,) in (Replicator(plan, bench.laboratory).replicate([1]), run_piece(piece)):
         assert replace(alone, seconds=0.0) == replace(second, seconds=0.0)
 
 
@@ -458,7 +458,7 @@ def test_work_is_cut_so_that_all_replications_are_done_once():
     dataset = data_set("yarn-on-cylinder")
     numbers = list(range(3, 203))
     for workers, largest in ((1, 128), (2, 25), (50, 16)):
-        pieces = pieces_of(Asked(Plan(dataset, dataset, 3)), numbers, workers)
+        pieces = split_into_pieces(CalibrationJob(CalibrationPlan(dataset, dataset, 3)), numbers, workers)
         assert [number for piece in pieces for number in piece.numbers] == numbers
         assert max(len(piece.numbers) for piece in pieces) == largest
 
@@ -487,8 +487,8 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
 
 
 def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
-    quantity = Quantity(r"$\mu$", meaning="friction of the sheath")
-    found = replace(findings(replications(50), {"mu": quantity}), name="</title><script>alert(1)</script>")
+    quantity = QuantityLabel(r"$\mu$", meaning="friction of the sheath")
+    found = replace(summarize_replications(replications(50), {"mu": quantity}), name="</title><script>alert(1)</script>")
     draw_calibration(found, tmp_path)
     path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
     with browser() as chromium, opened(chromium, path, width=390) as reader:
@@ -506,7 +506,7 @@ def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.questions.calibrate.workbench.Workbench.replications", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.workbench.Replicator.replicate", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err

@@ -23,9 +23,9 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import with_parameters_of
+from bowdenfit.questions.calibrate.refit import replace_data
 from bowdenfit.questions.figures import collect_figure_data
-from bowdenfit.questions.simulate.simulation import empty_tables, true_values, with_readings
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, replace_readings
 from bowdenfit.questions.simulate.tables import read_bench
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
@@ -236,10 +236,10 @@ def simulated(plan):
 
     def measured(seed, preload=15.0):
         if preload not in programs:
-            values = true_values(plan.description, tables, plan.truth | {"preload": preload}, jax.random.key(0))
+            values = draw_true_values(plan.description, tables, plan.truth | {"preload": preload}, jax.random.key(0))
             named = {name: jnp.asarray(value) for name, value in values.items()}
             programs[preload] = jax.jit(lambda key: drawn_readings(cable, tables, named, key))
-        return with_readings(dataset, programs[preload](jax.random.key(seed)))
+        return replace_readings(dataset, programs[preload](jax.random.key(seed)))
 
     return measured
 
@@ -251,7 +251,7 @@ def solved(simulated):
     objective = make_objective(LogDensity(model))
 
     def solve(dataset):
-        posterior = LogDensity(with_parameters_of(model, dataset))
+        posterior = LogDensity(replace_data(model, dataset))
         return fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z, intervals=False)
 
     return solve

@@ -8,20 +8,20 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.questions.metabolic.answer import answered
-from bowdenfit.questions.metabolic.contradictions import contradictions, rounded
+from bowdenfit.questions.metabolic.answer import analyze_study
+from bowdenfit.questions.metabolic.contradictions import find_contradictions, rounding_range
 from bowdenfit.questions.metabolic.paired import (
     brockway,
     half_width,
-    least_found,
+    mean_and_error,
     persons_needed,
     power,
     probability_below,
-    t_of,
-    t_of_p,
-    two_sided,
+    smallest_detectable,
+    t_from_p,
+    two_sided_p,
 )
-from bowdenfit.questions.metabolic.study import Costs, Study, read_study
+from bowdenfit.questions.metabolic.study import MetabolicCosts, Study, read_study
 
 PRINTED = Path(__file__).parents[2] / "datasets" / "on-body-metabolic"
 
@@ -30,15 +30,15 @@ def test_the_t_of_pairs_is_scipys():
     generator = np.random.default_rng(1)
     for persons in (2, 5, 12, 40):
         one, other = generator.normal(6, 0.3, (2, persons))
-        mean, error = t_of(one - other)
+        mean, error = mean_and_error(one - other)
         reference = stats.ttest_rel(one, other)
         assert mean / error == pytest.approx(reference.statistic, rel=1e-12)
-        assert two_sided(mean / error, persons) == pytest.approx(reference.pvalue, rel=1e-12)
+        assert two_sided_p(mean / error, persons) == pytest.approx(reference.pvalue, rel=1e-12)
         low, high = reference.confidence_interval(0.95)
         assert (mean - half_width(error, persons), mean + half_width(error, persons)) == pytest.approx((low, high), rel=1e-12)
         below = stats.ttest_rel(one, other, alternative="less").pvalue
         assert probability_below(mean, error, persons) == pytest.approx(1 - below, rel=1e-12)
-        assert two_sided(t_of_p(0.03, persons), persons) == pytest.approx(0.03, rel=1e-12)
+        assert two_sided_p(t_from_p(0.03, persons), persons) == pytest.approx(0.03, rel=1e-12)
 
 
 def test_power_is_that_of_simulated_studies():
@@ -54,7 +54,7 @@ def test_power_is_that_of_simulated_studies():
         needed = persons_needed(effect)
         assert power(effect, needed) >= 0.8 > power(effect, needed - 1)
     for persons in (2, 5, 1000):
-        assert power(least_found(persons), persons) == pytest.approx(0.8)
+        assert power(smallest_detectable(persons), persons) == pytest.approx(0.8)
 
 
 def test_brockways_equation_is_the_literatures():
@@ -71,7 +71,7 @@ def test_intervals_hold_the_truth_in_ninety_five_of_a_hundred_studies(studies, l
     for _ in range(studies):
         person = generator.normal(6.0, 0.3, (5, 1))
         net = person + np.array([0.0, -0.3]) + generator.normal(0, 0.15, (5, 2))
-        (each,) = answered(study, Costs(tuple("abcde"), ("without", "with"), net)).comparisons
+        (each,) = analyze_study(study, MetabolicCosts(tuple("abcde"), ("without", "with"), net)).comparisons
         held += each.low <= -0.3 <= each.high
     assert least <= held <= most
 
@@ -79,9 +79,9 @@ def test_intervals_hold_the_truth_in_ninety_five_of_a_hundred_studies(studies, l
 def test_the_printed_study_shows_what_it_can_show():
     found = bf.metabolic(PRINTED)
     by_pair = {(each.condition, each.less): each for each in found.comparisons}
-    assert by_pair["550 mm", "no exoskeleton"].shown and by_pair["470 mm", "no exoskeleton"].shown
+    assert by_pair["550 mm", "no exoskeleton"].is_significant and by_pair["470 mm", "no exoskeleton"].is_significant
     between = by_pair["470 mm", "550 mm"]
-    assert not between.shown and between.lower == pytest.approx(0.889, abs=1e-3)
+    assert not between.is_significant and between.lower == pytest.approx(0.889, abs=1e-3)
     assert 0.85 < between.lower_doubted < 0.87 and between.needed == 21
     assert by_pair["550 mm", "no exoskeleton"].share == pytest.approx(-0.0619, abs=5e-5)
     assert len(found.contradictions) == 2
@@ -95,11 +95,11 @@ def test_the_printed_study_shows_what_it_can_show():
 def test_numbers_that_go_together_contradict_nothing():
     study, _ = read_study(PRINTED)
     right = [each.model_copy(update={"percent": "-6.19"} if each.percent == "-6.98" else {}) for each in study.difference]
-    assert not list(contradictions(study.model_copy(update={"difference": tuple(right)})))
+    assert not list(find_contradictions(study.model_copy(update={"difference": tuple(right)})))
     wild = study.difference[0].model_copy(update={"p": "0.9", "percent": None})
-    (said,) = contradictions(study.model_copy(update={"difference": (wild,)}))
+    (said,) = find_contradictions(study.model_copy(update={"difference": (wild,)}))
     assert "does not go with their standard errors" in said
-    assert rounded("-6.98") == pytest.approx((-6.985, -6.975)) and rounded("6.3") == pytest.approx((6.25, 6.35))
+    assert rounding_range("-6.98") == pytest.approx((-6.985, -6.975)) and rounding_range("6.3") == pytest.approx((6.25, 6.35))
 
 
 def table_of(folder, rows, *lines):

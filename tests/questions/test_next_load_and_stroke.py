@@ -6,9 +6,9 @@ from hand_bench import pull, write
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import name_of, words_of
-from bowdenfit.questions.next.ranking import next_measurement
+from bowdenfit.questions.next.candidate_names import parse_candidates
+from bowdenfit.questions.next.candidates import describe_candidate, format_candidate
+from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import next_measurement_text
 
 pytestmark = pytest.mark.extended
@@ -26,7 +26,7 @@ def fit(tmp_path_factory):
 @pytest.fixture(scope="module")
 def advice(fit):
     """What to measure next for the hidden tension."""
-    return next_measurement(fit, "drag")
+    return rank_measurements(fit, "drag")
 
 
 @pytest.mark.slow
@@ -46,9 +46,9 @@ def test_the_advice_says_which_load_and_stroke(fit, advice):
 
 
 def test_a_run_is_read_as_it_is_named(fit):
-    (candidate,) = parsed_candidates(fit, ["force@180deg,20N,return"])
+    (candidate,) = parse_candidates(fit, ["force@180deg,20N,return"])
     assert (candidate.load, candidate.stroke) == (20.0, -1)
-    assert name_of(candidate) == "force@180deg,20N,return"
-    assert words_of(fit, candidate).endswith("under 20 N while returning")
+    assert format_candidate(candidate) == "force@180deg,20N,return"
+    assert describe_candidate(fit, candidate).endswith("under 20 N while returning")
     with pytest.raises(UsageError, match="pull or return"):
-        parsed_candidates(fit, ["force@180deg,pul"])
+        parse_candidates(fit, ["force@180deg,pul"])

@@ -30,10 +30,10 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
-from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import default_candidates, name_of, words_of
-from bowdenfit.questions.next.ranking import next_measurement
-from bowdenfit.questions.next.simulated_readings import simulated_readings
+from bowdenfit.questions.next.candidate_names import parse_candidates
+from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, list_candidates
+from bowdenfit.questions.next.ranking import rank_measurements
+from bowdenfit.questions.next.simulated_readings import simulate_readings
 from bowdenfit.questions.next.variance_reduction import error_of_difference, explained_share, mean_and_spread
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
@@ -176,7 +176,7 @@ def test_the_expected_reduction_is_what_weighting_the_draws_by_each_outcome_give
     are too small to detect there.
     """
     at = 490.0
-    found = next_measurement(wide, answer, [name_of(Candidate(kind, at))])
+    found = rank_measurements(wide, answer, [format_candidate(Candidate(kind, at))])
     model, z = wide.model, wide.draws().flat_z
     curves = for_each_draw(curve_function(model, np.array([at])), model.space.size)(z)
     shown = {k: v.ravel() for k, v in wide.draws().values.items()}
@@ -203,7 +203,7 @@ def test_an_angle_that_cannot_be_detected_tells_nothing(on_body):
     dataset = load_dataset(on_body, ["tables.angles.detection_limit.value=179"])
     model = build_model(dataset)
     z = 0.1 * np.random.default_rng(1).standard_normal((64, model.space.size))
-    (reading,) = simulated_readings(model, dataset.measurements, [Candidate("angle", 470.0)], z, 1)
+    (reading,) = simulate_readings(model, dataset.measurements, [Candidate("angle", 470.0)], z, 1)
     assert reading.shape == (64, 1, 2)
     np.testing.assert_allclose(reading, 179.0)
 
@@ -213,7 +213,7 @@ def test_readings_of_the_published_geometry_are_of_the_curves_that_hold_there(on
     model = build_model(dataset)
     z = 0.1 * np.random.default_rng(1).standard_normal((8, model.space.size))
     candidates = [Candidate("angle", at) for at in (440.0, 470.0, 520.0)]
-    readings = simulated_readings(model, dataset.measurements, candidates, z, 1)
+    readings = simulate_readings(model, dataset.measurements, candidates, z, 1)
     assert [r.shape[2] for r in readings] == [1, 2, 1]
 
 
@@ -229,7 +229,7 @@ def _runs(dataset: Dataset, model: Model, *values: dict[str, float], repeats: in
     """Runs at 500 mm of each cable, repeats by columns."""
     middle = {p.name: float(p.prior.constrain(jnp.zeros(()))) for p in model.space.free}
     z = np.array([model.space.unconstrain(middle | each) for each in values])
-    (runs,) = simulated_readings(model, dataset.measurements, [Candidate("force", 500.0)], z, 1, repeats=repeats)
+    (runs,) = simulate_readings(model, dataset.measurements, [Candidate("force", 500.0)], z, 1, repeats=repeats)
     return runs
 
 
@@ -270,7 +270,7 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
     assert run.noise == "sigma_block"
     assert set(run.stroke) == {-1.0, 1.0}
     assert len(run.input_force) == 24 < run.worth.sum()
-    found = default_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
+    found = list_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
     assert {c.kind for c in found} == {"angle", "force"}
     assert Candidate("force", 430.0) in found
 
@@ -279,7 +279,7 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
 
 
 def test_by_default_candidates_are_what_the_tables_can_hold(fit):
-    names = [name_of(c) for c in default_candidates(fit)]
+    names = [format_candidate(c) for c in list_candidates(fit)]
     lengths = range(430, 540, 10)
     assert names == [f"angle@{at}" for at in lengths] + [f"efficiency@{at}" for at in (*lengths, 540, 550)]
 
@@ -290,8 +290,8 @@ def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
     design = design_of(runs=(0.0,) * 3, input_forces=(20.0, 60.0), own_angles={"clamp_angle": (30.0, 90.0, 180.0)})
     dataset = Dataset(description, empty_tables(description, design), {})
     fit = pretended(dataset, {"mu": 0.1, "tau": 0.01, "sigma_F": 0.5}, n=3200)
-    assert [name_of(c) for c in default_candidates(fit)] == ["force@30deg", "force@90deg", "force@180deg"]
-    found = next_measurement(fit)
+    assert [format_candidate(c) for c in list_candidates(fit)] == ["force@30deg", "force@90deg", "force@180deg"]
+    found = rank_measurements(fit)
     assert found.answer.name == "mu"
     assert found.best.name == "force@180deg"  # the same error of the exponent is least of the largest angle
     assert "wrap angles in the columns" not in next_measurement_text(found, 5)
@@ -301,11 +301,11 @@ def test_elastic_cables_have_stretch_preload_and_loop_readings():
     description = elastic_cable()
     dataset = Dataset(description, empty_tables(description, design_of(**ELASTIC)), {})
     fit = pretended(dataset, ELASTIC_TRUTH, n=3200)  # in shown units, which here are the internal ones
-    names = [name_of(c) for c in default_candidates(fit)]
+    names = [format_candidate(c) for c in list_candidates(fit)]
     assert {name.partition("@")[0] for name in names} == {"stretch", "preload", "loop"}
     assert all("," in name for name in names if not name.startswith("preload"))
     asked = ["stretch@90deg,50N", "stretch@0deg,0.1kN", "preload@1.5rad", "loop@90deg,30N"]
-    found = next_measurement(fit, "stiffness", asked)
+    found = rank_measurements(fit, "stiffness", asked)
     assert {r.name for r in found.ranked} == {
         "stretch@90deg,50N",
         "stretch@0deg,100N",
@@ -323,10 +323,10 @@ def test_what_is_proposed_where_nothing_is_offered_can_be_asked(on_body):
     dataset = load_dataset(on_body.parent / "synthetic-catheter")
     fit = pretended(dataset, np.zeros(build_model(dataset).space.size), n=3200)
     with pytest.raises(UsageError, match=r"\(displacement\) cannot be simulated") as refused:
-        next_measurement(fit)
+        rank_measurements(fit)
     proposed = re.search(r"such as (.*)\.$", str(refused.value))[1].split(" or ")
     assert proposed == ["efficiency@90deg"]
-    assert [r.name for r in next_measurement(fit, candidates=proposed).ranked] == proposed
+    assert [r.name for r in rank_measurements(fit, candidates=proposed).ranked] == proposed
 
 
 def test_what_is_not_understood_is_answered_with_a_name_that_is(fit):
@@ -335,21 +335,21 @@ def test_what_is_not_understood_is_answered_with_a_name_that_is(fit):
     for of, kinds in ((fit, ("angle", "efficiency")), (loop, ("stretch", "preload", "loop"))):
         for kind in kinds:
             with pytest.raises(UsageError) as refused:
-                parsed_candidates(of, [f"{kind}@3s"])
+                parse_candidates(of, [f"{kind}@3s"])
             (name,) = re.findall(rf"{kind}@[^ ]*\d\w*(?=, with units|\.$)", str(refused.value))
-            (candidate,) = parsed_candidates(of, [name])
-            assert name_of(candidate) == name
+            (candidate,) = parse_candidates(of, [name])
+            assert format_candidate(candidate) == name
 
 
 @pytest.mark.parametrize("text", ["angle@450", "efficiency@470", "efficiency@550"])
 def test_a_candidate_is_read_as_it_is_named(fit, text):
-    (candidate,) = parsed_candidates(fit, [text])
-    assert name_of(candidate) == text
-    assert f"{candidate.route:g} mm" in words_of(fit, candidate)
+    (candidate,) = parse_candidates(fit, [text])
+    assert format_candidate(candidate) == text
+    assert f"{candidate.route:g} mm" in describe_candidate(fit, candidate)
 
 
 def test_lengths_may_have_units(fit):
-    assert parsed_candidates(fit, ["angle@47cm", "angle@470 mm", "angle@470"]) == (Candidate("angle", 470.0),)
+    assert parse_candidates(fit, ["angle@47cm", "angle@470 mm", "angle@470"]) == (Candidate("angle", 470.0),)
 
 
 @pytest.mark.parametrize(
@@ -374,7 +374,7 @@ def test_lengths_may_have_units(fit):
 )
 def test_candidates_that_make_no_sense_are_refused_in_a_sentence(fit, text, sentence):
     with pytest.raises(UsageError) as refused:
-        parsed_candidates(fit, [text])
+        parse_candidates(fit, [text])
     assert sentence in str(refused.value)
     assert repr(text) in str(refused.value)
 
@@ -384,7 +384,7 @@ def test_candidates_that_make_no_sense_are_refused_in_a_sentence(fit, text, sent
 
 @pytest.fixture(scope="module")
 def for_length(fit):
-    return next_measurement(fit)
+    return rank_measurements(fit)
 
 
 def test_for_the_best_length_efficiencies_far_from_it_are_worth_most(for_length):
@@ -396,12 +396,12 @@ def test_for_the_best_length_efficiencies_far_from_it_are_worth_most(for_length)
 
 
 def test_for_the_coefficient_of_the_bracket_edge_the_length_of_least_other_friction_is_best(fit):
-    found = next_measurement(fit, "mu3", [f"efficiency@{at}" for at in (430, 450, 480, 510, 530)])
+    found = rank_measurements(fit, "mu3", [f"efficiency@{at}" for at in (430, 450, 480, 510, 530)])
     assert found.best.name == "efficiency@480"
 
 
 def test_an_efficiency_is_best_known_by_measuring_it(fit):
-    found = next_measurement(fit, "efficiency@500", [f"efficiency@{at}" for at in (430, 470, 500, 530)])
+    found = rank_measurements(fit, "efficiency@500", [f"efficiency@{at}" for at in (430, 470, 500, 530)])
     assert found.best.name == "efficiency@500"
     assert found.answer.unit == "points"
     assert found.repeats.to_halve(found.answer.sd) is not None
@@ -429,7 +429,7 @@ def test_the_ranking_is_in_order_and_says_what_is_as_good(for_length):
 
 def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):
     named = ["angle@470", "efficiency@430", "efficiency@510"]
-    found = next_measurement(fit, None, named, {"angle": 1e-6, "efficiency": 5.0})
+    found = rank_measurements(fit, None, named, {"angle": 1e-6, "efficiency": 5.0})
     assert found.best.name == "efficiency@430"
     assert found.ranked[-1].name == "angle@470"
     assert found.best.worth == pytest.approx(found.best.share / 5)
@@ -446,7 +446,7 @@ def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):
 )
 def test_costs_that_make_no_sense_are_refused(fit, costs, sentence):
     with pytest.raises(UsageError, match=sentence):
-        next_measurement(fit, None, ["angle@450", "efficiency@450"], costs)
+        rank_measurements(fit, None, ["angle@450", "efficiency@450"], costs)
 
 
 @pytest.mark.parametrize(
@@ -459,11 +459,11 @@ def test_costs_that_make_no_sense_are_refused(fit, costs, sentence):
 )
 def test_answers_that_there_are_not_are_refused(fit, wanted, sentence):
     with pytest.raises(UsageError, match=sentence):
-        next_measurement(fit, wanted)
+        rank_measurements(fit, wanted)
 
 
 def test_where_nothing_helps_that_is_what_is_said(fit):
-    text = next_measurement_text(next_measurement(fit, None, ["angle@470"]), 5)
+    text = next_measurement_text(rank_measurements(fit, None, ["angle@470"]), 5)
     assert text.startswith("None of these measurements would narrow the best cable length noticeably")
     assert "--candidate" in text
 
@@ -558,7 +558,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     length = for_each_draw(make_optimizer(density.model), density.model.space.size)
     before, generator = length(z)[0], np.random.default_rng(2)
     candidates = [Candidate("efficiency", 400.0), Candidate("efficiency", 500.0), Candidate("angle", 500.0)]
-    readings = simulated_readings(density.model, dataset.measurements, candidates, z, 1)
+    readings = simulate_readings(density.model, dataset.measurements, candidates, z, 1)
     realized, expected = {}, {}
     for candidate, reading in zip(candidates, readings, strict=True):
         expected[candidate] = explained_share(reading[:, 0], before).share

@@ -13,8 +13,8 @@ from bowdenfit.inference.identifiability import Combination, CovarianceAnalysis,
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.questions.calibrate.answer import Quantity
-from bowdenfit.questions.calibrate.findings import findings
+from bowdenfit.questions.calibrate.answer import QuantityLabel
+from bowdenfit.questions.calibrate.findings import summarize_replications
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
 from bowdenfit.questions.check import prior_figure
 from bowdenfit.questions.check.prior_predictive import prior_predictive
@@ -22,9 +22,9 @@ from bowdenfit.questions.compare.answer import ComparedParameter, Comparison
 from bowdenfit.questions.figure_files import write_figure
 from bowdenfit.questions.figures import FIGURES
 from bowdenfit.questions.identify.answer import Identifiability
-from bowdenfit.questions.next.answer import NextMeasurement, Ranked
-from bowdenfit.questions.next.candidates import can_be_ranked
-from bowdenfit.questions.next.target import Answer
+from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate
+from bowdenfit.questions.next.candidates import has_candidates
+from bowdenfit.questions.next.target import TargetQuantity
 from bowdenfit.results.figures_folder import CAPTIONS
 
 pytestmark = pytest.mark.extended
@@ -46,8 +46,8 @@ def calibration(names, wrong, truths=()):
         ranks = {n: generator.beta(0.2, 0.2) if n == wrong else generator.uniform() for n in names}
         ranked = {n: RankedTruth(0.0, generator.normal(), 1.0, rank) for n, rank in ranks.items()}
         made.append(Replication(i, {}, (), ranked, 1.0))
-    shown = {n: Quantity(n.replace("_", " ")) for n in names}
-    return findings(tuple(made), shown, name=NAME, seed=1, assumed=(), truths=truths)
+    shown = {n: QuantityLabel(n.replace("_", " ")) for n in names}
+    return summarize_replications(tuple(made), shown, name=NAME, seed=1, assumed=(), truths=truths)
 
 
 def comparison(n_fits, n_readings, label):
@@ -58,7 +58,9 @@ def comparison(n_fits, n_readings, label):
     labels = tuple((table, label.format(i)) for i, table in enumerate(tables))
     how = ("importance sampling",) * n_readings
     predictions = {
-        fit: LooPrediction(generator.normal(i, 1.0, n_readings), np.full(n_readings, 0.1), np.zeros(n_readings), labels, how)
+        fit: LooPrediction(
+            generator.normal(i, 1.0, n_readings), np.full(n_readings, 0.1), np.zeros(n_readings), labels, how
+        )
         for i, fit in enumerate(fits)
     }
     wide = {fit: Interval.of(generator.normal(0.123, 0.01, 500)) for fit in fits}
@@ -92,10 +94,12 @@ def identifiability(*groups):
 def ranking(candidates, scale, words):
     """Of candidates, each the better the earlier it stands."""
     ranked = tuple(
-        Ranked(c, f"{c.kind}@{i}", words.format(i), 0.3 / (i + 1), 0.01, scale * (1 - 0.1 / (i + 1)), 0.001 * scale, i == 0)
+        RankedCandidate(
+            c, f"{c.kind}@{i}", words.format(i), 0.3 / (i + 1), 0.01, scale * (1 - 0.1 / (i + 1)), 0.001 * scale, i == 0
+        )
         for i, c in enumerate(candidates)
     )
-    answer = Answer("optimal-length", "the best cable length", "mm", scale * np.array([-1.0, 1.0]))
+    answer = TargetQuantity("optimal-length", "the best cable length", "mm", scale * np.array([-1.0, 1.0]))
     return NextMeasurement(answer, ranked, None, (), "Cable length (mm)", (430.0, 530.0), True)
 
 
@@ -110,7 +114,10 @@ ANSWERS = {
     "seven fits": (("comparison",), lambda: comparison(7, 40, "squeezed_sheath_angle at {} mm")),
     "many readings": (("comparison",), lambda: comparison(3, 400, "{} mm")),
     "one coefficient": (("identifiability",), lambda: identifiability(("mu",))),
-    "many coefficients": (("identifiability",), lambda: identifiability(MANY, (*MANY, *(f"{n}b" for n in MANY), *"abcdefg"))),
+    "many coefficients": (
+        ("identifiability",),
+        lambda: identifiability(MANY, (*MANY, *(f"{n}b" for n in MANY), *"abcdefg")),
+    ),
     "along a route": (("next",), lambda: ranking(ROUTE, 5.2, "the efficiency at {} mm")),
     "small numbers": (("next",), lambda: ranking(LOADS, 6.5e-5, "the loop's output force at 180 deg under {} N")),
     "large numbers, long words": (("next",), lambda: ranking(LOADS, 6.5e5, NAME + " {}")),
@@ -142,7 +149,10 @@ def test_each_figure_is_written_in_three_formats_beside_its_caption(tmp_path):
     for name in ("coverage", "ranks", "coverage"):
         write_figure(FILES[f"{name}_figure"], found, folder, name, found.name)
     endings = ("pdf", "png", "svg")
-    assert {p.name for p in folder.iterdir()} == {CAPTIONS, *(f"{n}.{e}" for n in ("coverage", "ranks") for e in endings)}
+    assert {p.name for p in folder.iterdir()} == {
+        CAPTIONS,
+        *(f"{n}.{e}" for n in ("coverage", "ranks") for e in endings),
+    }
     first, second = (folder / CAPTIONS).read_text().split("\n\n")
     assert first.startswith("coverage: How often intervals hold the truth")
     assert second.startswith("ranks: Where truths lie within what the fits say")
@@ -154,7 +164,9 @@ def test_figures_of_answers_on_every_data_set_can_be_read(folder, tmp_path):
     fit = bf.fit(folder, output=tmp_path / "fit", seed=1, figures=False)
     assert_answer_readable(prior_figure, prior_predictive(fit.dataset, 1), fit.name)
     assert_answer_readable(FILES["identifiability_figure"], bf.identify(fit), fit.name)
-    named = () if can_be_ranked(fit) else ("efficiency@180deg", "efficiency@540deg")  # of a catheter no displacement can be
+    named = (
+        () if has_candidates(fit) else ("efficiency@180deg", "efficiency@540deg")
+    )  # of a catheter no displacement can be
     assert_answer_readable(FILES["next_figure"], bf.next_measurement(fit, candidates=named), fit.name)
     found = bf.calibrate(folder, replications=20, seed=1, output=tmp_path / "calibration")
     for name in ("coverage", "ranks", "sharpness"):

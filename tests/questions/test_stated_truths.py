@@ -9,14 +9,14 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate import power
-from bowdenfit.questions.calibrate.answer import Quantity
-from bowdenfit.questions.calibrate.findings import findings
-from bowdenfit.questions.calibrate.power import power_of
-from bowdenfit.questions.calibrate.refit import Laboratory
+from bowdenfit.questions.calibrate.answer import QuantityLabel
+from bowdenfit.questions.calibrate.findings import summarize_replications
+from bowdenfit.questions.calibrate.power import estimate_power
+from bowdenfit.questions.calibrate.refit import BatchFitter
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
-from bowdenfit.questions.calibrate.truths import StatedTruth, read_truths, stated_truths
+from bowdenfit.questions.calibrate.truths import StatedTruth, parse_truths, read_truths
 from bowdenfit.questions.calibrate.words import calibration_text
-from bowdenfit.questions.calibrate.workbench import Plan, Workbench
+from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 pytestmark = pytest.mark.extended
@@ -35,13 +35,13 @@ SPACE = build_model(bench(**WEAK)).space
 
 
 def truths(**page: object) -> tuple[StatedTruth, ...]:
-    return stated_truths(page, SPACE, "truth.toml")
+    return parse_truths(page, SPACE, "truth.toml")
 
 
 def drawn(stated: StatedTruth, n: int = 2000) -> np.ndarray:
     """True values in shown units."""
     generator, prior = np.random.default_rng(1), stated.parameter.prior
-    return np.array([float(prior.constrain(stated.z(generator))) for _ in range(n)]) * stated.parameter.shown_scale
+    return np.array([float(prior.constrain(stated.draw_z(generator))) for _ in range(n)]) * stated.parameter.shown_scale
 
 
 def test_a_number_is_the_truth_of_every_replication():
@@ -62,7 +62,7 @@ def test_so_are_ranges_of_whatever_default_priors_leave_positive(name):
     """Noise scales and drag were drawn uniformly; by chance out once in a million seeds."""
     description = cable(1, friction_model="drag")
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
-    (stated,) = stated_truths({name: [0.01, 1.0]}, space, "truth.toml")
+    (stated,) = parse_truths({name: [0.01, 1.0]}, space, "truth.toml")
     assert " log-uniform from 0.01 to 1" in stated.text
     assert abs(np.mean(drawn(stated, 200) < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
 
@@ -71,7 +71,7 @@ def test_a_range_of_either_sign_is_drawn_uniformly():
     prior = {"free_angle_b": {"prior": {"normal": {"mean": 0.0, "sd": 1.0}}}}
     description = cable(1, ("angles",), prior=prior)
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
-    (stated,) = stated_truths({"free_angle_b": [-1.0, 3.0]}, space, "truth.toml")
+    (stated,) = parse_truths({"free_angle_b": [-1.0, 3.0]}, space, "truth.toml")
     values = drawn(stated, 200)
     assert stated.text == "free_angle_b uniform from -1 to 3"
     assert -1.0 <= values.min() < values.max() <= 3.0
@@ -120,22 +120,22 @@ def test_only_coefficients_and_the_optimum_are_judged_and_only_by_their_interval
         Replication(i, {}, (), {"mu": ranked(float(generator.uniform())), "tau": ranked(0.999)}, 0.1)
         for i in range(200)
     ]
-    known = {"mu": Quantity("mu"), "tau": Quantity("tau", is_answer=False)}
-    assert set(findings(made, known).faults) == {"tau"}
-    found = findings(made, known, truths=("mu 0.1",))
+    known = {"mu": QuantityLabel("mu"), "tau": QuantityLabel("tau", is_answer=False)}
+    assert set(summarize_replications(made, known).faults) == {"tau"}
+    found = summarize_replications(made, known, truths=("mu 0.1",))
     assert found.is_calibrated
     text = calibration_text(found)
     assert "true values were stated (mu 0.1), the others drawn from the priors" in " ".join(text.split())
     assert "(tau)" in text
     wrong = [Replication(i, {}, (), {"mu": ranked(0.999)}, 0.1) for i in range(200)]
-    assert "too narrow" in findings(wrong, known, truths=("mu 0.1",)).faults["mu"]
+    assert "too narrow" in summarize_replications(wrong, known, truths=("mu 0.1",)).faults["mu"]
 
 
 BANDS = {0.5: (0.37, 0.63), 0.9: (0.82, 0.97)}
 
 
 def test_power_grows_with_the_number_of_replications_and_with_what_is_wrong():
-    few, many = (power_of(n, 0.005, BANDS, by_ranks=True) for n in (50, 400))
+    few, many = (estimate_power(n, 0.005, BANDS, by_ranks=True) for n in (50, 400))
     assert [p.too_small for p in few] == [0.1, 0.2, 0.3]
     assert few[0].caught < few[1].caught < few[2].caught
     assert all(a.caught < b.caught for a, b in zip(few[1:], many[1:], strict=True))
@@ -145,22 +145,22 @@ def test_power_grows_with_the_number_of_replications_and_with_what_is_wrong():
 def test_right_intervals_are_caught_no_more_often_than_the_level(monkeypatch):
     """In 500 simulated calibrations at 0.01: 17 or fewer, but once in a thousand seeds; the seed is fixed."""
     monkeypatch.setattr(power, "TOO_SMALL", (0.0,))
-    (right,) = power_of(200, 0.01, {}, by_ranks=True)
+    (right,) = estimate_power(200, 0.01, {}, by_ranks=True)
     assert 0 < right.caught < 0.034
 
 
-def with_truth(laboratory: Laboratory, **friction: object) -> dict[str, str]:
+def with_truth(laboratory: BatchFitter, **friction: object) -> dict[str, str]:
     """What is wrong with intervals of 24 cables whose coefficient is 0.2."""
     dataset = bench(**friction)
-    stated = stated_truths({"mu_edge": 0.2}, build_model(dataset).space, "truth.toml")
-    made = Workbench(Plan(dataset, dataset, 1, stated), laboratory).replications(range(24))
-    return findings(list(made), {}, truths=("mu_edge 0.2",)).faults
+    stated = parse_truths({"mu_edge": 0.2}, build_model(dataset).space, "truth.toml")
+    made = Replicator(CalibrationPlan(dataset, dataset, 1, stated), laboratory).replicate(range(24))
+    return summarize_replications(list(made), {}, truths=("mu_edge 0.2",)).faults
 
 
 @pytest.mark.slow
 def test_stated_truths_show_a_prior_that_is_wrong():
     """Of a prior that is sure of 0.12; a weak one would be rejected by chance for one seed in a hundred."""
-    laboratory = Laboratory()
+    laboratory = BatchFitter()
     assert "estimated too low and intervals too narrow" in with_truth(laboratory, **SURE)["mu_edge"]
     assert "mu_edge" not in with_truth(laboratory, **WEAK)
 

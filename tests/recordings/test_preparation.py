@@ -12,7 +12,13 @@ from scipy.signal import savgol_filter
 
 from bowdenfit.description import ForceLimits, Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 from bowdenfit.recordings.preparation import likely_input as likely_input_file
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
@@ -311,7 +317,7 @@ def test_noise_does_not_shift_the_delay_by_more_than_the_error_in_common(noise, 
     """
     errors = []
     for seed in range(10):
-        faults = Faults(input_noise=noise, output_noise=noise, delay=DELAY)
+        faults = LoadCellFaults(input_noise=noise, output_noise=noise, delay=DELAY)
         profile = MotorProfile(speed=speed, stroke=45, cycles=4, lead_in=0.5, pause=pause)
         bench, generator = BenchSettings(rate=250, preload=preload), np.random.default_rng(seed)
         read = simulate_recording(0.35, BenchFriction(), profile, bench, faults, generator)

@@ -16,7 +16,13 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import columns_csv
 from bowdenfit.kinds import KINDS
-from bowdenfit.questions.simulate.bench import BenchFriction, BenchSettings, Faults, MotorProfile, simulate_recording
+from bowdenfit.questions.simulate.bench import (
+    BenchFriction,
+    BenchSettings,
+    LoadCellFaults,
+    MotorProfile,
+    simulate_recording,
+)
 from bowdenfit.recordings.recording import PULL, RETURN, Recordings
 
 pytestmark = pytest.mark.extended
@@ -52,7 +58,7 @@ GLOB = [(ENTRY, "")]
 @pytest.fixture(scope="module")
 def simulated():
     """One cycle with little noise, friction exponent 0.3."""
-    noise = Faults(input_noise=0.3, output_noise=0.3)
+    noise = LoadCellFaults(input_noise=0.3, output_noise=0.3)
     profile, generator = MotorProfile(speed=1.0, cycles=1), np.random.default_rng(0)
     return simulate_recording(0.3, BenchFriction(), profile, BenchSettings(), noise, generator)
 

@@ -12,7 +12,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,
-    Faults,
+    LoadCellFaults,
     MotorProfile,
     SimulatedRecording,
     simulate_recording,
@@ -89,7 +89,7 @@ def simulated(
         friction or BenchFriction(),
         MotorProfile(**{"speed": 2.0, "cycles": 3, **profile}),
         bench or BenchSettings(),
-        Faults(input_noise=noise, output_noise=noise),
+        LoadCellFaults(input_noise=noise, output_noise=noise),
         np.random.default_rng(seed),
     )
 
@@ -261,7 +261,7 @@ def random_recording(seed: int) -> RawRecording:
     bench = BenchSettings(
         float(g.choice([50.0, 100.0])), float(g.uniform(3, 25)), float(g.uniform(1, 3)), float(g.uniform(10, 40))
     )
-    faults = Faults(
+    faults = LoadCellFaults(
         input_noise=noise,
         output_noise=noise,
         delay=float(g.choice([0.0, 0.0, 0.01])),

@@ -23,7 +23,7 @@ from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.engines import versions
 from bowdenfit.inference.ensemble import CheckpointedBackend
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
-from bowdenfit.questions.calibrate.store import keep, open_replications, seed_of
+from bowdenfit.questions.calibrate.store import append_replication, open_replications, read_seed
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.results import folder as names
 from bowdenfit.results.answer_cache import file_checksum, read_answers
@@ -164,17 +164,17 @@ def begun_calibration(place: Path) -> Path:
     open_replications(place, FINGERPRINT, resume=False, force=False)
     for number in range(3):
         ranked = {"mu": RankedTruth(0.1, 0.2, 0.3, 0.4), "optimal_length": RankedTruth(float("inf"), 1.0, 0.1, 0.5)}
-        keep(place, Replication(number, {"too few": 1}, (), ranked, 1.0, 20, "laplace"))
+        append_replication(place, Replication(number, {"too few": 1}, (), ranked, 1.0, 20, "laplace"))
     return place
 
 
 def resume_calibration(folder: Path) -> None:
     """What `calibrate --resume` reads, and makes of it."""
-    from bowdenfit.questions.calibrate.findings import findings
+    from bowdenfit.questions.calibrate.findings import summarize_replications
 
-    seed_of(folder)
+    read_seed(folder)
     found = open_replications(folder, FINGERPRINT, resume=True, force=False)
-    findings(tuple(found.values()), {}, name="x", seed=3, assumed=(), truths=())
+    summarize_replications(tuple(found.values()), {}, name="x", seed=3, assumed=(), truths=())
 
 
 def begun_fleet(place: Path) -> Path:

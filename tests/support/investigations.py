@@ -10,8 +10,8 @@ import bowdenfit as bf
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.calibrate.refit import Laboratory as Fits
-from bowdenfit.questions.calibrate.refit import with_parameters_of
+from bowdenfit.questions.calibrate.refit import BatchFitter as Fits
+from bowdenfit.questions.calibrate.refit import replace_data
 from bowdenfit.results.along_route import make_optimizer
 
 HELD = 0.9
@@ -44,8 +44,8 @@ def held(laboratory: Laboratory, sessions: int, scratch: Path) -> dict[str, int]
     with jax.enable_x64(True):
         data = [bf.read(folder, **given) for folder in folders]
         model = build_model(data[0])
-        posteriors = [LogDensity(with_parameters_of(model, each)) for each in data]
-        fits = Fits().fits(posteriors, list(range(sessions)))
+        posteriors = [LogDensity(replace_data(model, each)) for each in data]
+        fits = Fits().fit_all(posteriors, list(range(sessions)))
         draws = [drawn(model, fit.z) for fit in fits if len(fit.z) and not fit.reasons]
     found = {}
     for name, true in laboratory.truth.items():

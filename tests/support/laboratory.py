@@ -19,8 +19,8 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import Laboratory as Fits
-from bowdenfit.questions.calibrate.workbench import Plan, Workbench
+from bowdenfit.questions.calibrate.refit import BatchFitter as Fits
+from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
@@ -69,8 +69,8 @@ class Laboratory:
         key = description.model_dump_json() + repr(design)
         if key not in self.benches:
             dataset = Dataset(description, empty_tables(description, design), {})
-            plan = Plan(dataset, dataset, SEED)
-            self.benches[key] = Workbench(plan, self.fits, self.disturb, anything)
+            plan = CalibrationPlan(dataset, dataset, SEED)
+            self.benches[key] = Replicator(plan, self.fits, self.disturb, anything)
         found = self.benches[key].replications(list(seeds))
         return [{name: each.rank for name, each in replication.ranked.items()} for replication in found]
 

@@ -7,7 +7,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import RANKS, with_parameters_of
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, replace_data
 from bowdenfit.results.record import Draws, Provenance, Record
 
 MOUNTINGS, LOADS = 6, np.array([2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 120.0, 160.0])  # N
@@ -59,9 +59,9 @@ def measured(folder, cables, seed):
 def fitted(datasets, seed):
     """Fits of them all in one program, by the engines of a fleet; None of those that did not settle."""
     model = build_model(datasets[0])
-    each = [LogDensity(with_parameters_of(model, dataset)) for dataset in datasets]
+    each = [LogDensity(replace_data(model, dataset)) for dataset in datasets]
     seeds = [seed + i for i in range(len(datasets))]
-    fits = fit_batch(each[0], [posterior.data for posterior in each], seeds, RANKS)
+    fits = fit_batch(each[0], [posterior.data for posterior in each], seeds, RANK_SETTINGS)
     return [
         None if fit.reasons else _record(dataset, model, fit.z, own)
         for dataset, fit, own in zip(datasets, fits, seeds, strict=True)

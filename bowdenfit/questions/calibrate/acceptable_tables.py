@@ -15,7 +15,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import each_table
 
 
-def refusal(measured: Dataset, drawn: Dataset) -> str:
+def why_implausible(measured: Dataset, simulated: Dataset) -> str:
     """Why no bench would hand in the drawn tables, in a few words; empty if one might.
 
     Args:
@@ -24,6 +24,6 @@ def refusal(measured: Dataset, drawn: Dataset) -> str:
     """
     reasons = (
         kind.why_implausible(measured.measurements.table(kind.table), table)
-        for kind, table in each_table(drawn.measurements)
+        for kind, table in each_table(simulated.measurements)
     )
     return next((reason for reason in reasons if reason), "")

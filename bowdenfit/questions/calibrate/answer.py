@@ -11,13 +11,13 @@ from bowdenfit.words import percent
 
 LEVEL = 0.01  # at which a quantity is rejected, corrected for the number of quantities
 INTERVALS = (0.5, 0.9)
-MOST_UNCONVERGED = 0.1  # of all replications, beyond which the rest says little
-FEWEST = 20  # replications to judge by
-_CLEARLY = 3.0  # standard errors beyond which a bias is named
+MAX_UNCONVERGED = 0.1  # of all replications, beyond which the rest says little
+MIN_REPLICATIONS = 20  # replications to judge by
+_BIAS_ERRORS = 3.0  # standard errors beyond which a bias is named
 
 
 @dataclass(frozen=True)
-class Quantity:
+class QuantityLabel:
     """What may be ranked.
 
     Args:
@@ -53,7 +53,7 @@ class Coverage:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedQuantity:
     """One quantity over all replications.
 
     Args:
@@ -100,13 +100,13 @@ class Checked:
             return ""
         widest = self.coverage[-1]
         faults = []
-        if not np.isnan(self.bias) and abs(self.bias) > _CLEARLY * self.bias_error:
+        if not np.isnan(self.bias) and abs(self.bias) > _BIAS_ERRORS * self.bias_error:
             faults.append(f"estimated too {'high' if self.bias > 0 else 'low'}")
-        if any(each.rate < each.low for each in self.coverage):
+        if any(interval.rate < interval.low for interval in self.coverage):
             faults.append(
                 f"intervals too narrow ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
             )
-        elif any(each.rate > each.high for each in self.coverage):
+        elif any(interval.rate > interval.high for interval in self.coverage):
             faults.append(
                 f"intervals too wide ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
             )
@@ -137,7 +137,7 @@ class Calibration(Display):
     assumed: tuple[str, ...]
     seed: int
     replications: int
-    quantities: tuple[Checked, ...]
+    quantities: tuple[CheckedQuantity, ...]
     unconverged: dict[int, str]
     redrawn: dict[str, int]
     seconds: float
@@ -169,11 +169,11 @@ class Calibration(Display):
         return {q.name: q.fault for q in self.quantities if not q.is_calibrated}
 
     @property
-    def is_judged(self) -> bool:
+    def is_conclusive(self) -> bool:
         """Whether enough replications converged to say anything."""
-        return self.ranked >= FEWEST and len(self.unconverged) <= MOST_UNCONVERGED * self.replications
+        return self.ranked >= MIN_REPLICATIONS and len(self.unconverged) <= MAX_UNCONVERGED * self.replications
 
     @property
     def is_calibrated(self) -> bool:
         """Whether every quantity is."""
-        return self.is_judged and not self.faults
+        return self.is_conclusive and not self.faults

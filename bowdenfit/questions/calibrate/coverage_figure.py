@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, VERMILLION, in_paper_style
-from bowdenfit.questions.calibrate.quantity_rows import quantity_rows
+from bowdenfit.questions.calibrate.quantity_rows import quantity_panels
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
 HEADING = "How often intervals hold the truth"
 
 
-def caption(found: Calibration) -> str:
+def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
         "Dots: share of the 50 % and 90 % intervals of each quantity that held the true value; gray: what chance allows all of "
-        f"them together in 99 % of calibrations; n = {counted(found.ranked, 'replication')}."
+        f"them together in 99 % of calibrations; n = {counted(calibration.ranked, 'replication')}."
     )
 
 
 @in_paper_style
-def draw(found: Calibration) -> Figure:
+def draw(calibration: Calibration) -> Figure:
     """The share of the 50 and 90 % intervals of each quantity that hold the truth, and what chance allows."""
-    figure, flat = quantity_rows(found, 2)
+    figure, flat = quantity_panels(calibration, 2)
     for k, axes in enumerate(flat):
-        for i, q in enumerate(found.quantities):
-            each = q.coverage[k]
+        for i, q in enumerate(calibration.quantities):
+            coverage = q.coverage[k]
             axes.plot(
-                [100 * each.low, 100 * each.high], [i, i], color=LIGHT, lw=7, solid_capstyle="butt", label="By chance"
+                [100 * coverage.low, 100 * coverage.high], [i, i], color=LIGHT, lw=7, solid_capstyle="butt", label="By chance"
             )
-            said, color = ("Intervals that hold the truth", BLUE) if each.within else ("Wrong", VERMILLION)
-            axes.plot(100 * each.rate, i, "o" if each.within else "X", color=color, label=said)
-        claimed = 100 * found.quantities[0].coverage[k].probability
+            label, color = ("Intervals that hold the truth", BLUE) if coverage.within else ("Wrong", VERMILLION)
+            axes.plot(100 * coverage.rate, i, "o" if coverage.within else "X", color=color, label=label)
+        claimed = 100 * calibration.quantities[0].coverage[k].probability
         axes.axvline(claimed, color=GRAY, lw=0.8)
         axes.set_xlabel(f"{claimed:.0f} % intervals that hold the truth (%)")
     legend_above(figure, flat, 3)

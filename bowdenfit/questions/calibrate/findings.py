@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.questions.calibrate.answer import INTERVALS, LEVEL, Calibration, Checked, Coverage, Quantity
-from bowdenfit.questions.calibrate.power import power_of
+from bowdenfit.questions.calibrate.answer import INTERVALS, LEVEL, Calibration, CheckedQuantity, Coverage, QuantityLabel
+from bowdenfit.questions.calibrate.power import estimate_power
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.questions.calibrate.uniformity import UniformRanks
 
 
-def findings(
+def summarize_replications(
     replications: Sequence[Replication],
-    quantities: Mapping[str, Quantity],
+    quantities: Mapping[str, QuantityLabel],
     *,
     name: str = "",
     assumed: tuple[str, ...] = (),
@@ -33,37 +33,40 @@ def findings(
         seed: Seed of the replications.
     """
     replications = sorted(replications, key=lambda r: r.number)
-    good = [r for r in replications if not r.reasons]
-    known = {q: quantities.get(q, Quantity(q)) for q in (good[0].ranked if good else ())}
-    way = "coverage" if truths else "ranks and coverage"
-    judged_by = {q: way if each.is_answer or not truths else "" for q, each in known.items()}
+    converged = [r for r in replications if not r.reasons]
+    descriptions = {q: quantities.get(q, QuantityLabel(q)) for q in (converged[0].ranked if converged else ())}
+    criterion = "coverage" if truths else "ranks and coverage"
+    judged_by = {q: criterion if each.is_answer or not truths else "" for q, each in descriptions.items()}
     n_judged = sum(map(bool, judged_by.values()))
-    checked = _check_all(known, judged_by, good)
-    drawn = [r for r in replications if r.ranked]
-    with_all = checked if len(drawn) == len(good) else _check_all(known, judged_by, drawn)
+    checked = _check_all(descriptions, judged_by, converged)
+    with_draws = [r for r in replications if r.ranked]
+    with_all = checked if len(with_draws) == len(converged) else _check_all(descriptions, judged_by, with_draws)
     redrawn: Counter[str] = Counter()
     for each in replications:
         redrawn.update(each.redrawn)
     unconverged = {r.number: r.reasons[0] for r in replications if r.reasons}
     seconds = float(np.median([r.seconds for r in replications])) if replications else float("nan")
-    engines = Counter(r.engine for r in good if r.engine)
-    bands = {claimed: _band(len(good), claimed, n_judged) for claimed in INTERVALS} if checked else {}
-    power = power_of(len(good), LEVEL / n_judged, bands, not truths) if checked else ()
-    done = len(replications), checked, unconverged, dict(redrawn), seconds
+    engines = Counter(r.engine for r in converged if r.engine)
+    bands = {claimed: _band(len(converged), claimed, n_judged) for claimed in INTERVALS} if checked else {}
+    power = estimate_power(len(converged), LEVEL / n_judged, bands, not truths) if checked else ()
+    summary = len(replications), checked, unconverged, dict(redrawn), seconds
     wrong_with_all = {q.name: q.fault for q in with_all if not q.is_calibrated}
-    return Calibration(name, assumed, seed, *done, truths, dict(engines.most_common()), power, wrong_with_all)
+    return Calibration(name, assumed, seed, *summary, truths, dict(engines.most_common()), power, wrong_with_all)
 
 
 def _check_all(
-    known: Mapping[str, Quantity], judged_by: Mapping[str, str], ranked: Sequence[Replication]
-) -> tuple[Checked, ...]:
+    descriptions: Mapping[str, QuantityLabel], judged_by: Mapping[str, str], replications: Sequence[Replication]
+) -> tuple[CheckedQuantity, ...]:
     """Every quantity over the same replications."""
     n_judged = sum(map(bool, judged_by.values()))
-    ranks = [np.array([r.ranked[q].rank for r in ranked]) for q in known]
-    p_values = [UniformRanks(len(ranked)).p_value(r) for r in ranks]
+    ranks = [np.array([r.ranked[q].rank for r in replications]) for q in descriptions]
+    p_values = [UniformRanks(len(replications)).p_value(r) for r in ranks]
     return tuple(
-        replace(_check_quantity(q, known[q].symbol, r, (p, c), n_judged, judged_by[q], ranked), meaning=known[q].meaning)
-        for q, r, p, c in zip(known, ranks, p_values, adjust_p_values(p_values).tolist(), strict=True)
+        replace(
+            _check_quantity(q, descriptions[q].symbol, r, (p, c), n_judged, judged_by[q], replications),
+            meaning=descriptions[q].meaning,
+        )
+        for q, r, p, c in zip(descriptions, ranks, p_values, adjust_p_values(p_values).tolist(), strict=True)
     )
 
 
@@ -74,20 +77,22 @@ def _check_quantity(
     p: tuple[float, float],
     n_judged: int,
     judged_by: str,
-    good: Sequence[Replication],
-) -> Checked:
-    found = [r.ranked[name] for r in good]
-    truth, mean, sd = (np.array([getattr(each, what) for each in found]) for what in ("truth", "mean", "sd"))
-    known = (sd > 0) & np.isfinite(truth)  # an optimum at the same end in every draw has no spread
-    deviation = (mean - truth)[known] / sd[known]
+    replications: Sequence[Replication],
+) -> CheckedQuantity:
+    ranked_truths = [r.ranked[name] for r in replications]
+    truth, mean, sd = (
+        np.array([getattr(ranked_truth, what) for ranked_truth in ranked_truths]) for what in ("truth", "mean", "sd")
+    )
+    usable = (sd > 0) & np.isfinite(truth)  # an optimum at the same end in every draw has no spread
+    deviation = (mean - truth)[usable] / sd[usable]
     n = max(len(deviation), 1)
-    bias, error = (float(deviation.mean()), float(deviation.std() / np.sqrt(n))) if known.any() else (np.nan, np.nan)
+    bias, error = (float(deviation.mean()), float(deviation.std() / np.sqrt(n))) if usable.any() else (np.nan, np.nan)
     # The prior of z is the standard normal; that of the optimum is what was drawn.
     prior = float(np.var(truth)) if name.startswith("optimal_") else 1.0
-    of_prior = prior > 0 and judged_by == Checked.judged_by
+    of_prior = prior > 0 and judged_by == CheckedQuantity.judged_by
     shrinkage = 1 - float(np.mean(sd**2)) / prior if of_prior else float("nan")
     coverage = tuple(_coverage(ranks, probability, n_judged) for probability in INTERVALS)
-    return Checked(name, symbol, tuple(ranks.tolist()), *p, coverage, bias, error, shrinkage, judged_by)
+    return CheckedQuantity(name, symbol, tuple(ranks.tolist()), *p, coverage, bias, error, shrinkage, judged_by)
 
 
 def _coverage(ranks: np.ndarray, probability: float, n_judged: int) -> Coverage:

@@ -7,15 +7,18 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from bowdenfit.inference.engines import refuse_other_versions, versions
-from bowdenfit.questions.calibrate.refit import RANKS, Laboratory
+from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, BatchFitter
 from bowdenfit.questions.calibrate.replication import Replication
-from bowdenfit.questions.calibrate.workbench import TOGETHER, Plan, Workbench
+from bowdenfit.questions.calibrate.workbench import BATCH_SIZE, CalibrationPlan, Replicator
 
-_LEAST, _EACH = 16, 4  # replications of a piece, so that its programs pay; pieces of a worker, so that all end together
+_MIN_PIECE, _PIECES_PER_WORKER = (
+    16,
+    4,
+)  # replications of a piece, so that its programs pay; pieces of a worker, so that all end together
 
 
 @dataclass(frozen=True)
-class Asked:
+class CalibrationJob:
     """A plan; two that say the same are the same.
 
     Args:
@@ -24,7 +27,7 @@ class Asked:
         key: Made from the plan.
     """
 
-    plan: Plan = field(compare=False)
+    plan: CalibrationPlan = field(compare=False)
     threads: int = 0
     key: str = field(default="", init=False)
 
@@ -33,7 +36,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Numbered:
+class ReplicationPiece:
     """Replications of a plan.
 
     Args:
@@ -42,12 +45,12 @@ class Numbered:
         versions: Where the work comes from.
     """
 
-    asked: Asked
+    job: CalibrationJob
     numbers: tuple[int, ...]
     versions: dict[str, str]
 
 
-def pieces_of(asked: Asked, numbers: Sequence[int], workers: int) -> list[Numbered]:
+def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int) -> list[ReplicationPiece]:
     """The work, cut so that so many workers end at about the same time.
 
     Args:
@@ -55,11 +58,15 @@ def pieces_of(asked: Asked, numbers: Sequence[int], workers: int) -> list[Number
         numbers: Of the replications.
         workers: At a time; one gets as much at once as is fitted together.
     """
-    size = TOGETHER if workers == 1 else min(max(-(-len(numbers) // (_EACH * workers)), _LEAST), TOGETHER)
-    return [Numbered(asked, tuple(numbers[i : i + size]), versions()) for i in range(0, len(numbers), size)]
+    size = (
+        BATCH_SIZE
+        if workers == 1
+        else min(max(-(-len(numbers) // (_PIECES_PER_WORKER * workers)), _MIN_PIECE), BATCH_SIZE)
+    )
+    return [ReplicationPiece(job, tuple(numbers[i : i + size]), versions()) for i in range(0, len(numbers), size)]
 
 
-def replicated(piece: Numbered) -> list[Replication]:
+def run_piece(piece: ReplicationPiece) -> list[Replication]:
     """What comes of each replication.
 
     Args:
@@ -69,10 +76,10 @@ def replicated(piece: Numbered) -> list[Replication]:
         UsageError: The work comes from a program of other versions, or hardly any tables look like ones from a bench.
     """
     refuse_other_versions(piece.versions)
-    return list(_bench(piece.asked).replications(piece.numbers))
+    return list(_replicator(piece.job).replicate(piece.numbers))
 
 
 @lru_cache(maxsize=1)
-def _bench(asked: Asked) -> Workbench:
+def _replicator(job: CalibrationJob) -> Replicator:
     """What serves all pieces of one plan, with what it has compiled."""
-    return Workbench(asked.plan, Laboratory(replace(RANKS, threads=asked.threads)))
+    return Replicator(job.plan, BatchFitter(replace(RANK_SETTINGS, threads=job.threads)))

@@ -24,7 +24,7 @@ class Power:
     caught: float
 
 
-def power_of(n: int, level: float, bands: dict[float, tuple[float, float]], by_ranks: bool) -> tuple[Power, ...]:
+def estimate_power(n: int, level: float, bands: dict[float, tuple[float, float]], by_ranks: bool) -> tuple[Power, ...]:
     """The power of a calibration, by simulation of normal posteriors.
 
     Args:
@@ -36,7 +36,7 @@ def power_of(n: int, level: float, bands: dict[float, tuple[float, float]], by_r
     from scipy import special
 
     errors = np.random.default_rng(_SEED).standard_normal((_SIMULATED, n))
-    by_chance, found = UniformRanks(n), []
+    uniform, powers = UniformRanks(n), []
     for too_small in TOO_SMALL:
         ranks = special.ndtr(errors / (1 - too_small))
         rates = {claimed: np.mean(np.abs(ranks - 0.5) < claimed / 2, axis=1) for claimed in bands}
@@ -44,6 +44,6 @@ def power_of(n: int, level: float, bands: dict[float, tuple[float, float]], by_r
             [(rates[claimed] < low) | (rates[claimed] > high) for claimed, (low, high) in bands.items()], axis=0
         )
         if by_ranks:
-            caught |= np.array([by_chance.p_value(each) < level for each in ranks])
-        found.append(Power(too_small, float(caught.mean())))
-    return tuple(found)
+            caught |= np.array([uniform.p_value(row) < level for row in ranks])
+        powers.append(Power(too_small, float(caught.mean())))
+    return tuple(powers)

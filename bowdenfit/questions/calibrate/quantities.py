@@ -5,12 +5,12 @@ from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.terms import measured_kinds
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.answer import Quantity
-from bowdenfit.questions.calibrate.workbench import Plan
+from bowdenfit.questions.calibrate.answer import QuantityLabel
+from bowdenfit.questions.calibrate.workbench import CalibrationPlan
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
 
-def quantities_of(plan: Plan) -> dict[str, Quantity]:
+def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
     """What will be ranked, once it is clear that the data set can be replicated.
 
     Raises:
@@ -29,10 +29,10 @@ def quantities_of(plan: Plan) -> dict[str, Quantity]:
         raise UsageError(
             "every parameter of the description is fixed, so there is nothing to calibrate; leave one free."
         )
-    quantities = {p.name: Quantity(p.symbol, p.role == "friction", p.meaning) for p in space.free}
+    quantities = {p.name: QuantityLabel(p.symbol, p.role == "friction", p.meaning) for p in space.free}
     return quantities | {
-        OPTIMAL_LENGTH: Quantity(r"$l^*$", meaning="best length"),
-        OPTIMAL_EFFICIENCY: Quantity(r"$\eta^*$", meaning="efficiency at the best length"),
+        OPTIMAL_LENGTH: QuantityLabel(r"$l^*$", meaning="best length"),
+        OPTIMAL_EFFICIENCY: QuantityLabel(r"$\eta^*$", meaning="efficiency at the best length"),
     }
 
 

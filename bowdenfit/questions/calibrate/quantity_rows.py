@@ -15,9 +15,9 @@ _LONGEST = 2.0  # in, of a name
 _MARK = 0.2  # in, from a name to the panel and to the edge of the page
 
 
-def quantity_rows(found: Calibration, columns: int) -> tuple[Figure, list[Axes]]:
+def quantity_panels(calibration: Calibration, columns: int) -> tuple[Figure, list[Axes]]:
     """Panels side by side with one row for each quantity, the first on top."""
-    names = [wrap_words(q.symbol, _LONGEST, most=1) for q in found.quantities]
+    names = [wrap_words(q.symbol, _LONGEST, most=1) for q in calibration.quantities]
     figure, flat = panels([0.3 + _ROW * len(names)], columns, 0.1, (0.35, 0.3), sharey=True)
     for axes in flat:
         axes.set_ylim(len(names) - 0.4, -0.6)

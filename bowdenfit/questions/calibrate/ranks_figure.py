@@ -22,37 +22,37 @@ _MARGIN = 0.3  # in, between titles
 _BAND = 0.99
 
 
-def caption(found: Calibration) -> str:
+def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
         "Line: share of the truths below each level of what the fits say, less what even ones would be; gray: what chance "
         "leaves in 99 % of calibrations. A hump, then a dip is of intervals too wide, the reverse of intervals too narrow; all "
         "above zero is of estimates too high, all below of estimates too low. p: how probable a line so far from zero is by "
-        f"chance, all quantities considered; n = {counted(found.ranked, 'replication')}."
+        f"chance, all quantities considered; n = {counted(calibration.ranked, 'replication')}."
     )
 
 
 @in_paper_style
-def draw(found: Calibration) -> Figure:
+def draw(calibration: Calibration) -> Figure:
     """Distribution function of the ranks less that of uniform ones, with the band that holds uniform ones in 99 %."""
-    n = len(found.quantities)
+    n = len(calibration.quantities)
     rows, columns = -(-n // _COLUMNS), min(_COLUMNS, n)
     figure, flat = panels([1.15] * rows, columns, TITLE, (_APART, 0.5), sharex=True)
     room = (WIDE - LEFT - RIGHT + _APART) / columns
-    by_chance = UniformRanks(found.ranked)
-    places, (low, high) = by_chance.places, by_chance.band(_BAND)
-    reach = max(0.01, float(max(np.max(high - places), np.max(places - low))))
+    uniform = UniformRanks(calibration.ranked)
+    positions, (low, high) = uniform.positions, uniform.band(_BAND)
+    reach = max(0.01, float(max(np.max(high - positions), np.max(positions - low))))
     flat = drop_unused(flat, n)
-    for axes, q in zip(flat, found.quantities, strict=True):
-        difference = by_chance.below(np.array(q.ranks)) / found.ranked - places
+    for axes, q in zip(flat, calibration.quantities, strict=True):
+        difference = uniform.count_below(np.array(q.ranks)) / calibration.ranked - positions
         color = BLUE if q.is_calibrated else VERMILLION
-        said = "Truths" if q.is_calibrated else "Truths of a quantity that is wrong"
-        axes.fill_between(places, low - places, high - places, color=LIGHT, lw=0, label="Even, in 99 %")
-        axes.plot([0, *places, 1], [0, *difference, 0], color=color, label=said)
+        label = "Truths" if q.is_calibrated else "Truths of a quantity that is wrong"
+        axes.fill_between(positions, low - positions, high - positions, color=LIGHT, lw=0, label="Even, in 99 %")
+        axes.plot([0, *positions, 1], [0, *difference, 0], color=color, label=label)
         axes.axhline(0.0, color=GRAY, lw=0.6)
-        chance = f"   p = {q.corrected:.2g}"
-        name = wrap_words(q.symbol, room - text_width(chance, TITLE_SIZE) - _MARGIN, TITLE_SIZE, most=1)
-        axes.set_title(f"{name}{chance}", fontsize=TITLE_SIZE)
+        p_value = f"   p = {q.corrected:.2g}"
+        name = wrap_words(q.symbol, room - text_width(p_value, TITLE_SIZE) - _MARGIN, TITLE_SIZE, most=1)
+        axes.set_title(f"{name}{p_value}", fontsize=TITLE_SIZE)
         axes.set_xlim(0, 1)
         axes.set_ylim(-1.15 * max(reach, np.max(np.abs(difference))), 1.15 * max(reach, np.max(np.abs(difference))))
     label_outer(flat, columns, "Level", "Share less even")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
-from bowdenfit.questions.calibrate.quantity_rows import quantity_rows
+from bowdenfit.questions.calibrate.quantity_rows import quantity_panels
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 HEADING = "Bias, and what the measurements settle"
 
 
-def caption(found: Calibration) -> str:
+def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
         "Left: estimate less truth, in standard deviations of the estimate, with three standard errors. Right: how much of the "
         "variance that was open beforehand the measurements settle; "
-        f"n = {counted(found.ranked, 'replication')}."
+        f"n = {counted(calibration.ranked, 'replication')}."
     )
 
 
 @in_paper_style
-def draw(found: Calibration) -> Figure:
+def draw(calibration: Calibration) -> Figure:
     """Bias of the posterior mean, and how far the data narrow the prior."""
-    figure, (left, right) = quantity_rows(found, 2)
-    for i, q in enumerate(found.quantities):
+    figure, (left, right) = quantity_panels(calibration, 2)
+    for i, q in enumerate(calibration.quantities):
         left.errorbar(q.bias, i, xerr=3 * q.bias_error, fmt="o", color=BLUE, lw=1.2, label="Mean, 3 standard errors")
         right.plot([0, 100 * q.shrinkage], [i, i], color=BLUE, lw=5, solid_capstyle="butt")
     left.axvline(0.0, color=GRAY, lw=0.8)
     left.set_xlabel("Estimate less truth (standard deviations)")
     right.set_xlabel("Settled by the measurements (%)")
-    right.set_xlim(min(0.0, *(100 * q.shrinkage for q in found.quantities)), 100)
+    right.set_xlim(min(0.0, *(100 * q.shrinkage for q in calibration.quantities)), 100)
     legend_above(figure, [left], 1)
     return figure

@@ -27,8 +27,13 @@ from bowdenfit.results.serialization import deserialize, serialize
 CALIBRATION = "calibration.json"
 # Everything that a calibration writes.
 _FILES, _FOLDERS = (CALIBRATION, SUMMARY_TEXT, DETAILS_TEXT, REPORT, REPLICATIONS), (FIGURES, JOBS_FOLDER)
-_WHAT = {"description": "the description", "sha256": "an input file", "seed": "the seed", "assumed": "what is assumed"}
-_WHAT |= {"truths": "what is stated of the truth"}
+_FINGERPRINT_WORDS = {
+    "description": "the description",
+    "sha256": "an input file",
+    "seed": "the seed",
+    "assumed": "what is assumed",
+}
+_FINGERPRINT_WORDS |= {"truths": "what is stated of the truth"}
 
 
 def open_replications(
@@ -67,50 +72,62 @@ def open_replications(
 def _is_unused(folder: Path) -> bool:
     """Whether a calibration was begun in a folder that failed before its first replication, so that nobody loses anything."""
     path = folder / REPLICATIONS
-    return holds_only_run_files(folder, (REPLICATIONS, JOBS_FOLDER)) and path.is_file() and path.read_bytes().count(b"\n") == 1
+    return (
+        holds_only_run_files(folder, (REPLICATIONS, JOBS_FOLDER))
+        and path.is_file()
+        and path.read_bytes().count(b"\n") == 1
+    )
 
 
-def seed_of(folder: Path) -> int:
+def read_seed(folder: Path) -> int:
     """The seed of the calibration in a folder.
 
     Raises:
         StoreError: There is none.
     """
     try:
-        seed = _lines(folder / REPLICATIONS)[0]["seed"]
+        seed = _read_lines(folder / REPLICATIONS)[0]["seed"]
         refuse_invalid_seed(seed)
         return int(seed)
     except (KeyError, TypeError, ValueError):
-        raise _damaged(folder / REPLICATIONS) from None
+        raise _damaged_error(folder / REPLICATIONS) from None
 
 
 def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
-    before, *pages = _lines(path)
-    changed = [name for name in _WHAT if before.get(name, {}) != fingerprint.get(name, {})]
+    earlier, *pages = _read_lines(path)
+    changed = [name for name in _FINGERPRINT_WORDS if earlier.get(name, {}) != fingerprint.get(name, {})]
     if changed:
         raise StoreError(
-            f"{path.parent} cannot be resumed because {_WHAT[changed[0]]} changed since; undo the change, or start over with "
+            f"{path.parent} cannot be resumed because {_FINGERPRINT_WORDS[changed[0]]} changed since; undo the change, "
+            "or start over with "
             "--force."
         )
     # A line that was being written when the program was stopped is made again.
     with folder_to_write(path.parent):
-        write_text(path, "".join(json.dumps(line) + "\n" for line in (before, *pages)))
-    with or_damaged(_damaged(path)):
-        found = [deserialize(Replication, page) for page in pages]
-        if not (all(map(_is_whole, found)) and len({frozenset(each.ranked) for each in found if each.ranked}) <= 1):
+        write_text(path, "".join(json.dumps(line) + "\n" for line in (earlier, *pages)))
+    with or_damaged(_damaged_error(path)):
+        replications = [deserialize(Replication, page) for page in pages]
+        if not (
+            all(map(_is_valid, replications))
+            and len({frozenset(replication.ranked) for replication in replications if replication.ranked}) <= 1
+        ):
             raise ValueError("something else was kept")
-        return {each.number: each for each in found}
+        return {replication.number: replication for replication in replications}
 
 
-def _is_whole(one: Replication) -> bool:
+def _is_valid(replication: Replication) -> bool:
     """Whether a replication that was read is one that was kept."""
-    counts = (one.number, one.steps, *one.redrawn.values())
-    texts = (one.engine, *one.reasons)
+    counts = (replication.number, replication.steps, *replication.redrawn.values())
+    texts = (replication.engine, *replication.reasons)
     good = all(type(count) is int and count >= 0 for count in counts) and all(isinstance(text, str) for text in texts)
-    return good and bool(one.ranked or one.reasons) and all(0 <= each.rank <= 1 for each in one.ranked.values())
+    return (
+        good
+        and bool(replication.ranked or replication.reasons)
+        and all(0 <= ranked_truth.rank <= 1 for ranked_truth in replication.ranked.values())
+    )
 
 
-def _lines(path: Path) -> list[dict[str, Any]]:
+def _read_lines(path: Path) -> list[dict[str, Any]]:
     """The whole lines of a file of replications, the fingerprint first."""
     if not path.exists():
         raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
@@ -120,14 +137,14 @@ def _lines(path: Path) -> list[dict[str, Any]]:
         lines = [json.loads(line) for line in whole]
         return [dict(lines[0]), *({"engine": "", **page, "redrawn": page["redrawn"]} for page in lines[1:])]
     except (ValueError, IndexError, KeyError, TypeError, RecursionError):
-        raise _damaged(path) from None
+        raise _damaged_error(path) from None
 
 
-def _damaged(path: Path) -> StoreError:
+def _damaged_error(path: Path) -> StoreError:
     return StoreError(f"{path} is damaged and cannot be resumed; start over with --force.")
 
 
-def keep(folder: Path, replication: Replication) -> None:
+def append_replication(folder: Path, replication: Replication) -> None:
     """Add a finished replication."""
     with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
         file.write(json.dumps(serialize(replication)) + "\n")

@@ -24,7 +24,7 @@ from bowdenfit.inputs import read_toml_file
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.words import shown
 
-_ENDLESS = 1e60  # beyond which a range has no end: half-Cauchy priors stay at 1e88 of their scale
+_UNBOUNDED = 1e60  # beyond which a range has no end: half-Cauchy priors stay at 1e88 of their scale
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class StatedTruth:
     parameter: Parameter
     low: float
     high: float
-    by_factors: bool
+    log_uniform: bool
 
     @property
     def text(self) -> str:
@@ -48,14 +48,14 @@ class StatedTruth:
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
         if self.low == self.high:
             return f"{self.parameter.name} {self.low:g}{unit}"
-        way = "log-uniform" if self.by_factors else "uniform"
+        way = "log-uniform" if self.log_uniform else "uniform"
         return f"{self.parameter.name} {way} from {self.low:g} to {self.high:g}{unit}"
 
-    def z(self, generator: np.random.Generator) -> float:
+    def draw_z(self, generator: np.random.Generator) -> float:
         """A true value, where the parameter's prior is a standard normal."""
         share = generator.uniform()
         value = self.low + share * (self.high - self.low)
-        if self.by_factors:
+        if self.log_uniform:
             value = self.low * (self.high / self.low) ** share
         return z_at(self.parameter.prior, value / self.parameter.shown_scale)
 
@@ -75,7 +75,7 @@ def read_truths(path: Path) -> dict[str, Any]:
     return page
 
 
-def stated_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> tuple[StatedTruth, ...]:
+def parse_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> tuple[StatedTruth, ...]:
     """What a file says of the parameters of a model.
 
     Args:
@@ -92,27 +92,27 @@ def stated_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> 
             raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{suggest_name(name, list(known))}")
         if known[name].fixed is not None:
             raise UsageError(f"{file}: {name} is fixed in cable.toml, so there is no truth to look for; leave it out.")
-    return tuple(_stated(known[name], value, f"{file}, {name}") for name, value in page.items())
+    return tuple(_parse_truth(known[name], value, f"{file}, {name}") for name, value in page.items())
 
 
-def _stated(parameter: Parameter, value: Any, place: str) -> StatedTruth:
+def _parse_truth(parameter: Parameter, value: Any, where: str) -> StatedTruth:
     numbers = value if isinstance(value, list) else [value, value]
     if len(numbers) != 2 or not all(_is_number(number) for number in numbers):
-        raise UsageError(f"{place}: {shown(value)} is neither a number nor a range; write 0.1 or [0.05, 0.2].")
+        raise UsageError(f"{where}: {shown(value)} is neither a number nor a range; write 0.1 or [0.05, 0.2].")
     low, high = (float(number) for number in numbers)
     if isinstance(value, list) and not low < high:
-        raise UsageError(f"{place}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
+        raise UsageError(f"{where}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
     ends = (value_at(parameter.prior, z) * parameter.shown_scale for z in (-np.inf, np.inf))
-    least, most = (math.inf if end > _ENDLESS else end for end in ends)
-    if low < least or high > most:
-        outside = low if low < least else high
+    smallest, largest = (math.inf if end > _UNBOUNDED else end for end in ends)
+    if low < smallest or high > largest:
+        outside = low if low < smallest else high
         raise UsageError(
-            f"{place}: {outside:g} is outside what the parameter can be, {least:g} to {most:g}"
+            f"{where}: {outside:g} is outside what the parameter can be, {smallest:g} to {largest:g}"
             f"{'' if parameter.unit == '1' else f' {parameter.unit}'}; truths are stated in that unit."
         )
-    by_factors = least == 0 and most == math.inf and low < high
+    by_factors = smallest == 0 and largest == math.inf and low < high
     if by_factors and low == 0:
-        raise UsageError(f"{place}: a range of factors cannot start at 0; write the smallest value that matters.")
+        raise UsageError(f"{where}: a range of factors cannot start at 0; write the smallest value that matters.")
     return StatedTruth(parameter, low, high, by_factors)
 
 

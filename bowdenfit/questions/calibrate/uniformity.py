@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-PLACES = 50  # where the distribution function is looked at
+N_INTERVALS = 50  # where the distribution function is looked at
 _SIMULATED = 20_000
 _SEED = 20_220_728
 
@@ -28,41 +28,41 @@ class UniformRanks:
     n: int
 
     @property
-    def places(self) -> np.ndarray:
+    def positions(self) -> np.ndarray:
         """Ranks at which the distribution function is looked at."""
-        return np.arange(1, PLACES) / PLACES
+        return np.arange(1, N_INTERVALS) / N_INTERVALS
 
     @cached_property
-    def _two_sided(self) -> np.ndarray:
+    def _two_sided_probability(self) -> np.ndarray:
         """Two-sided binomial probability by number of ranks below a place, and place."""
         from scipy import stats
 
         counts = np.arange(self.n + 1)[:, None]
-        below, above = (f(counts, self.n, self.places) for f in (stats.binom.cdf, stats.binom.sf))
-        return np.minimum(1.0, 2 * np.minimum(below, above + stats.binom.pmf(counts, self.n, self.places)))
+        below, above = (f(counts, self.n, self.positions) for f in (stats.binom.cdf, stats.binom.sf))
+        return np.minimum(1.0, 2 * np.minimum(below, above + stats.binom.pmf(counts, self.n, self.positions)))
 
     @cached_property
-    def _by_chance(self) -> np.ndarray:
+    def _null_statistics(self) -> np.ndarray:
         """The statistic of uniform samples, in growing order."""
         generator = np.random.default_rng(_SEED)
-        counts = generator.multinomial(self.n, np.full(PLACES, 1 / PLACES), size=_SIMULATED)[:, :-1].cumsum(axis=1)
-        return np.sort(self._two_sided[counts, np.arange(PLACES - 1)].min(axis=1))
+        counts = generator.multinomial(self.n, np.full(N_INTERVALS, 1 / N_INTERVALS), size=_SIMULATED)[:, :-1].cumsum(axis=1)
+        return np.sort(self._two_sided_probability[counts, np.arange(N_INTERVALS - 1)].min(axis=1))
 
     def p_value(self, ranks: np.ndarray) -> float:
         """Probability that uniform ranks are as far from uniform as these."""
-        counts = self.below(ranks)
-        statistic = self._two_sided[counts, np.arange(PLACES - 1)].min()
-        return float((1 + np.searchsorted(self._by_chance, statistic, side="right")) / (1 + _SIMULATED))
+        counts = self.count_below(ranks)
+        statistic = self._two_sided_probability[counts, np.arange(N_INTERVALS - 1)].min()
+        return float((1 + np.searchsorted(self._null_statistics, statistic, side="right")) / (1 + _SIMULATED))
 
-    def below(self, ranks: np.ndarray) -> np.ndarray:
+    def count_below(self, ranks: np.ndarray) -> np.ndarray:
         """How many ranks are at or below each place."""
-        return np.searchsorted(np.sort(ranks), self.places, side="right")
+        return np.searchsorted(np.sort(ranks), self.positions, side="right")
 
     def band(self, probability: float) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest distribution function at each place, which hold that of uniform ranks with a probability."""
         from scipy import stats
 
-        gamma = float(np.quantile(self._by_chance, 1 - probability))
-        ends = (stats.binom.ppf(tail, self.n, self.places) / self.n for tail in (gamma / 2, 1 - gamma / 2))
+        gamma = float(np.quantile(self._null_statistics, 1 - probability))
+        ends = (stats.binom.ppf(tail, self.n, self.positions) / self.n for tail in (gamma / 2, 1 - gamma / 2))
         low, high = ends
         return low, high

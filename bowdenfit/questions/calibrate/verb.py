@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.questions.calibrate.answer import Calibration
     from bowdenfit.questions.calibrate.replication import Replication
-    from bowdenfit.questions.calibrate.workbench import Plan
+    from bowdenfit.questions.calibrate.workbench import CalibrationPlan
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
@@ -33,7 +33,9 @@ def calibrate(
     *,
     replications: Annotated[int, Parameter(alias="-n", metavar="NUMBER"), whole_number(2)] = 200,
     engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
-    workers: Annotated[int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)] = None,
+    workers: Annotated[
+        int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)
+    ] = None,
     output: Annotated[Output, Parameter(show_default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Parameter(metavar="KEY=VALUE"), TEXTS] = (),
     truth: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
@@ -74,32 +76,32 @@ def calibrate(
     plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
 
     import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.questions.calibrate.findings import findings
+    from bowdenfit.questions.calibrate.findings import summarize_replications
     from bowdenfit.questions.calibrate.store import open_replications
     from bowdenfit.results.folder import reserve_folder
 
-    quantities = _quantities(plan)
+    quantities = _list_quantities(plan)
     with reserve_folder(folder):
         done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
         with show_progress_bar(WATCH, progress) as show:
             _replicate(engine, workers, plan, done, replications, folder, show)
-        found = findings(tuple(done.values()), quantities, assumed=tuple(assume), **_told(plan))
-        _write(found, folder)
-    return found
+        calibration = summarize_replications(tuple(done.values()), quantities, assumed=tuple(assume), **_labels(plan))
+        _write(calibration, folder)
+    return calibration
 
 
-def _quantities(plan: "Plan") -> Any:
+def _list_quantities(plan: "CalibrationPlan") -> Any:
     import jax
 
-    from bowdenfit.questions.calibrate.quantities import quantities_of
+    from bowdenfit.questions.calibrate.quantities import list_quantities
 
     with jax.enable_x64(True):
-        return quantities_of(plan)
+        return list_quantities(plan)
 
 
-def _told(plan: "Plan") -> dict[str, Any]:
+def _labels(plan: "CalibrationPlan") -> dict[str, Any]:
     """What the answer says of a plan."""
-    truths = tuple(each.text for each in plan.truths)
+    truths = tuple(truth.text for truth in plan.truths)
     return {"name": plan.stated.description.name, "seed": plan.seed, "truths": truths}
 
 
@@ -111,19 +113,19 @@ def _folder(output: str | Path | None, resume: bool) -> Path | None:
     return Path(output) if output is not None else None
 
 
-def _plan(sets: "tuple[Dataset, Dataset]", seed: int, truth: str | Path | None) -> "Plan":
+def _plan(sets: "tuple[Dataset, Dataset]", seed: int, truth: str | Path | None) -> "CalibrationPlan":
     """What is replicated, with the truths of a file."""
     import jax
 
     from bowdenfit.model import build_model
-    from bowdenfit.questions.calibrate.truths import read_truths, stated_truths
-    from bowdenfit.questions.calibrate.workbench import Plan
+    from bowdenfit.questions.calibrate.truths import parse_truths, read_truths
+    from bowdenfit.questions.calibrate.workbench import CalibrationPlan
 
     if truth is None:
-        return Plan(*sets, seed)
+        return CalibrationPlan(*sets, seed)
     page = read_truths(Path(truth))
     with jax.enable_x64(True):
-        return Plan(*sets, seed, stated_truths(page, build_model(sets[0]).space, str(truth)))
+        return CalibrationPlan(*sets, seed, parse_truths(page, build_model(sets[0]).space, str(truth)))
 
 
 def _stated_and_assumed(
@@ -145,7 +147,7 @@ def _stated_and_assumed(
 def _replicate(
     engine: "str | Executor",
     workers: int | None,
-    plan: "Plan",
+    plan: "CalibrationPlan",
     done: "dict[int, Replication]",
     replications: int,
     folder: Path | None,
@@ -153,17 +155,17 @@ def _replicate(
 ) -> None:
     """Do what is not done yet, and keep each as it ends."""
     from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
-    from bowdenfit.questions.calibrate.pieces import Asked, pieces_of, replicated
-    from bowdenfit.questions.calibrate.store import keep
+    from bowdenfit.questions.calibrate.pieces import CalibrationJob, run_piece, split_into_pieces
+    from bowdenfit.questions.calibrate.store import append_replication
 
-    asked = Asked(plan, (workers or 0) if engine == "local" else 0)
+    job = CalibrationJob(plan, (workers or 0) if engine == "local" else 0)
     missing = [number for number in range(replications) if number not in done]
     with open_engine(engine, workers, folder and folder / JOBS_FOLDER) as opened:
-        for piece in opened.results(replicated, pieces_of(asked, missing, opened.workers)):
-            for each in piece:
-                done[each.number] = each
+        for piece in opened.results(run_piece, split_into_pieces(job, missing, opened.workers)):
+            for replication in piece:
+                done[replication.number] = replication
                 if folder is not None:
-                    keep(folder, each)
+                    append_replication(folder, replication)
                 if progress is not None:
                     progress(len(done), max(replications, len(done)))
     if folder is not None:
@@ -176,24 +178,24 @@ def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
         return seed
     if folder is None or not resume:
         return secrets.randbelow(LARGEST_SEED)
-    from bowdenfit.questions.calibrate.store import seed_of
+    from bowdenfit.questions.calibrate.store import read_seed
 
-    return seed_of(folder)
+    return read_seed(folder)
 
 
-def _fingerprint(plan: "Plan", assumptions: Sequence[str]) -> dict[str, Any]:
+def _fingerprint(plan: "CalibrationPlan", assumptions: Sequence[str]) -> dict[str, Any]:
     """What must not change between an interrupted calibration and its continuation."""
     page = {
         "description": plan.stated.description.to_json(),
         "sha256": plan.stated.sha256,
         "seed": plan.seed,
         "assumed": list(assumptions),
-        "truths": {each.parameter.name: [each.low, each.high] for each in plan.truths},
+        "truths": {truth.parameter.name: [truth.low, truth.high] for truth in plan.truths},
     }
     return dict(json.loads(json.dumps(page)))
 
 
-def _write(found: "Calibration", folder: Path | None) -> None:
+def _write(calibration: "Calibration", folder: Path | None) -> None:
     """Summary, details, figures, report, and calibration.json last; nothing without a folder."""
     if folder is None:
         return
@@ -207,18 +209,24 @@ def _write(found: "Calibration", folder: Path | None) -> None:
 
     with folder_to_write(folder):
         (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications
-        write_text(folder / SUMMARY_TEXT, calibration_text(found))
-        write_text(folder / DETAILS_TEXT, details_text(found))
-        draw_calibration(found, folder / FIGURES)
-        write_page(calibration_page(found), folder / FIGURES, folder / REPORT)
-        write_text(folder / CALIBRATION, json.dumps(plain_data(found), indent=1, allow_nan=False) + "\n")
+        write_text(folder / SUMMARY_TEXT, calibration_text(calibration))
+        write_text(folder / DETAILS_TEXT, details_text(calibration))
+        draw_calibration(calibration, folder / FIGURES)
+        write_page(calibration_page(calibration), folder / FIGURES, folder / REPORT)
+        write_text(folder / CALIBRATION, json.dumps(plain_data(calibration), indent=1, allow_nan=False) + "\n")
 
 
-def _reply(found: "Calibration", asked: dict[str, Any]) -> Reply:
+def _reply(calibration: "Calibration", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.calibrate.words import calibration_text
 
-    exit_code = 0 if found.is_calibrated else NOT_CALIBRATED
-    return Reply(calibration_text(found), lambda: found, (f"Wrote {asked['output']}.",), exit_code, found.to_csv)
+    exit_code = 0 if calibration.is_calibrated else NOT_CALIBRATED
+    return Reply(
+        calibration_text(calibration),
+        lambda: calibration,
+        (f"Wrote {options['output']}.",),
+        exit_code,
+        calibration.to_csv,
+    )
 
 
 def _show(bar: Any, done: int, total: int) -> None:

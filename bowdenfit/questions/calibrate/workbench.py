@@ -20,19 +20,19 @@ from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import Readings, drawn_readings, drawn_tables, slipped
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.calibrate.acceptable_tables import refusal
-from bowdenfit.questions.calibrate.refit import Laboratory, with_parameters_of
+from bowdenfit.questions.calibrate.acceptable_tables import why_implausible
+from bowdenfit.questions.calibrate.refit import BatchFitter, replace_data
 from bowdenfit.questions.calibrate.replication import RankedTruth, Replication, rank_truth
 from bowdenfit.questions.calibrate.truths import StatedTruth
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 
-TOGETHER = 128  # replications that are fitted together: what is lost when a calibration is interrupted
-MOST_DRAWN = 5000  # tables, before a replication is given up
+BATCH_SIZE = 128  # replications that are fitted together: what is lost when a calibration is interrupted
+MAX_DRAWS = 5000  # tables, before a replication is given up
 
 
 @dataclass(frozen=True)
-class Plan:
+class CalibrationPlan:
     """What is replicated.
 
     Args:
@@ -49,7 +49,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedTables:
     """Tables that are waiting to be fitted.
 
     Args:
@@ -70,7 +70,7 @@ class Simulated:
 
 
 @dataclass(frozen=True)
-class Workbench:
+class Replicator:
     """Runs replications of one plan in this process.
 
     Args:
@@ -80,10 +80,10 @@ class Workbench:
         refusal: Why simulated tables are not to be had from a bench, in a word; empty if they may be.
     """
 
-    plan: Plan
-    laboratory: Laboratory = field(default_factory=Laboratory)
+    plan: CalibrationPlan
+    laboratory: BatchFitter = field(default_factory=BatchFitter)
     disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset
-    refusal: Callable[[Dataset, Dataset], str] = refusal
+    why_implausible: Callable[[Dataset, Dataset], str] = why_implausible
 
     @cached_property
     def stated(self) -> Model:
@@ -96,7 +96,7 @@ class Workbench:
         return self.stated if self.plan.assumed is self.plan.stated else build_model(self.plan.assumed)
 
     @cached_property
-    def _readings(self) -> Callable[..., Any]:
+    def _simulate_readings(self) -> Callable[..., Any]:
         model, tables = self.stated, self.plan.stated.measurements
 
         def readings(z: jax.Array, words: jax.Array) -> Any:
@@ -116,69 +116,75 @@ class Workbench:
             return self._optimum_of_truth
         return for_each_draw(make_optimizer(self.assumed), self.assumed.space.size)
 
-    def replications(self, numbers: Sequence[int]) -> Iterator[Replication]:
+    def replicate(self, numbers: Sequence[int]) -> Iterator[Replication]:
         """Replications by their numbers, as they are done.
 
         Raises:
             UsageError: Hardly any tables drawn from the prior look like ones from a bench.
         """
-        for start in range(0, len(numbers), TOGETHER):
+        for start in range(0, len(numbers), BATCH_SIZE):
             with jax.enable_x64(True):
-                done = self._together(numbers[start : start + TOGETHER])
+                done = self._replicate_batch(numbers[start : start + BATCH_SIZE])
             yield from done
 
-    def _together(self, numbers: Sequence[int]) -> list[Replication]:
-        begin = time.perf_counter()
-        waiting = [self._simulated(number) for number in numbers]
-        fits = self.laboratory.fits([each.posterior for each in waiting], [each.seed for each in waiting])
-        ranked = [self._ranked(each, fit) if len(fit.z) else {} for each, fit in zip(waiting, fits, strict=True)]
-        seconds = (time.perf_counter() - begin) / len(numbers)
+    def _replicate_batch(self, numbers: Sequence[int]) -> list[Replication]:
+        start = time.perf_counter()
+        waiting = [self._simulate(number) for number in numbers]
+        fits = self.laboratory.fit_all(
+            [simulated.posterior for simulated in waiting], [simulated.seed for simulated in waiting]
+        )
+        ranked = [
+            self._rank_truths(simulated, fit) if len(fit.z) else {}
+            for simulated, fit in zip(waiting, fits, strict=True)
+        ]
+        seconds = (time.perf_counter() - start) / len(numbers)
         return [
-            Replication(each.number, each.redrawn, fit.reasons, found, seconds, fit.steps, fit.engine)
-            for each, fit, found in zip(waiting, fits, ranked, strict=True)
+            Replication(simulated.number, simulated.redrawn, fit.reasons, ranks, seconds, fit.steps, fit.engine)
+            for simulated, fit, ranks in zip(waiting, fits, ranked, strict=True)
         ]
 
-    def _simulated(self, number: int) -> Simulated:
+    def _simulate(self, number: int) -> SimulatedTables:
         generator = np.random.default_rng([self.plan.seed, number])
-        z, dataset, redrawn = self._tables(generator)
+        z, dataset, redrawn = self._draw_tables(generator)
         assumed = Dataset(self.plan.assumed.description, dataset.measurements, {})
-        posterior = LogDensity(with_parameters_of(self.assumed, self.disturb(assumed)))
-        return Simulated(number, z, posterior, redrawn, int(generator.integers(2**31)), generator.uniform())
+        posterior = LogDensity(replace_data(self.assumed, self.disturb(assumed)))
+        return SimulatedTables(number, z, posterior, redrawn, int(generator.integers(2**31)), generator.uniform())
 
-    def _truth(self, generator: np.random.Generator) -> np.ndarray:
+    def _draw_truth(self, generator: np.random.Generator) -> np.ndarray:
         """Where the priors are standard normals: drawn from them, but for what is stated."""
         z = generator.standard_normal(self.stated.space.size)
         for stated in self.plan.truths:
-            z[self.stated.space.index[stated.parameter.name]] = stated.z(generator)
+            z[self.stated.space.index[stated.parameter.name]] = stated.draw_z(generator)
         return z
 
-    def _tables(self, generator: np.random.Generator) -> tuple[np.ndarray, Dataset, dict[str, int]]:
+    def _draw_tables(self, generator: np.random.Generator) -> tuple[np.ndarray, Dataset, dict[str, int]]:
         """Truth and tables: drawn together until the tables, by themselves, could come from a bench."""
         redrawn: dict[str, int] = {}
-        for _ in range(MOST_DRAWN):
-            z = self._truth(generator)
+        for _ in range(MAX_DRAWS):
+            z = self._draw_truth(generator)
             words = generator.integers(2**32, size=2, dtype=np.uint32)
-            tables, why = self._acceptable(self._readings(z, words))
+            tables, why = self._tables_or_reason(self._simulate_readings(z, words))
             if not why:
                 return z, Dataset(self.plan.stated.description, Measurements(tables), {}), redrawn
             redrawn[why] = redrawn.get(why, 0) + 1
-        most = max(redrawn, key=lambda why: redrawn[why])
+        commonest = max(redrawn, key=lambda why: redrawn[why])
         cause = "a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml"
         if self.plan.truths:
             cause = "a true value that no cable on this bench can have: state others in the file of --truth"
         raise UsageError(
-            f"none of {MOST_DRAWN} simulated data sets looks like one from a bench, mostly because {most}; the usual cause is "
+            f"none of {MAX_DRAWS} simulated data sets looks like one from a bench, mostly because {commonest}; the "
+            "usual cause is "
             f"{cause}."
         )
 
-    def _acceptable(self, drawn: Readings) -> tuple[tuple[Any, ...], str]:
+    def _tables_or_reason(self, readings: Readings) -> tuple[tuple[Any, ...], str]:
         """Tables with what was drawn, and why no bench would hand them in: empty if one might."""
-        if slipped(drawn):
+        if slipped(readings):
             return (), "held readings would have slipped"
         stated, tables = self.plan.stated, list[Any]()
         try:
-            for table in drawn_tables(stated.description, stated.measurements, drawn):
-                why = self.refusal(stated, Dataset(stated.description, Measurements((table,)), {}))
+            for table in drawn_tables(stated.description, stated.measurements, readings):
+                why = self.why_implausible(stated, Dataset(stated.description, Measurements((table,)), {}))
                 if why:
                     return (), why
                 tables.append(table)
@@ -186,10 +192,10 @@ class Workbench:
             return (), "a recording has no strokes"
         return tuple(tables), ""
 
-    def _ranked(self, each: Simulated, fit: BatchFit) -> dict[str, RankedTruth]:
-        return self._ranked_parameters(each.z, fit.z) | self._ranked_optimum(each.z, fit.z, each.tie)
+    def _rank_truths(self, simulated: SimulatedTables, fit: BatchFit) -> dict[str, RankedTruth]:
+        return self._rank_parameters(simulated.z, fit.z) | self._rank_optimum(simulated.z, fit.z, simulated.tie)
 
-    def _ranked_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
+    def _rank_parameters(self, z_true: np.ndarray, z: np.ndarray) -> dict[str, RankedTruth]:
         """Parameters that both descriptions have and that are fitted."""
         stated, assumed = self.stated.space, self.assumed.space
         truth = dict(zip((p.name for p in stated.free), z_true, strict=True))
@@ -202,7 +208,7 @@ class Workbench:
             if name in assumed.index
         }
 
-    def _ranked_optimum(self, z_true: np.ndarray, z: np.ndarray, tie: float) -> dict[str, RankedTruth]:
+    def _rank_optimum(self, z_true: np.ndarray, z: np.ndarray, tie: float) -> dict[str, RankedTruth]:
         """Optimal length and the efficiency there, for a cable with a route.
 
         An optimum at an end of the range has probability of its own there; a truth at the same end takes a place at random

@@ -17,14 +17,14 @@ from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
 from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
 from bowdenfit.kinds.terms import measured_kinds, term_kind
-from bowdenfit.questions.compare.common_readings import CommonReadings, Omitted, common_readings
+from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, find_common_readings
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
 
 _FEW_RUNS = 5  # below which they are left out in parts, because little predicts a whole one
-_SHOWN_ROLES = {"friction", "friction_model", "sensor"}
+_COMPARED_ROLES = {"friction", "friction_model", "sensor"}
 Report = Callable[[str], None]
 
 
@@ -66,8 +66,8 @@ class Comparison(Display):
     differences: dict[str, ElpdDifference]
     weights: dict[str, float]
     predictions: dict[str, LooPrediction]
-    omitted: tuple[Omitted, ...]
-    described: dict[str, str]
+    omitted: tuple[OmittedReadings, ...]
+    descriptions: dict[str, str]
     parameters: dict[str, ComparedParameter]
     optimal_length: dict[str, tuple[Interval, str]]
     rate_effects: dict[str, RateEffect]
@@ -94,7 +94,7 @@ class Comparison(Display):
     @property
     def trusted(self) -> bool:
         """Whether the fit that predicts best is to be trusted, and the draws of all have settled, which scores rest on."""
-        return not self.troubles.get(self.best) and not any(NOT_CONVERGED in said for said in self.troubles.values())
+        return not self.troubles.get(self.best) and not any(NOT_CONVERGED in troubles for troubles in self.troubles.values())
 
     @property
     def readings(self) -> tuple[tuple[str, str], ...]:
@@ -120,7 +120,7 @@ class Comparison(Display):
         return Several(
             {
                 "name": name,
-                "model": self.described[name],
+                "model": self.descriptions[name],
                 "elpd": self.predictions[name].elpd.sum(),
                 "elpd_difference": d.elpd,
                 "standard_error": d.standard_error,
@@ -155,7 +155,7 @@ class Comparison(Display):
         return Named({name: vars(interval) | {"unit": unit} for name, (interval, unit) in self.optimal_length.items()})
 
 
-def compare(
+def compare_fits(
     fits: Mapping[str, Record], report: Report | None = None, leave_out: LeaveOut | None = None
 ) -> Comparison:
     """Compare fits.
@@ -172,22 +172,22 @@ def compare(
     """
     if len(fits) < 2:
         raise UsageError("a comparison needs at least two fits; name their results folders, two different ones.")
-    drawn = {name: _draws_of(name, fit) for name, fit in fits.items()}
-    unit, few, parts = _parts_to_leave_out(fits, leave_out)
-    common = _common(fits, parts)
+    draws = {name: _require_draws(name, fit) for name, fit in fits.items()}
+    unit, few, parts = _choose_parts(fits, leave_out)
+    common = _find_common_readings(fits, parts)
     predictions = {
-        name: _leave_out_each(name, fit, drawn[name], common, parts[name], report) for name, fit in fits.items()
+        name: _predict_left_out(name, fit, draws[name], common, parts[name], report) for name, fit in fits.items()
     }
-    order = compare_predictions(predictions)
-    ordered = {name: fits[name] for name in order}
+    differences = compare_predictions(predictions)
+    ordered = {name: fits[name] for name in differences}
     weights = stacking_weights(predictions)
     return Comparison(
-        order,
-        {name: weights[name] for name in order},
-        {name: predictions[name] for name in order},
+        differences,
+        {name: weights[name] for name in differences},
+        {name: predictions[name] for name in differences},
         common.omitted,
-        _described_all(ordered),
-        _parameters(ordered),
+        _describe_fits(ordered),
+        _compare_parameters(ordered),
         {
             n: (f.optimal_length().length, f.dataset.description.route.unit)
             for n, f in ordered.items()
@@ -196,43 +196,43 @@ def compare(
         {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
         unit,
         few,
-        {name: tuple(found.troubles) for name, fit in ordered.items() if (found := assess_fit(fit)).troubles},
+        {name: tuple(fit_verdict.troubles) for name, fit in ordered.items() if (fit_verdict := assess_fit(fit)).troubles},
     )
 
 
-def _parts_to_leave_out(
+def _choose_parts(
     fits: Mapping[str, Record], leave_out: LeaveOut | None
 ) -> tuple[LeaveOut, int, dict[str, dict[str, RunParts]]]:
     """What is left out of runs at a time; how few runs there are, if that decided it; the parts by fit and table."""
     runs = [len(t.labels) for fit in fits.values() for t in fit.model.terms if has_rows(t)]
     few = min(runs, default=_FEW_RUNS) if leave_out is None else 0
     unit: LeaveOut = leave_out or ("load" if few < _FEW_RUNS else "run")
-    parts = {name: _parts(fit, unit) for name, fit in fits.items()}
+    parts = {name: _run_parts(fit, unit) for name, fit in fits.items()}
     return (unit, few if unit == "load" else 0, parts) if leave_out or any(parts.values()) else ("run", 0, parts)
 
 
-def _parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
+def _run_parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
     """Parts of the runs of every table that has some."""
-    found = {term.name: run_parts(term, unit) for term in fit.model.terms}
-    return {name: parts for name, parts in found.items() if parts is not None}
+    parts = {term.name: run_parts(term, unit) for term in fit.model.terms}
+    return {name: parts for name, parts in parts.items() if parts is not None}
 
 
-def _draws_of(name: str, fit: Record) -> Draws:
+def _require_draws(name: str, fit: Record) -> Draws:
     if fit.sampled is None:
         raise UsageError(f"{name} has no posterior, because it was made without MCMC; fit it again without --no-mcmc.")
     return fit.posterior
 
 
-def _common(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
+def _find_common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
     """The readings that all fits share; refuses fits of other measurements."""
     first, *others = fits
     for name in others:
-        if _inputs(fits[name]) != _inputs(fits[first]):
+        if _input_files(fits[name]) != _input_files(fits[first]):
             raise UsageError(
                 f"{first} and {name} were not fitted to the same readings, so how well they predict them cannot be "
                 "compared; fit the same data set twice, such as with and without --friction rate-dependent."
             )
-    common = common_readings(fits, parts)
+    common = find_common_readings(fits, parts)
     if not common.readings:
         raise UsageError(
             f"{', '.join(fits)} have no reading in common that they take for the same, so they cannot be compared. "
@@ -247,35 +247,35 @@ def _common(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunPart
     return common
 
 
-def _inputs(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
+def _input_files(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
     """Files that were read, description aside, with their checksums; and the readings that they leave no choice of."""
     files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
     return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).chooses_rows]
 
 
-def _leave_out_each(
-    name: str, fit: Record, drawn: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
+def _predict_left_out(
+    name: str, fit: Record, draws: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
 ) -> LooPrediction:
     """Expected log density of every reading, had it been left out."""
     return leave_one_out(
         LooDensity(Density(fit.model), parts=parts),
-        drawn.z,
-        drawn.log_likelihood,
-        drawn.n_effective,
+        draws.z,
+        draws.log_likelihood,
+        draws.n_effective,
         fit.provenance.seed,
         common.positions[name],
         lambda sentence: report(f"{name}: {sentence}") if report is not None else None,
     )
 
 
-def _described_all(fits: Mapping[str, Record]) -> dict[str, str]:
+def _describe_fits(fits: Mapping[str, Record]) -> dict[str, str]:
     """What sets each fit apart; the families of its curves where the fits do not agree on them."""
-    families = {name: _families(fit.dataset.description) for name, fit in fits.items()}
+    families = {name: _curve_families(fit.dataset.description) for name, fit in fits.items()}
     differ = len(set(families.values())) > 1
     return {name: _describe(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
 
 
-def _families(description: Description) -> str:
+def _curve_families(description: Description) -> str:
     """Families of its curves, one word where all are of one, else in the order of the contacts."""
     curves = [c.wrap_angle.curve or "" for c in description.curved]
     return f"{listed(curves if len(set(curves)) > 1 else curves[:1])} curves"
@@ -297,11 +297,11 @@ def _describe(fit: Record) -> str:
     return ", ".join(parts + ([f"{', '.join(fixed)} fixed"] if fixed else []))
 
 
-def _parameters(fits: Mapping[str, Record]) -> dict[str, ComparedParameter]:
+def _compare_parameters(fits: Mapping[str, Record]) -> dict[str, ComparedParameter]:
     rows: dict[str, ComparedParameter] = {}
     for name, fit in fits.items():
         for p in fit.model.space.free:
-            if p.role in _SHOWN_ROLES and fit.sampled is not None:
+            if p.role in _COMPARED_ROLES and fit.sampled is not None:
                 row = rows.setdefault(p.name, ComparedParameter(p.symbol, p.unit, {}, p.meaning))
                 row.by_fit[name] = Interval.of(np.asarray(fit.posterior.values[p.name]))
     return rows

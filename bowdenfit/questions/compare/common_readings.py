@@ -20,7 +20,7 @@ Key = tuple[str, str, int]
 
 
 @dataclass(frozen=True)
-class Omitted:
+class OmittedReadings:
     """Readings of one table that the fits do not share.
 
     Args:
@@ -57,10 +57,10 @@ class CommonReadings:
 
     readings: tuple[tuple[str, str], ...]
     positions: dict[str, tuple[int, ...]]
-    omitted: tuple[Omitted, ...]
+    omitted: tuple[OmittedReadings, ...]
 
 
-def common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
+def find_common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
     """The readings that all fits have, as the same events.
 
     Args:
@@ -69,39 +69,39 @@ def common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str,
     """
     events = {name: _events(fit, parts[name]) for name, fit in fits.items()}
     first, *others = events.values()
-    shared = [key for key, event in first.items() if all(key in o and _same(event, o[key]) for o in others)]
-    places = {name: {key: i for i, key in enumerate(of_fit)} for name, of_fit in events.items()}
+    shared = [key for key, event in first.items() if all(key in o and _is_same_event(event, o[key]) for o in others)]
+    positions = {name: {key: i for i, key in enumerate(of_fit)} for name, of_fit in events.items()}
     descriptions = {name: fit.dataset.description for name, fit in fits.items()}
     tables = dict.fromkeys(key[0] for of_fit in events.values() for key in of_fit)
     counts = {
-        table: (_count(shared, table), max(_count(of_fit, table) for of_fit in events.values())) for table in tables
+        table: (_count_table(shared, table), max(_count_table(of_fit, table) for of_fit in events.values())) for table in tables
     }
     return CommonReadings(
         tuple((table, label) for table, label, _ in shared),
-        {name: tuple(places[name][key] for key in shared) for name in events},
+        {name: tuple(positions[name][key] for key in shared) for name in events},
         tuple(
-            Omitted(table, some, most, term_kind(table).why_events_differ(table, descriptions))
+            OmittedReadings(table, some, most, term_kind(table).why_events_differ(table, descriptions))
             for table, (some, most) in counts.items()
             if some < most
         ),
     )
 
 
-def _count(keys: Mapping[Key, np.ndarray] | list[Key], table: str) -> int:
+def _count_table(keys: Mapping[Key, np.ndarray] | list[Key], table: str) -> int:
     return sum(key[0] == table for key in keys)
 
 
 def _events(fit: Record, parts: Mapping[str, RunParts]) -> dict[Key, np.ndarray]:
     """What each reading says, by table, label and how often that label came before; in the order of the model's terms."""
-    found: dict[Key, np.ndarray] = {}
+    events: dict[Key, np.ndarray] = {}
     for term in fit.model.terms:
-        of_runs = parts.get(term.name)
-        said = of_runs.said if of_runs else term_kind(term.name).events(term, fit.dataset.description)
-        for label, event in zip((of_runs or term).labels, said, strict=True):
-            earlier = sum(key[:2] == (term.name, label) for key in found)
-            found[term.name, label, earlier] = event
-    return found
+        run_parts = parts.get(term.name)
+        values = run_parts.said if run_parts else term_kind(term.name).events(term, fit.dataset.description)
+        for label, event in zip((run_parts or term).labels, values, strict=True):
+            earlier = sum(key[:2] == (term.name, label) for key in events)
+            events[term.name, label, earlier] = event
+    return events
 
 
-def _same(one: np.ndarray, other: np.ndarray) -> bool:
+def _is_same_event(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=_SAME, atol=0.0, equal_nan=True)

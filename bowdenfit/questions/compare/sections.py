@@ -7,38 +7,39 @@ from bowdenfit.questions.compare.words import (
     HOW_WELL,
     WHAT_CHANGES,
     basis_sentences,
-    parameter_cells,
-    scores,
+    influential_text,
+    parameter_table,
+    score_table,
     speed_sentences,
-    treated_text,
     verdict_sentences,
 )
 from bowdenfit.words import listed
 
 
-def comparison_page(found: Comparison) -> HtmlPage:
+def comparison_page(comparison: Comparison) -> HtmlPage:
     """The page of a comparison.
 
     Args:
         found: The comparison.
     """
-    heads, rows = scores(found)
-    first, *others = verdict_sentences(found)
-    names, values = parameter_cells(found)
+    heads, rows = score_table(comparison)
+    first, *others = verdict_sentences(comparison)
+    names, values = parameter_table(comparison)
+    meanings = {name: parameter.meaning for name, parameter in comparison.parameters.items()}
     sections = (
         prose_section("The answer", others, headline=first),
         prose_section(
             "How well each predicts",
-            basis_sentences(found),
+            basis_sentences(comparison),
             [PageTable(heads, tuple(rows), HOW_WELL, left=(0, 1))],
-            folded=[("Readings on which a fit leans", treated_text(found))],
-            pictures=(Picture("comparison", HEADING, caption(found)),),
+            folded=[("Readings on which a fit leans", influential_text(comparison))],
+            pictures=(Picture("comparison", HEADING, caption(comparison)),),
         ),
         prose_section(
             "What changes",
-            speed_sentences(found),
+            speed_sentences(comparison),
             [PageTable(names, tuple(values), WHAT_CHANGES)],
-            folded=[("What the names stand for", make_meanings_table({n: row.meaning for n, row in found.parameters.items()}))],
+            folded=[("What the names stand for", make_meanings_table(meanings))],
         ),
     )
-    return HtmlPage(listed(list(found.differences)), "Comparison by bowdenfit", sections)
+    return HtmlPage(listed(list(comparison.differences)), "Comparison by bowdenfit", sections)

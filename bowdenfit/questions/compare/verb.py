@@ -49,7 +49,7 @@ def compare(
     import jax
 
     from bowdenfit.questions.compare import comparison_figure
-    from bowdenfit.questions.compare.answer import compare as compared
+    from bowdenfit.questions.compare.answer import compare_fits as compared
     from bowdenfit.questions.compare.sections import comparison_page
     from bowdenfit.questions.compare.words import comparison_text
     from bowdenfit.verb import show_progress_bar
@@ -57,20 +57,28 @@ def compare(
     if output is not None:
         refuse_to_replace(Path(output), NAME, "comparison", force)
     with jax.enable_x64(True), show_progress_bar(WATCH, progress) as show:
-        found = compared(fits, show, leave_out)
+        comparison = compared(fits, show, leave_out)
     if output is not None:
         names = {fit.name for fit in fits.values()}
         cable = names.pop() if len(names) == 1 else ""
-        write_answer(output, NAME, found, comparison_text(found), {NAME: comparison_figure}, cable, comparison_page(found))
-    return found
+        write_answer(
+            output,
+            NAME,
+            comparison,
+            comparison_text(comparison),
+            {NAME: comparison_figure},
+            cable,
+            comparison_page(comparison),
+        )
+    return comparison
 
 
-def _reply(found: "Comparison", asked: dict[str, Any]) -> Reply:
+def _reply(comparison: "Comparison", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.compare.words import comparison_text
 
-    notes = (f"Wrote {asked['output']}.",) if asked["output"] else ()
-    exit_code = 0 if found.trusted else NOT_TRUSTED
-    return Reply(comparison_text(found), lambda: found, notes, exit_code, csv=found.to_csv)
+    notes = (f"Wrote {options['output']}.",) if options["output"] else ()
+    exit_code = 0 if comparison.trusted else NOT_TRUSTED
+    return Reply(comparison_text(comparison), lambda: comparison, notes, exit_code, csv=comparison.to_csv)
 
 
 def _show(bar: Any, sentence: str) -> None:

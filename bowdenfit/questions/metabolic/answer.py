@@ -10,25 +10,25 @@ import numpy as np
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.errors import DatasetError
 from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.questions.metabolic.contradictions import contradictions
+from bowdenfit.questions.metabolic.contradictions import find_contradictions
 from bowdenfit.questions.metabolic.paired import (
     LEVEL,
     half_width,
-    least_found,
+    mean_and_error,
     persons_needed,
     power,
     probability_below,
-    t_of,
-    t_of_p,
-    two_sided,
+    smallest_detectable,
+    t_from_p,
+    two_sided_p,
 )
-from bowdenfit.questions.metabolic.study import Costs, Study
+from bowdenfit.questions.metabolic.study import MetabolicCosts, Study
 
 EXPECTED = 0.03  # of the cost: standard deviation of differences that one who doubts expects
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(Part):
+class ConditionDifference(Part):
     """A condition less another, of the same persons.
 
     Args:
@@ -62,7 +62,7 @@ class Comparison(Part):
     least: float
 
     @property
-    def shown(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether the study shows a difference."""
         return self.p_holm < LEVEL
 
@@ -81,7 +81,7 @@ class Metabolic(Display):
 
     name: str
     source: str
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[ConditionDifference, ...]
     contradictions: tuple[str, ...]
     order: tuple[str, ...]
     from_persons: bool
@@ -89,10 +89,12 @@ class Metabolic(Display):
     JSON: ClassVar = (...,)
 
     def _table(self) -> Rows:
-        return [vars(each) for each in self.comparisons], dict.fromkeys(("difference", "low", "high", "least"), "W/kg")
+        return [vars(comparison) for comparison in self.comparisons], dict.fromkeys(
+            ("difference", "low", "high", "least"), "W/kg"
+        )
 
 
-def answered(study: Study, costs: Costs | None) -> Metabolic:
+def analyze_study(study: Study, costs: MetabolicCosts | None) -> Metabolic:
     """What a study shows.
 
     Args:
@@ -102,44 +104,50 @@ def answered(study: Study, costs: Costs | None) -> Metabolic:
     Raises:
         DatasetError: Nothing can be compared.
     """
-    pairs = list(_of_persons(costs)) if costs is not None else list(_of_printed(study))
+    pairs = list(_pairs_from_persons(costs)) if costs is not None else list(_pairs_from_printed(study))
     if not pairs:
-        raise DatasetError("no two conditions can be compared; a pair needs two persons, or means and a p that were printed.")
-    adjusted = adjust_p_values([two_sided(mean / error, n) for _, _, n, mean, error, _ in pairs])
-    found = tuple(_compared(*pair, p) for pair, p in zip(pairs, adjusted.tolist(), strict=True))
-    return Metabolic(study.name, study.source, found, tuple(contradictions(study)), study.order, costs is not None)
+        raise DatasetError(
+            "no two conditions can be compared; a pair needs two persons, or means and a p that were printed."
+        )
+    adjusted = adjust_p_values([two_sided_p(mean / error, n) for _, _, n, mean, error, _ in pairs])
+    comparisons = tuple(_compare(*pair, p) for pair, p in zip(pairs, adjusted.tolist(), strict=True))
+    return Metabolic(
+        study.name, study.source, comparisons, tuple(find_contradictions(study)), study.order, costs is not None
+    )
 
 
-def _of_persons(costs: Costs) -> list[tuple[str, str, int, float, float, float]]:
+def _pairs_from_persons(costs: MetabolicCosts) -> list[tuple[str, str, int, float, float, float]]:
     pairs = []
     for j, i in combinations(range(len(costs.conditions)), 2):
         both = np.isfinite(costs.net[:, [i, j]]).all(axis=1)
         differences = costs.net[both, i] - costs.net[both, j]
         if both.sum() >= 2 and np.ptp(differences) > 0:
             baseline = float(costs.net[both, j].mean())
-            pairs.append((costs.conditions[i], costs.conditions[j], int(both.sum()), *t_of(differences), baseline))
+            pairs.append(
+                (costs.conditions[i], costs.conditions[j], int(both.sum()), *mean_and_error(differences), baseline)
+            )
     return pairs
 
 
-def _of_printed(study: Study) -> list[tuple[str, str, int, float, float, float]]:
-    means = {each.name: float(each.mean) for each in study.condition if each.mean is not None}
+def _pairs_from_printed(study: Study) -> list[tuple[str, str, int, float, float, float]]:
+    means = {printed.name: float(printed.mean) for printed in study.condition if printed.mean is not None}
     pairs = []
-    for each in study.difference:
-        if each.p is None or each.condition not in means or each.less not in means:
+    for printed in study.difference:
+        if printed.p is None or printed.condition not in means or printed.less not in means:
             continue
-        difference, persons = means[each.condition] - means[each.less], study.persons or 2
+        difference, persons = means[printed.condition] - means[printed.less], study.persons or 2
         if difference != 0:
-            error = abs(difference) / t_of_p(float(each.p), persons)
-            pairs.append((each.condition, each.less, persons, difference, error, means[each.less]))
+            error = abs(difference) / t_from_p(float(printed.p), persons)
+            pairs.append((printed.condition, printed.less, persons, difference, error, means[printed.less]))
     return pairs
 
 
-def _compared(
+def _compare(
     condition: str, less: str, persons: int, mean: float, error: float, baseline: float, adjusted: float
-) -> Comparison:
+) -> ConditionDifference:
     half, spread = half_width(error, persons), error * math.sqrt(persons)
-    return Comparison(
-        condition, less, persons, mean, mean - half, mean + half, mean / baseline, two_sided(mean / error, persons), adjusted,
+    return ConditionDifference(
+        condition, less, persons, mean, mean - half, mean + half, mean / baseline, two_sided_p(mean / error, persons), adjusted,
         probability_below(mean, error, persons), probability_below(mean, error, persons, EXPECTED * abs(baseline)),
-        power(mean / spread, persons), persons_needed(mean / spread), least_found(persons) * spread,
+        power(mean / spread, persons), persons_needed(mean / spread), smallest_detectable(persons) * spread,
     )  # fmt: skip

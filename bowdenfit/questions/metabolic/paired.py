@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 _OXYGEN, _CARBON_DIOXIDE, _NITROGEN = 16.58, 4.51, 5.90  # kJ/l, kJ/l and kJ/g
 LEVEL, POWER = 0.05, 0.8
-_MOST_PERSONS = 100_000
+_MAX_PERSONS = 100_000
 
 
 def brockway(oxygen: np.ndarray | float, carbon_dioxide: np.ndarray | float, nitrogen: float = 0.0) -> np.ndarray | float:
@@ -27,7 +27,7 @@ def brockway(oxygen: np.ndarray | float, carbon_dioxide: np.ndarray | float, nit
     return (_OXYGEN * oxygen + _CARBON_DIOXIDE * carbon_dioxide - 1000 * _NITROGEN * nitrogen) / 60
 
 
-def t_of(differences: np.ndarray) -> tuple[float, float]:
+def mean_and_error(differences: np.ndarray) -> tuple[float, float]:
     """Mean difference and its standard error.
 
     Args:
@@ -36,7 +36,7 @@ def t_of(differences: np.ndarray) -> tuple[float, float]:
     return float(np.mean(differences)), float(stats.sem(differences))
 
 
-def two_sided(t: float, persons: int) -> float:
+def two_sided_p(t: float, persons: int) -> float:
     """Probability of a t as far from 0 by chance.
 
     Args:
@@ -46,7 +46,7 @@ def two_sided(t: float, persons: int) -> float:
     return float(2 * stats.t.sf(abs(t), persons - 1))
 
 
-def t_of_p(p: float, persons: float) -> float:
+def t_from_p(p: float, persons: float) -> float:
     """The t, without its sign, that has a two-sided probability."""
     return float(stats.t.isf(p / 2, persons - 1))
 
@@ -62,7 +62,7 @@ def half_width(error: float, persons: int, level: float = 1 - LEVEL) -> float:
     return float(stats.t.ppf((1 + level) / 2, persons - 1)) * error
 
 
-def probability_below(mean: float, error: float, persons: int, before: float = math.inf) -> float:
+def probability_below(mean: float, error: float, persons: int, prior_sd: float = math.inf) -> float:
     """Probability that the true difference is negative.
 
     Args:
@@ -70,11 +70,11 @@ def probability_below(mean: float, error: float, persons: int, before: float = m
         persons: How many.
         before: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
     """
-    if math.isinf(before):
+    if math.isinf(prior_sd):
         return float(stats.t.cdf(-mean / error, persons - 1))
-    at = np.linspace(-12, 12, 200_001) * before
-    weight = np.exp(-((at / before) ** 2) / 2) * (1 + ((at - mean) / error) ** 2 / (persons - 1)) ** (-persons / 2)
-    return float((weight[at < 0].sum() + weight[at == 0].sum() / 2) / weight.sum())
+    grid = np.linspace(-12, 12, 200_001) * prior_sd
+    weight = np.exp(-((grid / prior_sd) ** 2) / 2) * (1 + ((grid - mean) / error) ** 2 / (persons - 1)) ** (-persons / 2)
+    return float((weight[grid < 0].sum() + weight[grid == 0].sum() / 2) / weight.sum())
 
 
 def power(effect: float, persons: float, level: float = LEVEL) -> float:
@@ -85,7 +85,7 @@ def power(effect: float, persons: float, level: float = LEVEL) -> float:
         persons: How many.
         level: Of the two-sided test.
     """
-    limit, shift = t_of_p(level, persons), abs(effect) * math.sqrt(persons)
+    limit, shift = t_from_p(level, persons), abs(effect) * math.sqrt(persons)
     other_way = float(stats.nct.cdf(-limit, persons - 1, shift))  # NaN where it is too small to be computed
     return float(stats.nct.sf(limit, persons - 1, shift)) + (0.0 if math.isnan(other_way) else other_way)
 
@@ -97,13 +97,13 @@ def persons_needed(effect: float, share: float = POWER) -> int | None:
         effect: See `power`.
         share: The share.
     """
-    most = min(20 / max(effect**2, 1e-9) + 40, _MOST_PERSONS)  # with 20 over the square 99 % of all studies find it
-    if power(effect, most) < share:
+    largest = min(20 / max(effect**2, 1e-9) + 40, _MAX_PERSONS)  # with 20 over the square 99 % of all studies find it
+    if power(effect, largest) < share:
         return None
-    return 2 if power(effect, 2) >= share else math.ceil(brentq(lambda n: power(effect, n) - share, 2, most))
+    return 2 if power(effect, 2) >= share else math.ceil(brentq(lambda n: power(effect, n) - share, 2, largest))
 
 
-def least_found(persons: int, share: float = POWER) -> float:
+def smallest_detectable(persons: int, share: float = POWER) -> float:
     """Difference, over the standard deviation of persons' differences, that is found in so many studies of all."""
-    enough = 4 * t_of_p(LEVEL, persons) / math.sqrt(persons)
+    enough = 4 * t_from_p(LEVEL, persons) / math.sqrt(persons)
     return float(brentq(lambda effect: power(effect, persons) - share, 0.0, enough))

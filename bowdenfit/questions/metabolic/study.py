@@ -25,7 +25,7 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Condition(_Frozen):
+class PrintedCondition(_Frozen):
     """What was printed of one condition: mean net cost [W/kg] and its standard error, as written."""
 
     name: Name
@@ -33,7 +33,7 @@ class Condition(_Frozen):
     sem: Digits | None = None
 
 
-class Printed(_Frozen):
+class PrintedDifference(_Frozen):
     """What was printed of a condition less another: probability by chance, and change in percent, as written."""
 
     condition: Name
@@ -63,12 +63,12 @@ class Study(_Frozen):
     order: tuple[str, ...] = ()
     rest: str = ""
     table: str = ""
-    condition: tuple[Condition, ...] = ()
-    difference: tuple[Printed, ...] = ()
+    condition: tuple[PrintedCondition, ...] = ()
+    difference: tuple[PrintedDifference, ...] = ()
 
 
 @dataclass(frozen=True)
-class Costs:
+class MetabolicCosts:
     """Net metabolic cost of every person [W/kg], (person, condition), NaN where a person did not walk in one."""
 
     persons: tuple[str, ...]
@@ -76,7 +76,7 @@ class Costs:
     net: np.ndarray
 
 
-def read_study(folder: Path) -> tuple[Study, Costs | None]:
+def read_study(folder: Path) -> tuple[Study, MetabolicCosts | None]:
     """A study and, where it has them, the numbers of each person.
 
     Raises:
@@ -91,37 +91,37 @@ def read_study(folder: Path) -> tuple[Study, Costs | None]:
         study = Study.model_validate(raw)
     except ValidationError as error:
         first = error.errors()[0]
-        place = shown(".".join(map(str, first["loc"])))[1:-1] if first["loc"] else "the file"
+        where = shown(".".join(map(str, first["loc"])))[1:-1] if first["loc"] else "the file"
         raise DescriptionError(
-            f"{path.name}: {place} is wrong ({first['msg']}); numbers that were printed are written as text with all their "
+            f"{path.name}: {where} is wrong ({first['msg']}); numbers that were printed are written as text with all their "
             'digits, such as mean = "6.30", and datasets/on-body-metabolic shows every key.'
         ) from None
     if study.table:
-        return study, _costs(study, folder / study.table)
+        return study, _read_costs(study, folder / study.table)
     _refuse_incomplete(study, path.name)
     return study, None
 
 
 def _refuse_incomplete(study: Study, file: str) -> None:
     """What was printed is enough for one comparison at the least."""
-    names = [each.name for each in study.condition]
+    names = [difference.name for difference in study.condition]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DescriptionError(f"{file}: the condition {twice!r} stands twice; delete one.")
-    for each in study.difference:
-        unknown = next((name for name in (each.condition, each.less) if name not in names), None)
+    for difference in study.difference:
+        unknown = next((name for name in (difference.condition, difference.less) if name not in names), None)
         if unknown is not None:
             raise DescriptionError(f"{file}: a difference is of {unknown!r}, which no condition is called; correct the name.")
     if study.persons is None:
         raise DescriptionError(f"{file}: nobody says how many persons walked; write persons = 5, or name their table.")
     if len(names) < 2 or not study.difference:
         raise DescriptionError(f"{file}: nothing can be compared; write two [[condition]] and a [[difference]], or a table.")
-    for each in study.difference:
-        if each.p is not None and not 0 < float(each.p) < 1:
-            raise DescriptionError(f"{file}: p = {each.p} is no probability between 0 and 1; correct it.")
+    for difference in study.difference:
+        if difference.p is not None and not 0 < float(difference.p) < 1:
+            raise DescriptionError(f"{file}: p = {difference.p} is no probability between 0 and 1; correct it.")
 
 
-def _costs(study: Study, path: Path) -> Costs:
+def _read_costs(study: Study, path: Path) -> MetabolicCosts:
     """Net cost of each person."""
     table = read_table(path)
     columns = {heading.strip(): i for i, heading in enumerate(table.header)}
@@ -132,32 +132,32 @@ def _costs(study: Study, path: Path) -> Costs:
             f"{table.file} has no column {missing}; write person, condition and {_NET}, or person, condition, "
             f"{', '.join(_GAS)}."
         )
-    found: dict[tuple[str, str], float] = {}
+    costs: dict[tuple[str, str], float] = {}
     for row in table.rows:
         cells = {name: row[columns[name]] for name in needed}
-        who, where = cells["person"].text.strip(), cells["condition"].text.strip()
-        if (who, where) in found:
-            raise cells["person"].refuse(f"{who} stands twice for {where}; give each person one row a condition.")
+        person, condition = cells["person"].text.strip(), cells["condition"].text.strip()
+        if (person, condition) in costs:
+            raise cells["person"].refuse(f"{person} stands twice for {condition}; give each person one row a condition.")
         numbers = [cells[name].number() for name in needed[2:]]
         if not all(map(math.isfinite, numbers)) or (len(numbers) > 1 and min(numbers) <= 0):
             raise cells[needed[2]].refuse("a number here is blank, or not above 0; correct it, or leave the row out.")
-        found[who, where] = numbers[0] if len(numbers) == 1 else _rate(*numbers)
-    persons, conditions = (tuple(dict.fromkeys(key[i] for key in found)) for i in (0, 1))
-    gross = np.array([[found.get((who, where), math.nan) for where in conditions] for who in persons])
+        costs[person, condition] = numbers[0] if len(numbers) == 1 else _rate_per_kg(*numbers)
+    persons, conditions = (tuple(dict.fromkeys(key[i] for key in costs)) for i in (0, 1))
+    gross = np.array([[costs.get((person, condition), math.nan) for condition in conditions] for person in persons])
     if _NET not in columns:
         if study.rest not in conditions:
             raise DescriptionError(
                 f"{FILE}: {table.file} has gas, and net cost is what walking costs more than rest; write rest = \"NAME\" with "
                 "the condition in which persons rested."
             )
-        at = conditions.index(study.rest)
-        gross = np.delete(gross - gross[:, [at]], at, axis=1)
+        resting = conditions.index(study.rest)
+        gross = np.delete(gross - gross[:, [resting]], resting, axis=1)
         conditions = tuple(name for name in conditions if name != study.rest)
     if len(persons) < 2 or len(conditions) < 2:
         raise DatasetError(f"{table.file} has {len(persons)} persons and {len(conditions)} conditions; it takes two of each.")
-    return Costs(persons, conditions, gross)
+    return MetabolicCosts(persons, conditions, gross)
 
 
-def _rate(oxygen: float, carbon_dioxide: float, mass: float) -> Any:
+def _rate_per_kg(oxygen: float, carbon_dioxide: float, mass: float) -> Any:
     """W/kg"""
     return brockway(oxygen, carbon_dioxide) / mass

@@ -26,17 +26,17 @@ def metabolic(
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
-    from bowdenfit.questions.metabolic.answer import answered
+    from bowdenfit.questions.metabolic.answer import analyze_study
     from bowdenfit.questions.metabolic.study import read_study
     from bowdenfit.questions.metabolic.words import metabolic_text  # noqa: F401  (how the answer shows itself)
 
-    return answered(*read_study(Path(dataset)))
+    return analyze_study(*read_study(Path(dataset)))
 
 
-def _reply(found: "Metabolic", _: dict[str, Any]) -> Reply:
+def _reply(result: "Metabolic", _: dict[str, Any]) -> Reply:
     from bowdenfit.questions.metabolic.words import metabolic_text
 
-    return Reply(metabolic_text(found), lambda: found, csv=found.to_csv)
+    return Reply(metabolic_text(result), lambda: result, csv=result.to_csv)
 
 
 VERB = Verb(

@@ -5,15 +5,15 @@ from typing import ClassVar
 
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.questions.next.target import Answer
+from bowdenfit.questions.next.target import TargetQuantity
 
-WITHIN = 2.0  # standard errors within which two candidates are as good as each other
-_SHOWN = ("words", "share", "error", "sd", "sd_error", "as_good", "cost")  # columns of a table
+EQUAL_WITHIN = 2.0  # standard errors within which two candidates are as good as each other
+_COLUMNS = ("words", "share", "error", "sd", "sd_error", "as_good", "cost")  # columns of a table
 LEAST_SHARE = 0.01  # of the variance; a measurement that takes away less is not worth making
 
 
 @dataclass(frozen=True, repr=False)
-class Ranked(Part):
+class RankedCandidate(Part):
     """One candidate and what it would do.
 
     Args:
@@ -84,7 +84,7 @@ class Repeats:
 
 
 @dataclass(frozen=True)
-class Step:
+class PlannedMeasurement:
     """One measurement of several made one after the other.
 
     Args:
@@ -99,7 +99,7 @@ class Step:
 
 
 @dataclass(frozen=True, repr=False)
-class Within(Part):
+class LoadAndStroke(Part):
     """At which load and of which stroke the readings of the best candidate tell most.
 
     Args:
@@ -108,7 +108,7 @@ class Within(Part):
     """
 
     usual: str
-    ranked: tuple[Ranked, ...]
+    ranked: tuple[RankedCandidate, ...]
 
     JSON: ClassVar = ("usual", ("candidates", "ranked"))
 
@@ -130,16 +130,16 @@ class NextMeasurement(Display):
         within: At which load and stroke the best is best made; None where it says so itself, or is not made under any.
     """
 
-    answer: Answer
-    ranked: tuple[Ranked, ...]
+    answer: TargetQuantity
+    ranked: tuple[RankedCandidate, ...]
     repeats: Repeats | None
-    plan: tuple[Step, ...]
+    plan: tuple[PlannedMeasurement, ...]
     route_label: str
     route_range: tuple[float, float]
     converged: bool
     loads: tuple[float, float] | None = None
     stop: str = ""
-    within: Within | None = None
+    within: LoadAndStroke | None = None
 
     JSON: ClassVar = (
         "answer", ("best", "best_name"), ("candidates", "ranked"), ("load_and_stroke", "within"), "repeats", "plan",
@@ -147,7 +147,7 @@ class NextMeasurement(Display):
     )  # fmt: skip
 
     @property
-    def best(self) -> Ranked | None:
+    def best(self) -> RankedCandidate | None:
         """The candidate most worth measuring; None where none would narrow the answer noticeably."""
         first = self.ranked[0]
         return first if first.is_noticeable else None
@@ -158,10 +158,10 @@ class NextMeasurement(Display):
         return self.best.name if self.best else None
 
     def _table(self) -> Rows:
-        rows = [{"measurement": r.name} | {key: vars(r)[key] for key in _SHOWN} for r in self.ranked]
+        rows = [{"measurement": r.name} | {key: vars(r)[key] for key in _COLUMNS} for r in self.ranked]
         return rows, {"share": "1", "error": "1", "sd": self.answer.unit or "1", "sd_error": self.answer.unit or "1"}
 
 
 def is_noticeable(share: float, error: float) -> bool:
     """Whether a share of the variance is worth the trouble, and more than the error of its estimate."""
-    return share > max(LEAST_SHARE, WITHIN * error)
+    return share > max(LEAST_SHARE, EQUAL_WITHIN * error)

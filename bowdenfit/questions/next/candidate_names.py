@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate, CandidateKind
 from bowdenfit.kinds.terms import candidate_kinds
-from bowdenfit.questions.next.candidates import example, route_words, situation_of, why_not
+from bowdenfit.questions.next.candidates import build_situation, example_name, route_variable, why_unsuitable
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 
@@ -17,16 +17,16 @@ _STROKES = {"pull": 1, "return": -1}
 _NUMBER = re.compile(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
-def parsed_candidates(fit: Record, texts: Iterable[str]) -> tuple[Candidate, ...]:
+def parse_candidates(fit: Record, texts: Iterable[str]) -> tuple[Candidate, ...]:
     """Candidates as users write them, such as "angle@450" or "stretch@90deg,50N".
 
     Raises:
         UsageError: One is not understood, or makes no sense for this cable.
     """
-    return tuple(dict.fromkeys(_parsed(fit, text) for text in texts))
+    return tuple(dict.fromkeys(_parse_candidate(fit, text) for text in texts))
 
 
-def _parsed(fit: Record, text: str) -> Candidate:
+def _parse_candidate(fit: Record, text: str) -> Candidate:
     name, _, where = text.partition("@")
     kind = candidate_kinds().get(name)
     if kind is None:
@@ -34,23 +34,23 @@ def _parsed(fit: Record, text: str) -> Candidate:
         raise UsageError(f"--candidate {text!r} is of no kind that can be measured{suggestion}")
     candidate = Candidate(name)
     for part in filter(None, (part.strip() for part in where.split(","))):
-        candidate = _with_part(fit, kind, candidate, text, part)
+        candidate = _add_part(fit, kind, candidate, text, part)
     _check_complete(fit, kind, candidate, text)
-    reason = why_not(fit, candidate)
+    reason = why_unsuitable(fit, candidate)
     if reason:
         raise UsageError(f"--candidate {text!r}: {reason}")
     return candidate
 
 
-def _with_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str, part: str) -> Candidate:
+def _add_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str, part: str) -> Candidate:
     """The candidate with one more number of its place."""
-    found = _NUMBER.fullmatch(part)
+    match = _NUMBER.fullmatch(part)
     route = fit.dataset.description.route
-    has_designs = bool(kind.designs(situation_of(fit.model, fit.dataset.measurements)))
+    has_designs = bool(kind.designs(build_situation(fit.model, fit.dataset.measurements)))
     if part in _STROKES and has_designs:
         return replace(candidate, stroke=_STROKES[part])
     try:
-        value, unit = float(found[1]) if found else float("nan"), found[2] if found else ""
+        value, unit = float(match[1]) if match else float("nan"), match[2] if match else ""
         if np.isnan(value):
             strokes = f", nor a stroke, {' or '.join(_STROKES)}" if has_designs else ""
             raise ValueError(f"{part!r} is no number with its unit{strokes}")
@@ -64,15 +64,17 @@ def _with_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str
             return replace(candidate, angles=(*candidate.angles, value * conversion_factor(unit, "angle")))
     except (ValueError, DatasetError) as error:
         raise UsageError(f"--candidate {text!r}: {error}.") from None
-    units = f", with units where it is no {route_words(fit)}" if route is not None and kind.along_route else ""
-    raise UsageError(f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example(fit, kind)}{units}.")
+    units = f", with units where it is no {route_variable(fit)}" if route is not None and kind.along_route else ""
+    raise UsageError(
+        f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example_name(fit, kind)}{units}."
+    )
 
 
 def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text: str) -> None:
     """Every number that the kind needs must be there."""
-    columns = situation_of(fit.model, fit.dataset.measurements).columns_without_curve
+    columns = build_situation(fit.model, fit.dataset.measurements).columns_without_curve
     if kind.along_route and fit.dataset.description.route is not None:
-        missing = "" if np.isfinite(candidate.route) else f"the {route_words(fit)}"
+        missing = "" if np.isfinite(candidate.route) else f"the {route_variable(fit)}"
     else:
         n = {"none": 0, "columns": len(columns), "total": 1}[kind.angles]
         wanted = "a wrap angle" if n == 1 else f"the wrap angles in the columns {', '.join(columns)}"
@@ -87,4 +89,4 @@ def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text
     if not missing and any(not angle >= 0 for angle in candidate.angles):
         missing = "wrap angles without a sign"
     if missing:
-        raise UsageError(f"--candidate {text!r} needs {missing}; write it as, for example, {example(fit, kind)}.")
+        raise UsageError(f"--candidate {text!r} needs {missing}; write it as, for example, {example_name(fit, kind)}.")

@@ -19,112 +19,113 @@ if TYPE_CHECKING:
     from bowdenfit.questions.next.answer import NextMeasurement
 
 HEADING = "What to measure next"
-PAGE = 5.6  # in
-MOST = 14  # candidates in the figure without a route
-ROW = 0.19  # in, of each of them
-LONGEST = 2.8  # in, of a label
+WIDTH = 5.6  # in
+MAX_ROWS = 14  # candidates in the figure without a route
+ROW_HEIGHT = 0.19  # in, of each of them
+LABEL_WIDTH = 2.8  # in, of a label
 
 
-def caption(found: NextMeasurement) -> str:
+def caption(ranking: NextMeasurement) -> str:
     """What is drawn, in plain words."""
-    best = f" Circle: {found.best.words}, most worth measuring." if found.best is not None else ""
-    gray = " Gray: outside the range of the curves." if _goes_along(found) and found.route_label else ""
+    best = f" Circle: {ranking.best.words}, most worth measuring." if ranking.best is not None else ""
+    gray = " Gray: outside the range of the curves." if _is_along_route(ranking) and ranking.route_label else ""
     return (
-        f"How well {found.answer.words} would be known after one more measurement, as one standard deviation, on average over "
+        f"How well {ranking.answer.words} would be known after one more measurement, as one standard deviation, on "
+        "average over "
         "what it may read; bars: two standard errors of that estimate. Dashed: as well as it is known now."
-        f"{best}{gray} n = {counted(len(found.ranked), 'measurement')} considered."
+        f"{best}{gray} n = {counted(len(ranking.ranked), 'measurement')} considered."
     )
 
 
 @in_paper_style
-def draw(found: NextMeasurement) -> Figure:
+def draw(ranking: NextMeasurement) -> Figure:
     """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
-    return _along_route(found) if _goes_along(found) else _in_rows(found)
+    return _draw_along_route(ranking) if _is_along_route(ranking) else _draw_rows(ranking)
 
 
-def _goes_along(found: NextMeasurement) -> bool:
+def _is_along_route(ranking: NextMeasurement) -> bool:
     """Whether all candidates have places along the route, and nothing else that tells them apart."""
-    along = [r for r in found.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
-    return len(along) == len(found.ranked) and len({r.candidate.route for r in along}) > 1
+    along = [r for r in ranking.ranked if math.isfinite(r.candidate.route) and math.isnan(r.candidate.load)]
+    return len(along) == len(ranking.ranked) and len({r.candidate.route for r in along}) > 1
 
 
-def _name(found: NextMeasurement) -> str:
+def _axis_label(ranking: NextMeasurement) -> str:
     """What the axis shows."""
-    return axis_label("Known to ±, one standard deviation", found.answer.unit)
+    return axis_label("Known to ±, one standard deviation", ranking.answer.unit)
 
 
-def _title(axes: Axes, found: NextMeasurement, start: float = 0.0) -> None:
+def _set_title(axes: Axes, ranking: NextMeasurement, start: float = 0.0) -> None:
     """What the figure is about, from a place left of the axes on."""
-    words = found.answer.words
+    words = ranking.answer.words
     first = words[0].upper() if len(words.split()) > 1 else words[0]
     axes.set_title(f"{first}{words[1:]}: how well it would be known", loc="left", x=start)
 
 
-def _limits(found: NextMeasurement) -> tuple[float, float]:
+def _limits(ranking: NextMeasurement) -> tuple[float, float]:
     """An axis that shows what the candidates change, and does not make it look like more than it is."""
-    now, least = found.answer.sd, min(r.sd for r in found.ranked)
+    now, least = ranking.answer.sd, min(r.sd for r in ranking.ranked)
     change = max(now - least, 0.05 * now)
     return max(0.0, least - 1.5 * change), now + 0.3 * change
 
 
-def _along_route(found: NextMeasurement) -> Figure:
-    along = found.ranked
-    figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), PAGE)
+def _draw_along_route(ranking: NextMeasurement) -> Figure:
+    along = ranking.ranked
+    figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), WIDTH)
     kinds = [kind for kind in candidate_kinds().values() if any(r.candidate.kind == kind.name for r in along)]
     for i, kind in enumerate(kinds):
         here = sorted((r for r in along if r.candidate.kind == kind.name), key=lambda r: r.candidate.route)
-        at, sd, error = (
+        route, sd, error = (
             np.array(v) for v in zip(*((r.candidate.route, r.sd, 2 * r.sd_error) for r in here), strict=True)
         )
         axes.errorbar(
-            at, sd, error, marker=SERIES_MARKERS[i], linestyle=SERIES_LINES[i % len(SERIES_LINES)],
+            route, sd, error, marker=SERIES_MARKERS[i], linestyle=SERIES_LINES[i % len(SERIES_LINES)],
             color=SERIES_COLORS[i], capsize=2, linewidth=1.1, elinewidth=0.7, label=f"{kind.heading} measured here next",
         )  # fmt: skip
     shade_outside(
-        axes, found.route_range, route_limits(found.route_range, np.array([r.candidate.route for r in along]))
+        axes, ranking.route_range, route_limits(ranking.route_range, np.array([r.candidate.route for r in along]))
     )
-    _now(axes, found, horizontal=True)
-    axes.set(xlabel=found.route_label, ylabel=_name(found))
-    axes.set_ylim(*_limits(found))
+    _draw_reference(axes, ranking, horizontal=True)
+    axes.set(xlabel=ranking.route_label, ylabel=_axis_label(ranking))
+    axes.set_ylim(*_limits(ranking))
     show_plain_numbers(axes, "y")
-    _title(axes, found)
+    _set_title(axes, ranking)
     legend_above(figure, [axes], columns=2)
     return figure
 
 
-def _now(axes: Axes, found: NextMeasurement, horizontal: bool) -> None:
+def _draw_reference(axes: Axes, ranking: NextMeasurement, horizontal: bool) -> None:
     """The standard deviation as things are, and the best candidate."""
     line = axes.axhline if horizontal else axes.axvline
-    line(found.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="As things are")
-    best = found.best
+    line(ranking.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="As things are")
+    best = ranking.best
     if best is not None:
-        place = (best.candidate.route, best.sd) if horizontal else (best.sd, 0)
+        point = (best.candidate.route, best.sd) if horizontal else (best.sd, 0)
         axes.plot(
-            *place, "o", markersize=10, markerfacecolor="none", color=BLACK, zorder=4, label="Most worth measuring"
+            *point, "o", markersize=10, markerfacecolor="none", color=BLACK, zorder=4, label="Most worth measuring"
         )
 
 
-def _in_rows(found: NextMeasurement) -> Figure:
+def _draw_rows(ranking: NextMeasurement) -> Figure:
     """A row for each of the best candidates."""
-    shown = found.ranked[:MOST]
-    names = [wrap_words(r.words, LONGEST, most=1) for r in shown]
+    best = ranking.ranked[:MAX_ROWS]
+    names = [wrap_words(r.words, LABEL_WIDTH, most=1) for r in best]
     room = max(LEFT, 0.15 + max(map(text_width, names)))
-    figure, (axes,) = panels([max(1.0, ROW * (len(shown) + 1))], 1, TITLE, (0, 0), PAGE)
+    figure, (axes,) = panels([max(1.0, ROW_HEIGHT * (len(best) + 1))], 1, TITLE, (0, 0), WIDTH)
     box = axes.get_position()
-    axes.set_position((room / PAGE, box.y0, box.x1 - room / PAGE, box.height))
-    rows = np.arange(len(shown))
+    axes.set_position((room / WIDTH, box.y0, box.x1 - room / WIDTH, box.height))
+    rows = np.arange(len(best))
     axes.errorbar(
-        [r.sd for r in shown], rows, xerr=[2 * r.sd_error for r in shown], fmt="o", color=SERIES_COLORS[0], capsize=2,
+        [r.sd for r in best], rows, xerr=[2 * r.sd_error for r in best], fmt="o", color=SERIES_COLORS[0], capsize=2,
         markersize=4, label="Expected after this measurement",
     )  # fmt: skip
-    _now(axes, found, horizontal=False)
+    _draw_reference(axes, ranking, horizontal=False)
     axes.set_yticks(rows, names)
-    axes.set_ylim(len(shown) - 0.4, -0.6)
-    axes.set_xlim(*_limits(found))
+    axes.set_ylim(len(best) - 0.4, -0.6)
+    axes.set_xlim(*_limits(ranking))
     show_plain_numbers(axes, "x")
     axes.locator_params(axis="x", nbins=4)
-    axes.set_xlabel(_name(found))
-    _title(axes, found, -0.9 * room / (PAGE * axes.get_position().width))
+    axes.set_xlabel(_axis_label(ranking))
+    _set_title(axes, ranking, -0.9 * room / (WIDTH * axes.get_position().width))
     axes.grid(visible=False, axis="y")
     legend_above(figure, [axes], columns=2)
     return figure

@@ -5,10 +5,10 @@ from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.words import HOW_TO_READ, ranking_sentences, ranking_table
 
 TITLE = "What to measure next"
-_TOP = 10
+_MAX_ROWS = 10
 
 
-def ranking_section(found: NextMeasurement) -> PageSection:
+def ranking_section(ranking: NextMeasurement) -> PageSection:
     """The advice, and the best candidates in a table."""
-    heads, rows = ranking_table(found, _TOP)
-    return prose_section(TITLE, ranking_sentences(found), [PageTable(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)])
+    heads, rows = ranking_table(ranking, _MAX_ROWS)
+    return prose_section(TITLE, ranking_sentences(ranking), [PageTable(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)])

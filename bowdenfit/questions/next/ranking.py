@@ -12,31 +12,31 @@ from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.questions.next.answer import (
+    EQUAL_WITHIN,
     LEAST_SHARE,
-    WITHIN,
+    LoadAndStroke,
     NextMeasurement,
-    Ranked,
+    PlannedMeasurement,
+    RankedCandidate,
     Repeats,
-    Step,
-    Within,
     is_noticeable,
 )
-from bowdenfit.questions.next.candidate_names import parsed_candidates
-from bowdenfit.questions.next.candidates import default_candidates, name_of, situation_of, words_of
-from bowdenfit.questions.next.simulated_readings import simulated_readings
-from bowdenfit.questions.next.target import Answer, answer_of
+from bowdenfit.questions.next.candidate_names import parse_candidates
+from bowdenfit.questions.next.candidates import build_situation, describe_candidate, format_candidate, list_candidates
+from bowdenfit.questions.next.simulated_readings import simulate_readings
+from bowdenfit.questions.next.target import TargetQuantity, choose_target
 from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 from bowdenfit.words import significant
 
 REPEATS = (1, 2, 4, 8, 16, 32)
-STEPS, MOST_IN_PLAN = 3, 24  # measurements in a plan, and candidates that it chooses from
+PLAN_LENGTH, MAX_PLAN_CANDIDATES = 3, 24  # measurements in a plan, and candidates that it chooses from
 _SEED = 7  # beside the fit's own
 
 
-def next_measurement(
+def rank_measurements(
     fit: Record,
-    wanted: str | None = None,
+    target_name: str | None = None,
     candidates: Sequence[str] = (),
     costs: Mapping[str, float] | None = None,
 ) -> NextMeasurement:
@@ -51,108 +51,117 @@ def next_measurement(
     Raises:
         UsageError: The fit has no posterior, or the answer, a candidate or a cost makes no sense.
     """
-    answer = answer_of(fit, wanted)
-    chosen = parsed_candidates(fit, candidates) if candidates else default_candidates(fit)
+    target = choose_target(fit, target_name)
+    chosen = parse_candidates(fit, candidates) if candidates else list_candidates(fit)
     _check_costs(chosen, costs)
-    readings = _readings(fit, chosen, STEPS)
-    found = [explained_share(reading[:, 0], answer.draws) for reading in readings]
-    ranked = _ranked(fit, answer, chosen, found, costs)
+    readings = _simulate(fit, chosen, PLAN_LENGTH)
+    explained = [explained_share(reading[:, 0], target.draws) for reading in readings]
+    ranked = _rank(fit, target, chosen, explained, costs)
     route = fit.dataset.description.route
-    shown = (route.label, route.range) if route else ("", (0.0, 0.0))
-    loads, stop = _loads(fit), _stop(fit, answer)
+    route_axis = (route.label, route.range) if route else ("", (0.0, 0.0))
+    loads, stop = _load_range(fit), _stopping_advice(fit, target)
     if not ranked[0].is_noticeable:
-        return NextMeasurement(answer, ranked, None, (), *shown, fit.converged, loads, stop)
-    repeats = _repeats(fit, answer, ranked[0].candidate)
-    plan = _plan(answer, ranked, dict(zip(chosen, readings, strict=True)))
-    within = _within(fit, answer, ranked[0].candidate)
-    return NextMeasurement(answer, ranked, repeats, plan, *shown, fit.converged, loads, stop, within)
+        return NextMeasurement(target, ranked, None, (), *route_axis, fit.converged, loads, stop)
+    repeats = _repeat_measurement(fit, target, ranked[0].candidate)
+    plan = _plan_measurements(target, ranked, dict(zip(chosen, readings, strict=True)))
+    within = _vary_load_and_stroke(fit, target, ranked[0].candidate)
+    return NextMeasurement(target, ranked, repeats, plan, *route_axis, fit.converged, loads, stop, within)
 
 
-def _loads(fit: Record) -> tuple[float, float] | None:
+def _load_range(fit: Record) -> tuple[float, float] | None:
     """Lowest and highest input force of the runs made so far, of which a next one would be like."""
     run = typical_run(fit.dataset.measurements)
     return (float(run.input_force.min()), float(run.input_force.max())) if run is not None else None
 
 
-def _stop(fit: Record, answer: Answer) -> str:
+def _stopping_advice(fit: Record, target: TargetQuantity) -> str:
     """Whether more needs to be measured at all."""
-    if answer.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
+    if target.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
         best = fit.optimal_length()
-        return f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}" if best.is_certain else best.not_good_enough
-    unit = f" {answer.unit}" if answer.unit else ""
-    return f"You may stop if it is enough to know {answer.words} to ± {significant(answer.sd, 2)}{unit}."
+        return (
+            f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}"
+            if best.is_certain
+            else best.not_good_enough
+        )
+    unit = f" {target.unit}" if target.unit else ""
+    return f"You may stop if it is enough to know {target.words} to ± {significant(target.sd, 2)}{unit}."
 
 
-def _readings(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:
+def _simulate(fit: Record, chosen: Sequence[Candidate], repeats: int) -> list[np.ndarray]:
     measured, z = fit.dataset.measurements, fit.draws().flat_z
     with jax.enable_x64(True):
         seed = fit.provenance.seed + _SEED
-        return simulated_readings(fit.model, measured, chosen, z, seed, repeats)
+        return simulate_readings(fit.model, measured, chosen, z, seed, repeats)
 
 
-def _ranked(
+def _rank(
     fit: Record,
-    answer: Answer,
+    target: TargetQuantity,
     chosen: Sequence[Candidate],
-    found: Sequence[Explained],
+    explained: Sequence[Explained],
     costs: Mapping[str, float] | None,
-) -> tuple[Ranked, ...]:
+) -> tuple[RankedCandidate, ...]:
     """Candidates by what they are worth, best first."""
     price = [costs[c.kind] if costs else 1.0 for c in chosen]
-    worth = [e.share / p for e, p in zip(found, price, strict=True)]
+    worth = [e.share / p for e, p in zip(explained, price, strict=True)]
     # What does next to nothing comes last, however little it costs.
-    order = sorted(range(len(chosen)), key=lambda i: (not is_noticeable(found[i].share, found[i].error), -worth[i]))
+    order = sorted(
+        range(len(chosen)), key=lambda i: (not is_noticeable(explained[i].share, explained[i].error), -worth[i])
+    )
     first = order[0]
     ranked = []
     for i in order:
-        after = answer.sd_after(found[i].share)
-        scaled = [Explained(found[k].share / price[k], 0.0, found[k].without / price[k]) for k in (first, i)]
+        sd_after = target.sd_after(explained[i].share)
+        scaled = [Explained(explained[k].share / price[k], 0.0, explained[k].without / price[k]) for k in (first, i)]
         difference = scaled[0].share - scaled[1].share
         ranked.append(
-            Ranked(
-                chosen[i], name_of(chosen[i]), words_of(fit, chosen[i]), found[i].share, found[i].error, after,
-                found[i].error * answer.sd**2 / (2 * after) if after > 0 else 0.0,
-                bool(difference <= WITHIN * error_of_difference(*scaled)), price[i] if costs else None,
+            RankedCandidate(
+                chosen[i], format_candidate(chosen[i]), describe_candidate(fit, chosen[i]),
+                explained[i].share, explained[i].error, sd_after,
+                explained[i].error * target.sd**2 / (2 * sd_after) if sd_after > 0 else 0.0,
+                bool(difference <= EQUAL_WITHIN * error_of_difference(*scaled)), price[i] if costs else None,
             )
         )  # fmt: skip
     return Several(ranked)
 
 
-def _within(fit: Record, answer: Answer, best: Candidate) -> Within | None:
+def _vary_load_and_stroke(fit: Record, target: TargetQuantity, best: Candidate) -> LoadAndStroke | None:
     """The best candidate with its readings at other loads or of one stroke; None where it names these, or has none."""
-    kind, at = candidate_kinds()[best.kind], situation_of(fit.model, fit.dataset.measurements)
-    if np.isfinite(best.load) or best.stroke or not (designs := kind.designs(at)):
+    kind, situation = candidate_kinds()[best.kind], build_situation(fit.model, fit.dataset.measurements)
+    if np.isfinite(best.load) or best.stroke or not (designs := kind.designs(situation)):
         return None
     chosen = [best, *(replace(best, load=load, stroke=stroke) for load, stroke in designs)]
-    found = [explained_share(reading[:, 0], answer.draws) for reading in _readings(fit, chosen, 1)]
-    return Within(kind.describe_usual(at), _ranked(fit, answer, chosen, found, None))
+    explained = [explained_share(reading[:, 0], target.draws) for reading in _simulate(fit, chosen, 1)]
+    return LoadAndStroke(kind.describe_usual(situation), _rank(fit, target, chosen, explained, None))
 
 
-def _repeats(fit: Record, answer: Answer, candidate: Candidate) -> Repeats:
+def _repeat_measurement(fit: Record, target: TargetQuantity, candidate: Candidate) -> Repeats:
     """The candidate measured several times."""
-    (readings,) = _readings(fit, [candidate], max(REPEATS))
-    shares = [explained_share(mean_and_spread(readings[:, :n]), answer.draws).share for n in REPEATS]
-    return Repeats(REPEATS, tuple(answer.sd_after(share) for share in np.maximum.accumulate(shares)))
+    (readings,) = _simulate(fit, [candidate], max(REPEATS))
+    shares = [explained_share(mean_and_spread(readings[:, :n]), target.draws).share for n in REPEATS]
+    return Repeats(REPEATS, tuple(target.sd_after(share) for share in np.maximum.accumulate(shares)))
 
 
-def _plan(answer: Answer, ranked: Sequence[Ranked], readings: Mapping[Candidate, np.ndarray]) -> tuple[Step, ...]:
+def _plan_measurements(
+    target: TargetQuantity, ranked: Sequence[RankedCandidate], readings: Mapping[Candidate, np.ndarray]
+) -> tuple[PlannedMeasurement, ...]:
     """The best candidate, then the one that does most beside it, and so on; one may come again, mounted anew."""
-    able = [r for r in ranked if r.is_noticeable][:MOST_IN_PLAN] or list(ranked[:1])
-    made: list[Ranked] = [ranked[0]]
-    steps = [Step(ranked[0].words, ranked[0].name, ranked[0].sd)]
-    while len(steps) < STEPS:
-        known = [readings[r.candidate][:, made[:i].count(r)] for i, r in enumerate(made)]
+    noticeable = [r for r in ranked if r.is_noticeable][:MAX_PLAN_CANDIDATES] or list(ranked[:1])
+    chosen: list[RankedCandidate] = [ranked[0]]
+    steps = [PlannedMeasurement(ranked[0].words, ranked[0].name, ranked[0].sd)]
+    while len(steps) < PLAN_LENGTH:
+        known = [readings[r.candidate][:, chosen[:i].count(r)] for i, r in enumerate(chosen)]
         shares = [
-            explained_share(np.column_stack([*known, readings[r.candidate][:, made.count(r)]]), answer.draws).share
-            for r in able
+            explained_share(np.column_stack([*known, readings[r.candidate][:, chosen.count(r)]]), target.draws).share
+            for r in noticeable
         ]
-        before = 1 - (steps[-1].sd / answer.sd) ** 2
-        gains = [(share - before) / (r.cost or 1.0) for share, r in zip(shares, able, strict=True)]
+        before = 1 - (steps[-1].sd / target.sd) ** 2
+        gains = [(share - before) / (r.cost or 1.0) for share, r in zip(shares, noticeable, strict=True)]
         best = int(np.argmax(gains))
         if shares[best] - before < LEAST_SHARE:
             break
-        made.append(able[best])
-        steps.append(Step(able[best].words, able[best].name, answer.sd_after(shares[best])))
+        chosen.append(noticeable[best])
+        steps.append(PlannedMeasurement(noticeable[best].words, noticeable[best].name, target.sd_after(shares[best])))
     return tuple(steps)
 
 

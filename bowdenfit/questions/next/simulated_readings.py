@@ -13,10 +13,10 @@ from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
-from bowdenfit.questions.next.candidates import situation_of
+from bowdenfit.questions.next.candidates import build_situation
 
 
-def simulated_readings(
+def simulate_readings(
     model: Model,
     measurements: Measurements,
     candidates: Sequence[Candidate],
@@ -34,11 +34,11 @@ def simulated_readings(
         seed: Seed of the noise.
         repeats: How often each reading is taken, each time with a new mounting where it has one.
     """
-    wanted: dict[str, list[Candidate]] = {}
+    by_kind: dict[str, list[Candidate]] = {}
     for candidate in candidates:
-        wanted.setdefault(candidate.kind, []).append(candidate)
-    at, kinds = situation_of(model, measurements), candidate_kinds()
-    parts = {name: kinds[name].simulation(at, of_kind) for name, of_kind in wanted.items()}
+        by_kind.setdefault(candidate.kind, []).append(candidate)
+    situation, kinds = build_situation(model, measurements), candidate_kinds()
+    parts = {name: kinds[name].simulation(situation, of_kind) for name, of_kind in by_kind.items()}
     data, key = {name: part.data for name, part in parts.items()}, jax.random.key(seed)
 
     def readings(z_and_number: Array, data: Any, key: Array) -> dict[str, Array]:
@@ -50,6 +50,6 @@ def simulated_readings(
         }
 
     program = for_each_draw(readings, model.space.size + 1, data, key, run_once=True)
-    drawn = program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+    simulated = program(np.column_stack([z, np.arange(len(z), dtype=float)]))
     columns = {name: iter(part.columns) for name, part in parts.items()}
-    return [np.maximum(drawn[c.kind][:, :, list(next(columns[c.kind]))], parts[c.kind].lowest) for c in candidates]
+    return [np.maximum(simulated[c.kind][:, :, list(next(columns[c.kind]))], parts[c.kind].lowest) for c in candidates]

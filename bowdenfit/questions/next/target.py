@@ -10,7 +10,7 @@ from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 
 @dataclass(frozen=True)
-class Answer:
+class TargetQuantity:
     """What is to be known better.
 
     Args:
@@ -37,7 +37,7 @@ class Answer:
         return self.sd * float(np.sqrt(max(1.0 - share, 0.0)))
 
 
-def answer_of(fit: Record, wanted: str | None) -> Answer:
+def choose_target(fit: Record, name: str | None) -> TargetQuantity:
     """The answer that is to be known better.
 
     Args:
@@ -48,28 +48,28 @@ def answer_of(fit: Record, wanted: str | None) -> Answer:
     Raises:
         UsageError: There is no such answer, or no posterior.
     """
-    drawn, route = fit.draws(), fit.dataset.description.route
-    if wanted is None:
+    draws, route = fit.draws(), fit.dataset.description.route
+    if name is None:
         coefficients = [p.name for p in fit.model.space.free if p.role == "friction"]
-        wanted = "optimal-length" if route else coefficients[0] if len(coefficients) == 1 else "efficiency"
-    what, _, where = wanted.partition("@")
-    if wanted in drawn.values:
-        return _parameter(fit, wanted)
+        name = "optimal-length" if route else coefficients[0] if len(coefficients) == 1 else "efficiency"
+    what, _, where = name.partition("@")
+    if name in draws.values:
+        return _parameter_target(fit, name)
     if what == "efficiency":
-        return _efficiency(fit, wanted, where)
-    if wanted in ("optimal-length", "optimal-efficiency"):
+        return _efficiency_target(fit, name, where)
+    if name in ("optimal-length", "optimal-efficiency"):
         best = fit.optimal_length()  # refuses cables without a route
         variable = best.variable.replace("_", " ")
-        if wanted == "optimal-length":
-            return Answer(wanted, f"the best {variable}", best.unit, drawn.optimum[OPTIMAL_LENGTH].ravel())
-        return Answer(
-            wanted, f"the efficiency at the best {variable}", "points", 100 * drawn.optimum[OPTIMAL_EFFICIENCY].ravel()
+        if name == "optimal-length":
+            return TargetQuantity(name, f"the best {variable}", best.unit, draws.optimum[OPTIMAL_LENGTH].ravel())
+        return TargetQuantity(
+            name, f"the efficiency at the best {variable}", "points", 100 * draws.optimum[OPTIMAL_EFFICIENCY].ravel()
         )
     known = ["optimal-length", "optimal-efficiency", "efficiency@..."] if route else ["efficiency"]
-    raise UsageError(f"--for {wanted!r} is no answer of this fit{suggest_name(wanted, [*known, *drawn.values])}")
+    raise UsageError(f"--for {name!r} is no answer of this fit{suggest_name(name, [*known, *draws.values])}")
 
 
-def _parameter(fit: Record, name: str) -> Answer:
+def _parameter_target(fit: Record, name: str) -> TargetQuantity:
     """A parameter, or a coefficient of a curve."""
     units = {p.name: p.unit for p in fit.model.space.free}
     draws = fit.draws().values[name].ravel()
@@ -79,30 +79,30 @@ def _parameter(fit: Record, name: str) -> Answer:
             "parameter of the same curve."
         )
     unit = units.get(name, "1")
-    return Answer(name, name, "" if unit == "1" else unit, draws)
+    return TargetQuantity(name, name, "" if unit == "1" else unit, draws)
 
 
-def _efficiency(fit: Record, wanted: str, where: str) -> Answer:
+def _efficiency_target(fit: Record, name: str, where: str) -> TargetQuantity:
     """Efficiency at a length, or without a route at the nominal wrap angles, in points of percent."""
     route = fit.dataset.description.route
     if route is None:
         if where:
             raise UsageError(
-                f"--for {wanted!r}: this cable has no route, and its efficiency is that at its nominal wrap angles; write "
+                f"--for {name!r}: this cable has no route, and its efficiency is that at its nominal wrap angles; write "
                 "--for efficiency."
             )
-        return Answer(
-            wanted, "the efficiency at the nominal wrap angles", "points", 100 * fit.efficiency_draws(0.0)[:, 0]
+        return TargetQuantity(
+            name, "the efficiency at the nominal wrap angles", "points", 100 * fit.efficiency_draws(0.0)[:, 0]
         )
     try:
         at = float(where.removesuffix(route.unit))
     except ValueError:
         raise UsageError(
-            f"--for {wanted!r} does not say where; write it as efficiency@{route.middle:g}, in {route.unit}."
+            f"--for {name!r} does not say where; write it as efficiency@{route.middle:g}, in {route.unit}."
         ) from None
     if not route.range[0] <= at <= route.range[1]:
         low, high = route.range
         raise UsageError(
-            f"--for {wanted!r}: {at:g} {route.unit} lies outside the range {low:g} to {high:g} {route.unit}."
+            f"--for {name!r}: {at:g} {route.unit} lies outside the range {low:g} to {high:g} {route.unit}."
         )
-    return Answer(wanted, f"the efficiency at {at:g} {route.unit}", "points", 100 * fit.efficiency_draws(at)[:, 0])
+    return TargetQuantity(name, f"the efficiency at {at:g} {route.unit}", "points", 100 * fit.efficiency_draws(at)[:, 0])

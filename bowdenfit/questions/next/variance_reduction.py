@@ -15,9 +15,9 @@ from jaxtyping import Float
 
 GROUPS = 64  # of draws: what is learned on all but one is judged on that one
 _DEGREES = {1: 5, 2: 4, 3: 3}  # of the polynomials, by the number of columns of a reading
-_DEGREE_OF_MANY = 2
-_FEWEST = 3  # readings whose scatter says something
-_ALIKE = 1e-9  # relative spread below which readings are all the same
+_DEFAULT_DEGREE = 2
+_MIN_REPEATS = 3  # readings whose scatter says something
+_NEGLIGIBLE_SPREAD = 1e-9  # relative spread below which readings are all the same
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def explained_share(
         groups: Number of groups.
     """
     polynomials = _polynomials(reading)
-    left, total = _squares_left(polynomials, answer, groups)
+    left, total = _residual_squares(polynomials, answer, groups)
     all_left, all_of_it = float(np.sum(left)), float(np.sum(total))
     without = 1 - (all_left - left) / (all_of_it - total) if all_of_it > 0 else np.zeros(len(left))
     share = 1 - all_left / all_of_it if all_of_it > 0 else 0.0
@@ -69,7 +69,7 @@ def _jackknife_error(without: np.ndarray) -> float:
     return float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
 
 
-def _squares_left(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
+def _residual_squares(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
     """Of each group: squared deviations from the regression, and from the mean, that the other groups give."""
     scale = answer.std()
     y = (answer - answer.mean()) / (scale if scale > 0 else 1.0)
@@ -77,23 +77,27 @@ def _squares_left(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[np.nd
     products = np.array([a.T @ a for a, _ in parts])
     with_answer = np.array([a.T @ b for a, b in parts])
     squares = np.array([b @ b for _, b in parts])
-    return _judged(products, with_answer, squares), _judged(products[:, :1, :1], with_answer[:, :1], squares)
+    return _cross_validated_squares(products, with_answer, squares), _cross_validated_squares(
+        products[:, :1, :1], with_answer[:, :1], squares
+    )
 
 
-def _judged(products: np.ndarray, with_answer: np.ndarray, squares: np.ndarray) -> np.ndarray:
+def _cross_validated_squares(products: np.ndarray, with_answer: np.ndarray, squares: np.ndarray) -> np.ndarray:
     """Squared deviations of each group from what least squares of the others predicts."""
-    left = np.empty(len(squares))
+    squares_left = np.empty(len(squares))
     for g in range(len(squares)):
-        others = products.sum(axis=0) - products[g], with_answer.sum(axis=0) - with_answer[g]
-        coefficients = np.linalg.lstsq(*others, rcond=1e-12)[0]
-        left[g] = squares[g] - 2 * coefficients @ with_answer[g] + coefficients @ products[g] @ coefficients
-    return left
+        remaining = products.sum(axis=0) - products[g], with_answer.sum(axis=0) - with_answer[g]
+        coefficients = np.linalg.lstsq(*remaining, rcond=1e-12)[0]
+        squares_left[g] = squares[g] - 2 * coefficients @ with_answer[g] + coefficients @ products[g] @ coefficients
+    return squares_left
 
 
 def _polynomials(reading: np.ndarray) -> np.ndarray:
     """Products of powers of the columns, the constant first; columns that say nothing are left out."""
-    columns = [_normal_scores(column) for column in reading.T if np.ptp(column) > _ALIKE * np.abs(column).max()]
-    degree = _DEGREES.get(len(columns), _DEGREE_OF_MANY)
+    columns = [
+        _normal_scores(column) for column in reading.T if np.ptp(column) > _NEGLIGIBLE_SPREAD * np.abs(column).max()
+    ]
+    degree = _DEGREES.get(len(columns), _DEFAULT_DEGREE)
     terms = [np.ones(len(reading))]
     for power in range(1, degree + 1):
         for factors in combinations_with_replacement(columns, power):
@@ -116,6 +120,6 @@ def mean_and_spread(readings: Float[np.ndarray, "draws repeats columns"]) -> Flo
         readings: Readings of each draw.
     """
     mean = readings.mean(axis=1)
-    if readings.shape[1] < _FEWEST:
+    if readings.shape[1] < _MIN_REPEATS:
         return mean
     return np.column_stack([mean, np.log(readings.std(axis=1) + 1e-12)])

@@ -19,7 +19,7 @@ NAME = "next_measurement"
 
 @read_first
 def next_measurement(
-    found: Annotated["Record | str | Path", RESULTS, PATH],
+    fit: Annotated["Record | str | Path", RESULTS, PATH],
     answer: Annotated[
         str | None,
         Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient"),
@@ -53,23 +53,23 @@ def next_measurement(
         StoreError: The results folder is missing or damaged, or `output` cannot be written.
     """
     from bowdenfit.questions.next import next_figure
-    from bowdenfit.questions.next.ranking import next_measurement as ranked
+    from bowdenfit.questions.next.ranking import rank_measurements as ranked
     from bowdenfit.questions.next.words import next_measurement_text
     from bowdenfit.results.store import load
 
-    fit = load(Path(found)) if isinstance(found, str | Path) else found
-    ranking = ranked(fit, answer, candidates, costs)
+    record = load(Path(fit)) if isinstance(fit, str | Path) else fit
+    ranking = ranked(record, answer, candidates, costs)
     if output is not None:
         text = next_measurement_text(ranking, top)
-        write_answer(output, NAME, ranking, text, {NAME: next_figure}, fit.name)
+        write_answer(output, NAME, ranking, text, {NAME: next_figure}, record.name)
     return ranking
 
 
-def _reply(found: "NextMeasurement", asked: dict[str, Any]) -> Reply:
+def _reply(ranking: "NextMeasurement", options: dict[str, Any]) -> Reply:
     from bowdenfit.questions.next.words import next_measurement_text
 
-    notes = tuple(f"Wrote {path}." for path in answer_files(asked["output"], NAME)) if asked["output"] else ()
-    return Reply(next_measurement_text(found, asked["top"]), lambda: found, notes, csv=found.to_csv)
+    notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
+    return Reply(next_measurement_text(ranking, options["top"]), lambda: ranking, notes, csv=ranking.to_csv)
 
 
 VERB = Verb(

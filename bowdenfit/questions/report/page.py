@@ -21,7 +21,7 @@ from bowdenfit.questions.length.efficiency_chart import efficiency_chart
 from bowdenfit.questions.loss.answer import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.next_section import ranking_section
-from bowdenfit.questions.next.ranking import next_measurement
+from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.recorded.recordings_chart import recordings_charts
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.sections import (
@@ -101,7 +101,7 @@ def write_report(fit: Record | str | Path, output: str | Path | None, rank_next:
         output, fit, figures = output or folder / REPORT, load(folder), read_figure_data(folder)
     if output is None:
         raise UsageError("a fit by itself has no folder; name a file for the report.")
-    ranking = next_measurement(fit) if rank_next else None
+    ranking = rank_measurements(fit) if rank_next else None
     figures, path, mark = figures or dict(collect_figure_data(fit)), Path(output), warning_mark(assess_fit(fit).troubles)
     path = path / REPORT if path.is_dir() else path
     with file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:

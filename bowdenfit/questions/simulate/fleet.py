@@ -23,13 +23,13 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.terms import drawn_readings, with_drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import empty_tables, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables
 from bowdenfit.questions.simulate.tables import (
     TRUTH_FILE,
     BenchPlan,
     description_lines,
-    plan_page,
     read_bench,
+    read_plan_file,
     table_texts,
 )
 from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
@@ -114,7 +114,7 @@ def read_fleet_plan(path: Path) -> FleetPlan:
     Raises:
         DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
     """
-    _, raw = plan_page(path)
+    _, raw = read_plan_file(path)
     if "fleet" not in raw:
         raise DescriptionError(f"{path.name} has no [fleet]: say how many cables, such as cables = 40, cycles = [0, 50000].")
     try:
@@ -136,15 +136,15 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
     tables = empty_tables(bench.description, bench.design)
     model = build_model(Dataset(bench.description, tables, {}))
     scale = {p.name: p.shown_scale for p in model.space.parameters}
-    common = true_values(bench.description, tables, bench.truth, jax.random.key(seed))
+    common = draw_true_values(bench.description, tables, bench.truth, jax.random.key(seed))
     worn = list(model.cable.coefficients)
 
-    def readings(values: dict[str, jax.Array], words: jax.Array) -> Any:
-        return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(words), 1.0 if noise else 0.0)
+    def readings(values: dict[str, jax.Array], key_words: jax.Array) -> Any:
+        return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(key_words), 1.0 if noise else 0.0)
 
-    of_values = {name: jax.ShapeDtypeStruct((), jnp.float64) for name in common}
-    program = compile_program(readings, of_values, jax.ShapeDtypeStruct((2,), jnp.uint32), run_once=True)
-    found, truth, digits = list[SimulatedInspection](), dict[str, Any](), len(str(fleet.cables))
+    value_shapes = {name: jax.ShapeDtypeStruct((), jnp.float64) for name in common}
+    program = compile_program(readings, value_shapes, jax.ShapeDtypeStruct((2,), jnp.uint32), run_once=True)
+    inspections, truth, digits = list[SimulatedInspection](), dict[str, Any](), len(str(fleet.cables))
     for number in range(1, fleet.cables + 1):
         generator, name = np.random.default_rng([seed, number]), f"cable-{number:0{digits}d}"
         start = {k: np.log(common[k]) + fleet.spread * generator.standard_normal() for k in worn}
@@ -153,17 +153,17 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
         for cycles in fleet.cycles:
             temperature = round(float(generator.uniform(*fleet.temperature)), 1)
             lubricated = bool(generator.uniform() < fleet.lubricated)
-            more = wear * cycles / fleet.reference_cycles + fleet.lubrication * lubricated
-            more += fleet.per_degree * (temperature - fleet.reference_temperature)
-            values = common | {k: float(np.exp(start[k] + more)) for k in worn}
+            change = wear * cycles / fleet.reference_cycles + fleet.lubrication * lubricated
+            change += fleet.per_degree * (temperature - fleet.reference_temperature)
+            values = common | {k: float(np.exp(start[k] + change)) for k in worn}
             drawn = program(values, generator.integers(2**32, size=2, dtype=np.uint32))
             dataset = Dataset(bench.description, with_drawn_readings(bench.description, tables, drawn), {})
-            shown = {k: value * scale[k] for k, value in values.items()}
-            found.append(SimulatedInspection(name, cycles, temperature, lubricated, shown, dataset))
-    return found, {"seed": seed, "population": fleet.model_dump() | {"truth": dict(bench.truth)}, "cables": truth}
+            displayed = {k: value * scale[k] for k, value in values.items()}
+            inspections.append(SimulatedInspection(name, cycles, temperature, lubricated, displayed, dataset))
+    return inspections, {"seed": seed, "population": fleet.model_dump() | {"truth": dict(bench.truth)}, "cables": truth}
 
 
-def write_fleet(plan: FleetPlan, made: list[SimulatedInspection], truth: dict[str, Any], folder: Path) -> None:
+def write_fleet(plan: FleetPlan, inspections: list[SimulatedInspection], truth: dict[str, Any], folder: Path) -> None:
     """Write the description, fleet.csv, a table for each inspection, and truth.json.
 
     Raises:
@@ -171,15 +171,15 @@ def write_fleet(plan: FleetPlan, made: list[SimulatedInspection], truth: dict[st
     """
     text = "\n".join(description_lines(plan.bench.text, "bowdenfit simulate --fleet", "design", "fleet")) + "\n"
     rows, files = [",".join(COLUMNS)], dict[str, str]()
-    for each in made:
-        texts = list(table_texts(each.dataset.description, each.dataset.measurements).values())
+    for inspection in inspections:
+        texts = list(table_texts(inspection.dataset.description, inspection.dataset.measurements).values())
         if len(texts) != 1:
             raise DescriptionError("a simulated fleet has one table an inspection; leave one under [tables] of the plan.")
-        files[each.file] = texts[0]
-        lubricated = "yes" if each.lubricated else "no"
-        rows.append(f"{each.cable},{each.cycles:.0f},{each.temperature:g},{lubricated},{each.file}")
+        files[inspection.file] = texts[0]
+        lubricated = "yes" if inspection.lubricated else "no"
+        rows.append(f"{inspection.cable},{inspection.cycles:.0f},{inspection.temperature:g},{lubricated},{inspection.file}")
     files |= {FLEET_DESCRIPTION: text, FLEET_TABLE: "\n".join(rows) + "\n", TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
-    with fill_folder_atomically(folder) as place:
-        (place / READINGS).mkdir()
+    with fill_folder_atomically(folder) as new_folder:
+        (new_folder / READINGS).mkdir()
         for name, content in files.items():
-            write_text(place / name, content)
+            write_text(new_folder / name, content)

@@ -1,6 +1,6 @@
 """A bench on the computer: tables of a cable whose coefficients are known, for testing, planning and calibration.
 
-`simulate` measures a design; `simulated_again` measures once more what a data set holds, at coefficients that are known.
+`simulate` measures a design; `resimulate` measures once more what a data set holds, at coefficients that are known.
 Both draw readings as the likelihood takes them to scatter, so that a posterior can be asked to hold the truth.
 """
 
@@ -37,8 +37,8 @@ def empty_tables(description: Description, design: Design) -> Measurements:
     )
 
 
-def true_values(
-    description: Description, tables: Measurements, truth: Mapping[str, float], key: jax.Array, once: bool = False
+def draw_true_values(
+    description: Description, tables: Measurements, truth: Mapping[str, float], key: jax.Array, run_once: bool = False
 ) -> dict[str, float]:
     """True value of every parameter [internal units]: as given in shown units, else drawn from its prior.
 
@@ -61,9 +61,9 @@ def true_values(
     def draw(key: jax.Array) -> jax.Array:
         return space.vector(jax.random.normal(key, (space.size,)))
 
-    is_asked = any(p.name not in truth for p in space.free)
-    drawn = np.asarray(_worked_out(draw, key, once=once)) if is_asked else np.zeros(space.size)
-    values = {p.name: float(v) for p, v in zip(space.free, drawn, strict=True)}
+    needs_draw = any(p.name not in truth for p in space.free)
+    prior_draw = np.asarray(_evaluate(draw, key, run_once=run_once)) if needs_draw else np.zeros(space.size)
+    values = {p.name: float(v) for p, v in zip(space.free, prior_draw, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
 
@@ -74,7 +74,7 @@ def simulate(
     values: Mapping[str, float],
     key: jax.Array,
     noise: bool = True,
-    once: bool = False,
+    run_once: bool = False,
 ) -> Dataset:
     """Tables as a bench would give them.
 
@@ -88,17 +88,17 @@ def simulate(
             some hundred small ones, which would serve again.
     """
     dataset = Dataset(description, empty_tables(description, design), {})
-    return simulated_again(dataset, values, key, noise=noise, beyond_curves=True, once=once)
+    return resimulate(dataset, values, key, noise=noise, beyond_curves=True, run_once=run_once)
 
 
-def simulated_again(
+def resimulate(
     dataset: Dataset,
     values: Mapping[str, float],
     key: jax.Array,
     *,
     noise: bool = True,
     beyond_curves: bool = False,
-    once: bool = False,
+    run_once: bool = False,
 ) -> Dataset:
     """The same tables, with readings drawn anew at known coefficients.
 
@@ -121,12 +121,12 @@ def simulated_again(
     cable, scale = build_model(dataset).cable, 1.0 if noise else 0.0
     angles, beyond = dataset.measurements.table(AngleTable), {}
     if beyond_curves and angles is not None:
-        own = angles
+        table = angles
 
         def draw(named: Mapping[str, jax.Array], key: jax.Array) -> dict[str, jax.Array]:
-            return drawn_angles(own, Truth(cable, own, named, key, scale), everywhere=True)
+            return drawn_angles(table, Truth(cable, table, named, key, scale), everywhere=True)
 
-        beyond = {"angles": _worked_out(draw, named, key, once=once)}
+        beyond = {"angles": _evaluate(draw, named, key, run_once=run_once)}
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
         measured = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
         dataset = replace(dataset, measurements=measured)
@@ -135,15 +135,15 @@ def simulated_again(
     def readings(named: Mapping[str, jax.Array], key: jax.Array) -> Readings:
         return drawn_readings(cable, tables, named, key, scale)
 
-    return with_readings(dataset, _worked_out(readings, named, key, once=once) | beyond)
+    return replace_readings(dataset, _evaluate(readings, named, key, run_once=run_once) | beyond)
 
 
-def _worked_out(function: Callable[..., Any], *arguments: Any, once: bool) -> Any:
+def _evaluate(function: Callable[..., Any], *arguments: Any, run_once: bool) -> Any:
     """What a function of arrays gives, as one program where it is asked for once."""
-    return (compile_program(function, *arguments, run_once=True) if once else function)(*arguments)
+    return (compile_program(function, *arguments, run_once=True) if run_once else function)(*arguments)
 
 
-def with_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:
+def replace_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:
     """The data set with what `drawn_readings` gave; checksums do not hold for it.
 
     Raises:

@@ -17,7 +17,7 @@ from bowdenfit.kinds import each_table
 from bowdenfit.kinds.descriptions import parse_description, read_design
 from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 from bowdenfit.results.folder import fill_folder_atomically, write_text
 from bowdenfit.words import shown
 
@@ -35,7 +35,7 @@ class BenchPlan:
     truth: Mapping[str, float]
 
 
-def plan_page(path: Path) -> tuple[str, dict[str, Any]]:
+def read_plan_file(path: Path) -> tuple[str, dict[str, Any]]:
     """A plan as text and as plain data.
 
     Raises:
@@ -44,7 +44,7 @@ def plan_page(path: Path) -> tuple[str, dict[str, Any]]:
     return read_toml_file(path, "name a bench.toml")
 
 
-def truth_of(raw: Mapping[str, Any], file: str) -> Mapping[str, float]:
+def parse_truth(raw: Mapping[str, Any], file: str) -> Mapping[str, float]:
     """[truth] of a plan, all of it numbers."""
     truth: Mapping[str, float] = raw.get("truth", {})
     for name, value in truth.items():
@@ -59,19 +59,19 @@ def read_bench(path: Path) -> BenchPlan:
     Raises:
         DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
     """
-    text, raw = plan_page(path)
+    text, raw = read_plan_file(path)
     if "design" not in raw:
         raise DescriptionError(
             f"{path.name} has no [design]: say where to measure, such as angles = [430, 440, 450], runs = [440, 470], "
             "input_forces = [20, 40, 60] (in N)."
         )
-    truth = truth_of(raw, path.name)
+    truth = parse_truth(raw, path.name)
     cable = {name: value for name, value in raw.items() if name not in {"design", "fleet", "truth"}}
     description = parse_description(cable, path.name)
     return BenchPlan(text, description, read_design(raw["design"], description, path.name), truth)
 
 
-def make(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
+def simulate_tables(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[str, float]]:
     """The data set and the true value of every parameter [shown units].
 
     Args:
@@ -81,15 +81,15 @@ def make(bench: BenchPlan, key: jax.Array, noise: bool) -> tuple[Dataset, dict[s
     """
     from bowdenfit.model import build_model
 
-    of_truth, of_readings = jax.random.split(key)
+    truth_key, readings_key = jax.random.split(key)
     tables = empty_tables(bench.description, bench.design)
-    values = true_values(bench.description, tables, bench.truth, of_truth, once=True)
+    values = draw_true_values(bench.description, tables, bench.truth, truth_key, run_once=True)
     space = build_model(Dataset(bench.description, tables, {})).space
-    shown = {p.name: values[p.name] * p.shown_scale for p in space.parameters}
-    return simulate(bench.description, bench.design, values, of_readings, noise, once=True), shown
+    displayed = {p.name: values[p.name] * p.shown_scale for p in space.parameters}
+    return simulate(bench.description, bench.design, values, readings_key, noise, run_once=True), displayed
 
 
-def write(bench: BenchPlan, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:
+def write_tables(bench: BenchPlan, dataset: Dataset, truth: Mapping[str, float], folder: Path, seed: int) -> None:
     """Write cable.toml, the tables and truth.json, with true values in shown units and the seed they were made from."""
     cable = "\n".join(description_lines(bench.text, "bowdenfit simulate", "design")) + "\n"
     write_folder(
@@ -108,10 +108,10 @@ def write_folder(folder: Path, cable: str, files: Mapping[str, str], truth: Mapp
     outside = [name for name in texts if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name]
     if outside:
         raise DescriptionError(f"the plan names the file {shown(outside[0])}, outside of what is made; name one inside.")
-    with fill_folder_atomically(folder) as place:
+    with fill_folder_atomically(folder) as new_folder:
         for name, text in texts.items():
-            (place / name).parent.mkdir(parents=True, exist_ok=True)
-            write_text(place / name, text)
+            (new_folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(new_folder / name, text)
 
 
 def table_texts(description: Description, measured: Measurements) -> dict[str, str]:

@@ -48,20 +48,20 @@ def simulate(
     if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
         raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
     if recordings:
-        return _simulated_recordings(Path(bench), output, seed, noise)
+        return _simulate_recordings(Path(bench), output, seed, noise)
     if fleet:
-        return _simulated_fleet(Path(bench), output, seed, noise)
-    from bowdenfit.questions.simulate.tables import make, read_bench, write
+        return _simulate_fleet(Path(bench), output, seed, noise)
+    from bowdenfit.questions.simulate.tables import read_bench, simulate_tables, write_tables
 
     plan = read_bench(Path(bench))
     with jax.enable_x64(True):
-        dataset, truth = make(plan, jax.random.key(seed), noise)
+        dataset, truth = simulate_tables(plan, jax.random.key(seed), noise)
     if output is not None:
-        write(plan, dataset, truth, Path(output), seed)
+        write_tables(plan, dataset, truth, Path(output), seed)
     return dataset
 
 
-def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
+def _simulate_recordings(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
     import jax
 
     from bowdenfit.dataset import load_dataset
@@ -74,26 +74,26 @@ def _simulated_recordings(bench: Path, output: str | Path | None, seed: int, noi
         raise UsageError("simulated recordings are files; name a folder for them with output.")
     plan = read_recordings_plan(bench)
     with jax.enable_x64(True):
-        made = make_recordings(plan, seed, noise)
-    write_recordings(made, Path(output))
+        recording_set = make_recordings(plan, seed, noise)
+    write_recordings(recording_set, Path(output))
     return load_dataset(Path(output))
 
 
-def _simulated_fleet(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
+def _simulate_fleet(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
     import jax
 
     from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 
     plan = read_fleet_plan(bench)
     with jax.enable_x64(True):
-        made, truth = simulate_fleet(plan, seed, noise)
+        inspections, truth = simulate_fleet(plan, seed, noise)
     if output is not None:
-        write_fleet(plan, made, truth, Path(output))
-    return made[0].dataset
+        write_fleet(plan, inspections, truth, Path(output))
+    return inspections[0].dataset
 
 
-def _reply(_: "Dataset", asked: dict[str, Any]) -> Reply:
-    return Reply(f"Wrote {asked['output']}. Next: bowdenfit {'fleet' if asked['fleet'] else 'fit'} {asked['output']}\n")
+def _reply(_: "Dataset", options: dict[str, Any]) -> Reply:
+    return Reply(f"Wrote {options['output']}. Next: bowdenfit {'fleet' if options['fleet'] else 'fit'} {options['output']}\n")
 
 
 VERB = Verb(

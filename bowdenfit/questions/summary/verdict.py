@@ -16,7 +16,7 @@ from bowdenfit.questions.check.too_coarse import describe_coarse_readings
 from bowdenfit.questions.check.words import describe_misfits
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
-from bowdenfit.questions.next.candidates import can_be_ranked
+from bowdenfit.questions.next.candidates import has_candidates
 from bowdenfit.questions.summary.answer import outlying_readings
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
@@ -167,7 +167,7 @@ def suggest_next_step(fit: Record) -> str:
     remeasure = f"; in doubt, measure again what the fit leans on: {influential}" if influential else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
         return f"Next: nothing needs to be measured{remeasure}. bowdenfit next says what would narrow it."
-    if not can_be_ranked(fit):
+    if not has_candidates(fit):
         return f"Next: any measurement of another kind or at other bends would tell more{remeasure}."
     return f"Next: bowdenfit next says which measurement would tell most{remeasure}."
 

@@ -4,7 +4,7 @@ What the motor does is in `profile`, rope, friction and spring are in `mechanics
 `faults`; `recording` puts them together.
 """
 
-from bowdenfit.questions.simulate.bench.faults import Faults
+from bowdenfit.questions.simulate.bench.faults import LoadCellFaults
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings
 from bowdenfit.questions.simulate.bench.profile import MotorProfile
 from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, check_settings, simulate_recording
@@ -12,7 +12,7 @@ from bowdenfit.questions.simulate.bench.recording import SimulatedRecording, che
 __all__ = [
     "BenchFriction",
     "BenchSettings",
-    "Faults",
+    "LoadCellFaults",
     "MotorProfile",
     "SimulatedRecording",
     "check_settings",

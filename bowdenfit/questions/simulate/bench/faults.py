@@ -11,7 +11,7 @@ from bowdenfit.types import Vector
 
 
 @dataclass(frozen=True)
-class Faults:
+class LoadCellFaults:
     """What readings suffer on their way from the rope to the file; nothing, unless said.
 
     Args:
@@ -47,27 +47,27 @@ class Faults:
     spike_size: NonNegative = 50.0
 
 
-def readings(
+def apply_faults(
     force: Vector,
     noise: float,
     limits: tuple[float, float] | None,
-    faults: Faults,
+    faults: LoadCellFaults,
     rate: float,
     generator: np.random.Generator,
 ) -> Vector:
     """Readings of one cell: noise, spikes, the ends of its range, rounding, gaps."""
-    of_noise, of_spikes, of_gaps = generator.spawn(3)
-    reading = force + noise * _unit_noise(len(force), faults.noise_cutoff, rate, of_noise)
+    noise_generator, spike_generator, gap_generator = generator.spawn(3)
+    reading = force + noise * _unit_noise(len(force), faults.noise_cutoff, rate, noise_generator)
     minutes = len(force) / rate / 60
-    at = of_spikes.integers(0, len(force), of_spikes.poisson(faults.spikes * minutes))
-    reading[at] += faults.spike_size * of_spikes.choice([-1.0, 1.0], len(at))
+    spiked = spike_generator.integers(0, len(force), spike_generator.poisson(faults.spikes * minutes))
+    reading[spiked] += faults.spike_size * spike_generator.choice([-1.0, 1.0], len(spiked))
     if limits is not None:
         reading = np.clip(reading, *limits)
         if faults.bits is not None:
             step = (limits[1] - limits[0]) / (2**faults.bits - 1)
             reading = limits[0] + step * np.round((reading - limits[0]) / step)
     length = max(1, round(faults.dropout_length * rate))
-    for first in of_gaps.integers(0, len(force), of_gaps.poisson(faults.dropouts * minutes)):
+    for first in gap_generator.integers(0, len(force), gap_generator.poisson(faults.dropouts * minutes)):
         reading[first : first + length] = np.nan if faults.dropout_kind == "missing" else reading[max(first - 1, 0)]
     return reading
 

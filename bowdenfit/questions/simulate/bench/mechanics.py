@@ -8,12 +8,12 @@ from pydantic import Field
 
 from bowdenfit.description import Finite, NonNegative, Positive
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.simulate.bench.profile import Motion, MotorProfile
+from bowdenfit.questions.simulate.bench.profile import MotorMotion, MotorProfile
 from bowdenfit.recordings.preparation.play import play_between
 from bowdenfit.recordings.recording import SWITCH
 from bowdenfit.types import Labels, Vector
 
-_NEWTON_STEPS = 60
+_MAX_NEWTON_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,13 @@ class Mechanics:
     friction: BenchFriction
     profile: MotorProfile
     bench: BenchSettings
-    motion: Motion
+    motion: MotorMotion
 
-    def at(self, time: Vector) -> tuple[Labels, Vector, Vector]:
+    def forces_at(self, time: Vector) -> tuple[Labels, Vector, Vector]:
         """Contact state, input force and output force [N]; before the start everything is at rest."""
         clock = np.union1d(np.maximum(time, 0.0), self.motion.turns)
-        asked = np.searchsorted(clock, np.maximum(time, 0.0))
-        position, velocity = self.motion.at(clock)
+        sampled = np.searchsorted(clock, np.maximum(time, 0.0))
+        position, velocity = self.motion.state_at(clock)
         exponent = self._exponent(velocity)
         x, _ = play_between(self._boundary(position, exponent), self._boundary(position, -exponent), 0.0)
         stroke = np.sign(np.diff(x, prepend=0.0)).astype(int)
@@ -101,15 +101,15 @@ class Mechanics:
         input_force = bench.rope_stiffness * (position - x) + bench.preload
         output_force = bench.preload + bench.load_stiffness * x
         return (
-            np.where(loaded, stroke[asked], SWITCH),
-            np.where(loaded, input_force[asked], 0.0),
-            np.where(loaded, output_force[asked], 0.0),
+            np.where(loaded, stroke[sampled], SWITCH),
+            np.where(loaded, input_force[sampled], 0.0),
+            np.where(loaded, output_force[sampled], 0.0),
         )
 
     def _exponent(self, velocity: Vector) -> Vector:
         """Lambda(v) + m"""
-        shown = velocity if self.friction.speed == "rope" else velocity / self.profile.drum_radius
-        exponent = self.exponent * self.friction.rate_factor(shown) + self.run_effect
+        speed = velocity if self.friction.speed == "rope" else velocity / self.profile.drum_radius
+        exponent = self.exponent * self.friction.rate_factor(speed) + self.run_effect
         if not np.all(exponent > 0):
             raise UsageError(
                 f"the friction exponent comes out at {np.min(exponent):.4g}, but friction cannot push: raise the friction "
@@ -124,7 +124,7 @@ class Mechanics:
         """
         K, k, P, law = self.bench.rope_stiffness, self.bench.load_stiffness, self.bench.preload, self.friction
         x = np.zeros_like(position) if shift[0] > 0 else position + P / K
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(_MAX_NEWTON_STEPS):
             load = P + k * x
             needed = law.force(law.scale(load) + shift)
             slope = ((needed + law.drag) / (load + law.drag)) ** (1 - law.load_exponent)

@@ -40,7 +40,7 @@ class MotorProfile:
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotorMotion:
     """Motor position as stretches of constant acceleration [s, mm, mm/s, mm/s^2]; the last one is a rest."""
 
     start: Vector
@@ -50,7 +50,7 @@ class Motion:
     turns: Float[np.ndarray, " turns"]
     reversals: tuple[float, ...]
 
-    def at(self, time: Vector) -> tuple[Vector, Vector]:
+    def state_at(self, time: Vector) -> tuple[Vector, Vector]:
         """Position [mm] and velocity [mm/s]."""
         i = np.searchsorted(self.start, time, side="right") - 1
         since = time - self.start[i]
@@ -58,7 +58,7 @@ class Motion:
         return self.position[i] + (self.velocity[i] + self.acceleration[i] * since / 2) * since, velocity
 
 
-def motion_of(profile: MotorProfile) -> Motion:
+def plan_motion(profile: MotorProfile) -> MotorMotion:
     """All moves of the profile, one after the other."""
     clock, where = profile.lead_in, 0.0
     rows, turns, reversals, heading = [(0.0, 0.0, 0.0, 0.0)], [], [], 0.0
@@ -75,7 +75,7 @@ def motion_of(profile: MotorProfile) -> Motion:
             turns.append(clock)
         clock += profile.pause
     start, position, velocity, acceleration = (np.array(column) for column in zip(*rows, strict=True))
-    return Motion(start, position, velocity, acceleration, np.array(turns), tuple(reversals))
+    return MotorMotion(start, position, velocity, acceleration, np.array(turns), tuple(reversals))
 
 
 def _waypoints(profile: MotorProfile, number: int) -> list[float]:

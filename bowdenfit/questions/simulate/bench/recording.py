@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.simulate.bench.faults import Faults, readings
+from bowdenfit.questions.simulate.bench.faults import LoadCellFaults, apply_faults
 from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings, Mechanics
-from bowdenfit.questions.simulate.bench.profile import MotorProfile, motion_of
+from bowdenfit.questions.simulate.bench.profile import MotorProfile, plan_motion
 from bowdenfit.types import Labels, Vector
 
 
@@ -53,7 +53,7 @@ def simulate_recording(
     friction: BenchFriction,
     profile: MotorProfile,
     bench: BenchSettings,
-    faults: Faults,
+    faults: LoadCellFaults,
     generator: np.random.Generator,
     run_effect: float = 0.0,
 ) -> SimulatedRecording:
@@ -76,21 +76,21 @@ def simulate_recording(
         UsageError: The friction exponent is not positive, or a profile or fault contradicts itself.
     """
     check_settings(profile, faults)
-    motion = motion_of(profile)
+    motion = plan_motion(profile)
     n = int(np.floor((motion.start[-1] + profile.pause) * bench.rate + 1e-9)) + 1
     time = np.arange(n) / bench.rate
-    of_input, of_output = generator.spawn(2)
-    states = Mechanics(exponent, run_effect, friction, profile, bench, motion)
-    stroke, true_input, true_output = states.at(time)
-    late_output = states.at(time - faults.delay)[2] if faults.delay else true_output
-    position, velocity = motion.at(time)
-    shown_output = late_output * np.exp(-faults.gain_error) + faults.output_offset
+    input_generator, output_generator = generator.spawn(2)
+    mechanics = Mechanics(exponent, run_effect, friction, profile, bench, motion)
+    stroke, true_input, true_output = mechanics.forces_at(time)
+    delayed_output = mechanics.forces_at(time - faults.delay)[2] if faults.delay else true_output
+    position, velocity = motion.state_at(time)
+    shown_output = delayed_output * np.exp(-faults.gain_error) + faults.output_offset
     return SimulatedRecording(
         time,
-        readings(
-            true_input + faults.input_offset, faults.input_noise, faults.input_range, faults, bench.rate, of_input
+        apply_faults(
+            true_input + faults.input_offset, faults.input_noise, faults.input_range, faults, bench.rate, input_generator
         ),
-        readings(shown_output, faults.output_noise, faults.output_range, faults, bench.rate, of_output),
+        apply_faults(shown_output, faults.output_noise, faults.output_range, faults, bench.rate, output_generator),
         velocity,
         position,
         stroke,
@@ -100,7 +100,7 @@ def simulate_recording(
     )
 
 
-def check_settings(profile: MotorProfile, faults: Faults) -> None:
+def check_settings(profile: MotorProfile, faults: LoadCellFaults) -> None:
     """Refuse settings that contradict one another.
 
     Raises:

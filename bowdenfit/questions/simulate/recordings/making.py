@@ -18,13 +18,13 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
 from bowdenfit.questions.simulate.recordings.planned import RPM, PlannedRecording
-from bowdenfit.questions.simulate.simulation import empty_tables, simulate, true_values
+from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 
 _CELL_NOISE = 2.0  # N; standard deviations of load cells of which the plan says nothing are half-normal with this one
 
 
 @dataclass(frozen=True)
-class MadeRecording:
+class RecordingWithTruth:
     """One recording and its truth: friction exponent without the effect of its run, that effect, wrap angles [rad]."""
 
     planned: PlannedRecording
@@ -35,17 +35,17 @@ class MadeRecording:
 
 
 @dataclass(frozen=True)
-class MadeRecordings:
+class RecordingSet:
     """Everything that the folder will hold; `truth` in shown units."""
 
     plan: RecordingsPlan
     seed: int
     truth: Mapping[str, float]
     tables: Measurements
-    each: tuple[MadeRecording, ...]
+    recordings: tuple[RecordingWithTruth, ...]
 
 
-def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> MadeRecordings:
+def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> RecordingSet:
     """Make the recordings of a plan.
 
     Args:
@@ -56,50 +56,60 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Made
     Raises:
         UsageError: A name in the truth is no parameter, or a friction exponent comes out negative.
     """
-    of_truth, of_readings = jax.random.split(jax.random.key(seed))
-    of_noise, of_runs, of_angles, *of_each = np.random.default_rng(seed).spawn(3 + len(plan.recordings))
+    truth_key, readings_key = jax.random.split(jax.random.key(seed))
+    noise_generator, run_generator, angle_generator, *recording_generators = np.random.default_rng(seed).spawn(
+        3 + len(plan.recordings)
+    )
     lengths = np.array([r.length for r in plan.recordings])
     design = design_without_recordings(plan.description, plan.angles)
-    tables, given = empty_tables(plan.description, design), dict(plan.truth)
-    force_noise = given.pop(FORCE_NOISE, abs(of_noise.standard_normal()) * _CELL_NOISE)
-    values = true_values(plan.description, tables, given, of_truth, once=True)
+    tables, stated = empty_tables(plan.description, design), dict(plan.truth)
+    force_noise = stated.pop(FORCE_NOISE, abs(noise_generator.standard_normal()) * _CELL_NOISE)
+    values = draw_true_values(plan.description, tables, stated, truth_key, run_once=True)
     model = build_model(Dataset(plan.description, tables, {}))
     truth = {p.name: values[p.name] * p.shown_scale for p in model.space.parameters} | {FORCE_NOISE: float(force_noise)}
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
     angles = _true_angles(plan, model.cable, named, lengths)
     exponents = np.asarray(model.cable.friction_exponent(named, jnp.asarray(angles)), dtype=float)
     scatter = values[RUN_SCATTER] * noise
-    effects = {run: scatter * float(of_runs.standard_normal()) for run in dict.fromkeys(r.run for r in plan.recordings)}
+    effects = {
+        run: scatter * float(run_generator.standard_normal()) for run in dict.fromkeys(r.run for r in plan.recordings)
+    }
     contacts = [c.name for c in plan.description.contact]
-    each = []
-    for i, (planned, generator) in enumerate(zip(plan.recordings, of_each, strict=True)):
-        of_cells = plan.description.sensors.noise_ratio * float(force_noise), float(force_noise)
-        one = _with_faults(planned, of_cells, values.get(GAIN_ERROR, 0.0), noise)
-        exponent, effect = float(exponents[i]), effects[one.run]
-        simulated = simulate_recording(exponent, one.friction, one.profile, one.bench, one.faults, generator, effect)
+    recordings = []
+    for i, (planned, generator) in enumerate(zip(plan.recordings, recording_generators, strict=True)):
+        cell_noise = plan.description.sensors.noise_ratio * float(force_noise), float(force_noise)
+        recording = _add_true_faults(planned, cell_noise, values.get(GAIN_ERROR, 0.0), noise)
+        exponent, effect = float(exponents[i]), effects[recording.run]
+        simulated = simulate_recording(
+            exponent, recording.friction, recording.profile, recording.bench, recording.faults, generator, effect
+        )
         wrap = dict(zip(contacts, map(float, angles[i]), strict=True))
-        each.append(MadeRecording(one, simulated, exponent, effect, wrap))
-    dataset = simulate(plan.description, design, values, of_readings, noise, once=True) if plan.angles else None
+        recordings.append(RecordingWithTruth(recording, simulated, exponent, effect, wrap))
+    dataset = simulate(plan.description, design, values, readings_key, noise, run_once=True) if plan.angles else None
     table = dataset.measurements.table(AngleTable) if dataset else None
-    made = () if table is None else (_with_measured(table, plan, values[ANGLE_NOISE] * noise, of_angles),)
-    return MadeRecordings(plan, seed, {**truth, **_common_truth(each)}, Measurements(made), tuple(each))
+    angle_tables = (
+        () if table is None else (_add_measured_angles(table, plan, values[ANGLE_NOISE] * noise, angle_generator),)
+    )
+    return RecordingSet(
+        plan, seed, {**truth, **_common_truth(recordings)}, Measurements(angle_tables), tuple(recordings)
+    )
 
 
-def _common_truth(each: Sequence[MadeRecording]) -> dict[str, float]:
+def _common_truth(each: Sequence[RecordingWithTruth]) -> dict[str, float]:
     """What all recordings share of friction's dependences and of the sensors, by the names of a fit's parameters."""
     motor = each[0].planned.friction.speed == "motor"
-    shown = {"stribeck_speed": 1 / RPM, "viscous": RPM} if motor else {}
-    found: dict[str, float] = {}
+    unit_factors = {"stribeck_speed": 1 / RPM, "viscous": RPM} if motor else {}
+    common: dict[str, float] = {}
     for name in ("load_exponent", "drag", "stribeck", "stribeck_speed", "viscous"):
         values = {getattr(recording.planned.friction, name) for recording in each}
-        switched_on = name != "stribeck_speed" or "stribeck" in found
+        switched_on = name != "stribeck_speed" or "stribeck" in common
         if len(values) == 1 and switched_on and 0.0 not in values:
-            found[name] = values.pop() * shown.get(name, 1.0)
+            common[name] = values.pop() * unit_factors.get(name, 1.0)
     for name in (GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET):
         values = {getattr(recording.planned.faults, name) for recording in each}
         if len(values) == 1 and 0.0 not in values:
-            found[name] = values.pop()
-    return found
+            common[name] = values.pop()
+    return common
 
 
 def _true_angles(
@@ -114,18 +124,20 @@ def _true_angles(
     return angles
 
 
-def _with_faults(
-    planned: PlannedRecording, of_cells: tuple[float, float], gain_error: float, noise: bool
+def _add_true_faults(
+    planned: PlannedRecording, cell_noise: tuple[float, float], gain_error: float, noise: bool
 ) -> PlannedRecording:
     """The recording with what the truth says of noise and gain where the plan says nothing."""
-    true: dict[str, Any] = {"input_noise": of_cells[0], "output_noise": of_cells[1], "gain_error": gain_error}
+    true: dict[str, Any] = {"input_noise": cell_noise[0], "output_noise": cell_noise[1], "gain_error": gain_error}
     faults = dataclasses.replace(planned.faults, **{k: v for k, v in true.items() if k not in planned.stated_faults})
     if not noise:
         faults = dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)
     return planned.model_copy(update={"faults": faults})
 
 
-def _with_measured(table: AngleTable, plan: RecordingsPlan, noise: float, generator: np.random.Generator) -> AngleTable:
+def _add_measured_angles(
+    table: AngleTable, plan: RecordingsPlan, noise: float, generator: np.random.Generator
+) -> AngleTable:
     """The angle table with the rows outside the curves' range at its end."""
     if not plan.measured_angles:
         return table

@@ -13,14 +13,14 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import wrong_keys
 from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.kinds.descriptions import description_without_recordings
-from bowdenfit.questions.simulate.recordings.planned import Page, PlannedRecording, planned_recordings
-from bowdenfit.questions.simulate.tables import plan_page, truth_of
+from bowdenfit.questions.simulate.recordings.planned import PlannedRecording, RecordingsPage, plan_recordings
+from bowdenfit.questions.simulate.tables import parse_truth, read_plan_file
 
 
 class _Plan(Frozen):
     """What of a plan is about recordings."""
 
-    recordings: Page
+    recordings: RecordingsPage
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def read_recordings_plan(path: Path) -> RecordingsPlan:
     Raises:
         DescriptionError: The file is missing or no TOML, or a table or key in it is wrong.
     """
-    text, raw = plan_page(path)
+    text, raw = read_plan_file(path)
     return parse_recordings_plan(raw, text, path.name)
 
 
@@ -71,14 +71,14 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         raise DescriptionError(
             f'{file} has no [recordings]: say what to record, such as lengths = [440, 470], speeds = ["20 r/min"].'
         )
-    truth, description = truth_of(raw, file), description_without_recordings(raw, file)
+    truth, description = parse_truth(raw, file), description_without_recordings(raw, file)
     try:
         page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings
     except ValidationError as error:
         remedy = 'write it, such as speeds = ["20 r/min"]'
         raise wrong_keys(error, raw, _Plan, file, remedy) from None
     measured = _measured_angles(page, description, file)
-    recordings = planned_recordings(_with_reference_force(page, raw, file), description, file)
+    recordings = plan_recordings(_with_reference_force(page, raw, file), description, file)
     _check_lengths(recordings, measured, description, file)
     if description.curved and not page.angles:
         variable = description.route.variable if description.route else "the route variable"
@@ -90,7 +90,7 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
     return RecordingsPlan(text, description, truth, angles, measured, recordings, page.decimals)
 
 
-def _with_reference_force(page: Page, raw: Mapping[str, Any], file: str) -> Page:
+def _with_reference_force(page: RecordingsPage, raw: Mapping[str, Any], file: str) -> RecordingsPage:
     """The page with the description's reference force, where it states one and the page does not."""
     if "reference_force" not in raw or "reference_force" in page.friction:
         return page
@@ -103,21 +103,21 @@ def _with_reference_force(page: Page, raw: Mapping[str, Any], file: str) -> Page
     return page.model_copy(update={"friction": {**page.friction, "reference_force": force}})
 
 
-def _measured_angles(page: Page, description: Description, file: str) -> dict[float, dict[str, float]]:
+def _measured_angles(page: RecordingsPage, description: Description, file: str) -> dict[float, dict[str, float]]:
     columns = [c.wrap_angle.column or "" for c in description.curved]
-    found: dict[float, dict[str, float]] = {}
+    angles: dict[float, dict[str, float]] = {}
     for i, row in enumerate(page.measured_angles):
-        place = f"{file}, recordings.measured_angles.{i}"
+        where = f"{file}, recordings.measured_angles.{i}"
         for name in row:
             if name not in ["at", *columns]:
-                raise DescriptionError(f"{place}: unknown key {name!r}{suggest_name(name, ['at', *columns])}")
+                raise DescriptionError(f"{where}: unknown key {name!r}{suggest_name(name, ['at', *columns])}")
         for name in ["at", *columns]:
             if name not in row:
-                raise DescriptionError(f"{place}: the key {name!r} is missing; angles are in deg.")
+                raise DescriptionError(f"{where}: the key {name!r} is missing; angles are in deg.")
         if _inside(description, row["at"]):
-            raise DescriptionError(f"{place}: {row['at']:g} lies inside the range of the route, where the curves hold.")
-        found[row["at"]] = {name: row[name] for name in columns}
-    return found
+            raise DescriptionError(f"{where}: {row['at']:g} lies inside the range of the route, where the curves hold.")
+        angles[row["at"]] = {name: row[name] for name in columns}
+    return angles
 
 
 def _inside(description: Description, length: float) -> bool:
@@ -128,7 +128,7 @@ def _check_lengths(
     recordings: Sequence[PlannedRecording], measured: Mapping[float, Any], description: Description, file: str
 ) -> None:
     """Every recording has wrap angles, and recordings of one mounting have one length."""
-    of_run: dict[str, float] = {}
+    run_lengths: dict[str, float] = {}
     for recording in recordings:
         length = recording.length
         if description.curved and not _inside(description, length) and length not in measured:
@@ -136,8 +136,8 @@ def _check_lengths(
                 f"{file}, recordings: {length:g} lies outside the range of the route, where the curves do not hold; "
                 f"give its wrap angles in [[recordings.measured_angles]] with at = {length:g}."
             )
-        if not np.isnan(length) and of_run.setdefault(recording.run, length) != length:
+        if not np.isnan(length) and run_lengths.setdefault(recording.run, length) != length:
             raise DescriptionError(
-                f"{file}, recordings: the run {recording.run!r} has the lengths {of_run[recording.run]:g} and "
+                f"{file}, recordings: the run {recording.run!r} has the lengths {run_lengths[recording.run]:g} and "
                 f"{length:g}, but a run is one mounting of the cable."
             )

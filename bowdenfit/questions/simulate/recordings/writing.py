@@ -7,23 +7,30 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.questions.simulate.bench import SimulatedRecording
-from bowdenfit.questions.simulate.recordings.making import MadeRecording, MadeRecordings
+from bowdenfit.questions.simulate.recordings.making import RecordingSet, RecordingWithTruth
 from bowdenfit.questions.simulate.recordings.plan import RecordingsPlan
-from bowdenfit.questions.simulate.recordings.planned import RPM, Sections
+from bowdenfit.questions.simulate.recordings.planned import RPM, RecordingSettings
 from bowdenfit.questions.simulate.tables import description_lines, table_texts, write_folder
 
 
-def write_recordings(made: MadeRecordings, folder: Path) -> None:
+def write_recordings(recording_set: RecordingSet, folder: Path) -> None:
     """Write cable.toml, the recordings, the angles and truth.json.
 
     Args:
         made: What was made.
         folder: Where to.
     """
-    plan = made.plan
-    files = table_texts(plan.description, made.tables)
-    files |= {each.planned.file: _recording_text(each.simulated, plan.decimals) for each in made.each}
-    truth = {"seed": made.seed, "truth": dict(made.truth), "recordings": [_truth_of(each) for each in made.each]}
+    plan = recording_set.plan
+    files = table_texts(plan.description, recording_set.tables)
+    files |= {
+        recording.planned.file: _recording_text(recording.simulated, plan.decimals)
+        for recording in recording_set.recordings
+    }
+    truth = {
+        "seed": recording_set.seed,
+        "truth": dict(recording_set.truth),
+        "recordings": [_recording_truth(recording) for recording in recording_set.recordings],
+    }
     write_folder(folder, _description_text(plan), files, truth)
 
 
@@ -46,24 +53,24 @@ def _recording_text(simulated: SimulatedRecording, decimals: int) -> str:
     speeds = (simulated.motor_speed / RPM + 0.0).tolist()
     lines = ["time_s,input_force_N,output_force_N,motor_speed_rpm"]
     lines += [
-        f"{time:.6f},{pulled},{given},{speed:.2f}"
-        for time, pulled, given, speed in zip(simulated.time.tolist(), *forces, speeds, strict=True)
+        f"{time:.6f},{input_},{output},{speed:.2f}"
+        for time, input_, output, speed in zip(simulated.time.tolist(), *forces, speeds, strict=True)
     ]
     return "\n".join(lines) + "\n"
 
 
-def _truth_of(made: MadeRecording) -> dict[str, Any]:
+def _recording_truth(recording: RecordingWithTruth) -> dict[str, Any]:
     """What is true of one recording; contact states by the time of their first sample."""
-    planned = made.planned
+    planned = recording.planned
     return {
         "file": planned.file,
         "run": planned.run,
         "length": None if np.isnan(planned.length) else planned.length,
-        "exponent": made.exponent,
-        "efficiency": float(np.exp(-made.exponent)),
-        "run_effect": made.run_effect,
-        "wrap_angles_deg": {name: float(np.rad2deg(angle)) for name, angle in made.wrap_angles.items()},
-        **planned.model_dump(include=set(Sections.model_fields)),
-        "reversals": [round(time, 6) for time in made.simulated.reversals],
-        "contact_changes": [[round(time, 6), state] for time, state in made.simulated.contact_changes],
+        "exponent": recording.exponent,
+        "efficiency": float(np.exp(-recording.exponent)),
+        "run_effect": recording.run_effect,
+        "wrap_angles_deg": {name: float(np.rad2deg(angle)) for name, angle in recording.wrap_angles.items()},
+        **planned.model_dump(include=set(RecordingSettings.model_fields)),
+        "reversals": [round(time, 6) for time in recording.simulated.reversals],
+        "contact_changes": [[round(time, 6), state] for time, state in recording.simulated.contact_changes],
     }

@@ -11,7 +11,7 @@ from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.words import checks_page
 from bowdenfit.questions.figure_methods import FigureMethods
-from bowdenfit.questions.groups.answer import Groups, contrast_groups
+from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
 from bowdenfit.questions.identify.judgment import assess_identifiability
 from bowdenfit.questions.predict.predictions import predictions_text

@@ -1,1 +1,1 @@
-"""A cable between a motor and a joint: what drives it, what controls it, what is felt. Torques in N m, angles in rad, SI."""
+"""Mechanics of a haptic device with a cable between motor and joint. Torques in N m, angles in rad, SI."""

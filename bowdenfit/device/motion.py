@@ -1,4 +1,9 @@
-"""A device through time: the plant under its controller and a hand, in one program for any number of runs."""
+"""Simulation of a device under a sampled controller and a hand, and the torque that it transmits.
+
+The controller has an encoder, a speed filter, a delay of one sample, sensor noise and a torque limit. Its laws are equation 3
+of the haptic paper, whose second case must read V < -dv, its variant that is linear inside the dead zone, and the active one,
+which feeds back the torque measured at the joint.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,9 +14,89 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.device.control import Controller, ControllerMemory, step_controller
-from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle_node
-from bowdenfit.device.transmission import Numbers
+from bowdenfit.device.plant import Motion, Numbers, Plant, advance, rope_torques, settle_node
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Controller:
+    """What the controller does at every sample; sampling itself belongs to the run.
+
+    Args:
+        coulomb: F_cst, fed forward outside the dead zone [N m]; 0 for none.
+        dead_zone: dv [rad/s].
+        linear: 1 if F_cst grows linearly inside the dead zone, else 0.
+        gain: K_f, on the torque at the joint [1]; 0 for none.
+        integral_gain: K_i, on its integral [1/s].
+        active_zone: Speed below which the gains act, and F_cst does not [rad/s]; infinite for always, 0 for never.
+        count: Angle of one count of the encoder [rad].
+        filter_time: Time constant of the filter of the speed [s].
+        largest_torque: Of the motor [N m].
+    """
+
+    coulomb: Numbers
+    dead_zone: Numbers
+    linear: Numbers
+    gain: Numbers
+    integral_gain: Numbers
+    active_zone: Numbers
+    count: Numbers
+    filter_time: Numbers
+    largest_torque: Numbers
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class ControllerMemory:
+    """What a controller keeps from one sample to the next.
+
+    Args:
+        counted: Angle that the encoder showed [rad].
+        speed: Filtered [rad/s].
+        integral: Of the torque at the joint [N m s].
+        command: Torque for the motor, which acts a sample later [N m].
+    """
+
+    counted: Numbers
+    speed: Numbers
+    integral: Numbers
+    command: Numbers
+
+    @classmethod
+    def empty(cls, template: Numbers) -> "ControllerMemory":
+        """Nothing has been seen."""
+        zero = jnp.zeros_like(template)
+        return cls(zero, zero, zero, zero)
+
+
+def step_controller(
+    control: Controller, memory: ControllerMemory, angle: Numbers, torque: Numbers, sample: float
+) -> ControllerMemory:
+    """The controller's next command, from the angle [rad] and the torque [N m] at the joint.
+
+    Args:
+        control: The controller.
+        memory: What it kept.
+        angle: Of the joint.
+        torque: T_j as its sensor shows it.
+        sample: T_s [s].
+    """
+    counted = jnp.floor(angle / control.count) * control.count
+    raw = (counted - memory.counted) / sample
+    speed = memory.speed + (raw - memory.speed) * (1 - jnp.exp(-sample / control.filter_time))
+    is_active = jnp.abs(speed) < control.active_zone
+    integral = jnp.where(is_active, memory.integral + sample * torque, 0.0)
+    fed_back = -control.gain * torque - control.integral_gain * integral
+    command = jnp.where(is_active, fed_back, karnopp_torque(control, speed))
+    command = jnp.clip(command, -control.largest_torque, control.largest_torque)
+    return replace(memory, counted=counted, speed=speed, integral=integral, command=command)
+
+
+def karnopp_torque(control: Controller, speed: Numbers) -> Numbers:
+    """F_cst in the direction of motion outside the dead zone; inside nothing, or a share of it [N m]."""
+    inside = control.linear * control.coulomb * speed / jnp.maximum(control.dead_zone, 1e-12)
+    return jnp.where(jnp.abs(speed) > control.dead_zone, control.coulomb * jnp.sign(speed), inside)
+
 
 STEP = 1e-4  # of the plant [s]
 
@@ -137,3 +222,49 @@ def oscillating_path(seconds: float, sample: float, amplitude: float, period: fl
     frequency = 2 * np.pi / period
     phase = frequency * sample * np.arange(round(seconds / sample))
     return np.stack([amplitude * (1 - np.cos(phase)), amplitude * frequency * np.sin(phase)], axis=1)
+
+
+JUMP_SHARE = 0.1  # of the largest command, from which on a change from one sample to the next is a jump
+
+
+@dataclass(frozen=True)
+class TransmittedTorque:
+    """Of every run.
+
+    Args:
+        mean: Torque at the joint against the motion, where it is faster than the dead zone [N m].
+        peak: The largest, which is felt when the motion turns round [N m].
+        correlation: Between the torques at the motor and at the joint [1]; 0 where one of them does not change.
+        jumps: Of the motor's command in a second [1/s], beyond the two at each turn.
+    """
+
+    mean: np.ndarray
+    peak: np.ndarray
+    correlation: np.ndarray
+    jumps: np.ndarray
+
+
+def measure_transmitted_torque(runs: DeviceRuns, dead_zone: float, start: float = 0.0) -> TransmittedTorque:
+    """What is felt of runs.
+
+    Args:
+        runs: The runs.
+        dead_zone: Speed above which the mean is taken [rad/s].
+        start: When to begin [s].
+    """
+    selected = runs.time >= start
+    at_joint, at_motor, speed = runs.joint_torque[selected], runs.motor_torque[selected], runs.speed[selected]
+    moving = np.abs(speed) > dead_zone
+    resisting = -at_joint * np.sign(speed)
+    mean = np.sum(resisting * moving, axis=0) / np.maximum(moving.sum(axis=0), 1)
+    centered = at_motor - at_motor.mean(axis=0), at_joint - at_joint.mean(axis=0)
+    scale = np.sqrt(np.mean(centered[0] ** 2, axis=0) * np.mean(centered[1] ** 2, axis=0))
+    covariance = np.mean(centered[0] * centered[1], axis=0)
+    correlation = np.where(scale > 1e-12, covariance / np.where(scale > 1e-12, scale, 1.0), 0.0)
+    command = runs.command[selected]
+    jumps = np.abs(np.diff(command, axis=0)) > JUMP_SHARE * np.maximum(np.abs(command).max(axis=0), 1e-9)
+    turns = np.sum(np.diff(np.sign(speed), axis=0) != 0, axis=0)
+    seconds = runs.time[selected][-1] - runs.time[selected][0]
+    return TransmittedTorque(
+        mean, np.abs(at_joint).max(axis=0), correlation, np.maximum(jumps.sum(axis=0) - 2 * turns, 0) / seconds
+    )

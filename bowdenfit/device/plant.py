@@ -1,11 +1,96 @@
-"""Motor, loop and joint as a plant that is stepped through time: its states, and one step."""
+r"""A pull-pull loop between motor and joint as a plant stepped through time, all friction in a node between two springs.
+
+Each half passes :math:`S(d) = K d + \text{clip}(K d, \pm P r)` for a twist d: twice the stiffness of the loop while both
+sides are taut, and half of that once the return side is slack. The node holds still while the torque at the joint lies
+inside the band of the loop, and slides along its limits otherwise: the loop's play operator, whatever moves.
+"""
 
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
 
-from bowdenfit.device.transmission import LoopTransmission, Numbers
+from bowdenfit.physics.stretch import mean_tension
+
+Numbers: TypeAlias = Any  # an array over runs, of JAX or NumPy, or one number for all of them
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LoopTransmission:
+    """A loop at one bend, or in many runs at once.
+
+    Args:
+        stiffness: K, of the whole loop at the joint with the motor held [N m/rad].
+        preload: P r, preload times the pulley's radius [N m].
+        exponent: Lambda, friction exponent of one side [1].
+    """
+
+    stiffness: Numbers
+    preload: Numbers
+    exponent: Numbers
+
+    @property
+    def friction(self) -> Numbers:
+        """T_f = 2 r P Lambda, what moving it takes while both sides are taut [N m]."""
+        return 2 * self.preload * self.exponent
+
+    def half_torque(self, twist: Numbers) -> Numbers:
+        """S, torque that half of the loop passes on at a twist [rad]."""
+        force = self.stiffness * twist
+        return force + jnp.clip(force, -self.preload, self.preload)
+
+    def twist(self, torque: Numbers) -> Numbers:
+        """The twist of a half that passes a torque [N m]: the inverse of `passed`."""
+        return (
+            jnp.where(jnp.abs(torque) < 2 * self.preload, torque / 2, torque - jnp.sign(torque) * self.preload)
+            / self.stiffness
+        )
+
+    def half_energy(self, twist: Numbers) -> Numbers:
+        """Elastic energy of a half at a twist [J]."""
+        force = self.stiffness * twist
+        soft = jnp.clip(force, -self.preload, self.preload)
+        return (force**2 / 2 + soft * force - soft**2 / 2) / self.stiffness
+
+    def lower_joint_torque(self, torque: Numbers) -> Numbers:
+        """f_-, torque at the joint while it moves forward, from that at the motor [N m]; see `loop_output_force`."""
+        growth = jnp.where(torque > 0, jnp.exp(-self.exponent), jnp.exp(self.exponent))
+        return jnp.minimum(torque - self.friction, torque * growth)
+
+    def settled_node(self, node: Numbers, motor: Numbers, joint: Numbers) -> Numbers:
+        """Where the node comes to stand between the angles of motor and joint, from where it stood [rad]."""
+        return jnp.clip(node, self._lowest_node(motor, joint), -self._lowest_node(-motor, -joint))
+
+    def torques(self, node: Numbers, motor: Numbers, joint: Numbers) -> tuple[Numbers, Numbers]:
+        """T_m and T_j, what the loop takes from the motor and gives the joint [N m]."""
+        return self.half_torque(motor - node), self.half_torque(node - joint)
+
+    def _lowest_node(self, motor: Numbers, joint: Numbers) -> Numbers:
+        """x_-, the least place of the node: the root of S(x - q_j) = f_-(S(q_m - x)), between the kinks of either side."""
+        one = jnp.ones_like(self.exponent)
+        slack = self.preload / self.stiffness
+        by_load = self.twist(2 * self.preload / mean_tension(one, self.exponent))
+        by_return = self.twist(2 * self.preload / mean_tension(one, -self.exponent))
+        kinks = jnp.stack(
+            [joint - slack, joint + slack, motor - slack, motor + slack, motor - by_load, motor + by_return]
+        )
+        excess = self.half_torque(kinks - joint) - self.lower_joint_torque(
+            self.half_torque(motor - kinks)
+        )  # grows with the place
+        before, behind = excess <= 0, excess > 0
+        left, left_excess = (jnp.max(jnp.where(before, value, -jnp.inf), axis=0) for value in (kinks, excess))
+        right, right_excess = (jnp.min(jnp.where(behind, value, jnp.inf), axis=0) for value in (kinks, excess))
+        first, last = jnp.isinf(left), jnp.isinf(right)
+        slope_before = self.stiffness * (1 + jnp.exp(-self.exponent))
+        slope_behind = self.stiffness * (1 + jnp.exp(self.exponent))
+        slope = jnp.where(
+            first,
+            slope_before,
+            jnp.where(last, slope_behind, (right_excess - left_excess) / jnp.where(first | last, 1.0, right - left)),
+        )
+        return jnp.where(first, right - right_excess / slope, left - left_excess / slope)
 
 
 @jax.tree_util.register_dataclass

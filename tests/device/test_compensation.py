@@ -6,13 +6,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from bowdenfit.device.control import Controller
-from bowdenfit.device.coulomb import largest_safe_share, moves_by_itself
-from bowdenfit.device.felt import measure_transmitted_torque
-from bowdenfit.device.gains import LinearDevice, discretize, passive_gain, spectral_radius, stable_gain
-from bowdenfit.device.motion import Hand, oscillating_path, simulate_device
-from bowdenfit.device.plant import Motion, Plant
-from bowdenfit.device.transmission import LoopTransmission
+from bowdenfit.device.limits import (
+    LinearDevice,
+    discretize,
+    largest_safe_share,
+    moves_by_itself,
+    passive_gain,
+    spectral_radius,
+    stable_gain,
+)
+from bowdenfit.device.motion import Controller, Hand, measure_transmitted_torque, oscillating_path, simulate_device
+from bowdenfit.device.plant import LoopTransmission, Motion, Plant
 
 pytestmark = pytest.mark.extended
 

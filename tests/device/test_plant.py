@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bowdenfit.device.plant import (
+    LoopTransmission,
     Motion,
     Plant,
     advance,
@@ -19,7 +20,6 @@ from bowdenfit.device.plant import (
     rope_torques,
     settle_node,
 )
-from bowdenfit.device.transmission import LoopTransmission
 from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 

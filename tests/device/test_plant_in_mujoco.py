@@ -5,8 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bowdenfit.device.plant import Motion, Plant, advance, rope_torques, settle_node
-from bowdenfit.device.transmission import LoopTransmission
+from bowdenfit.device.plant import LoopTransmission, Motion, Plant, advance, rope_torques, settle_node
 
 pytestmark = pytest.mark.extended
 

@@ -6,18 +6,19 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from bowdenfit.device.coupling import (
+from bowdenfit.device.motion import Hand
+from bowdenfit.device.plant import LoopTransmission, Plant
+from bowdenfit.device.teleoperation import (
     CouplingGains,
+    MasterController,
     MasterSlave,
+    Slave,
     free_motion_torque,
     is_stable,
+    simulate_teleoperation,
     spectral_radius_in_contact,
     transmitted_stiffness,
 )
-from bowdenfit.device.motion import Hand
-from bowdenfit.device.plant import Plant
-from bowdenfit.device.teleoperation import MasterController, Slave, simulate_teleoperation
-from bowdenfit.device.transmission import LoopTransmission
 
 pytestmark = pytest.mark.extended
 

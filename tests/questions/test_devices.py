@@ -11,16 +11,15 @@ from one_page import faults as faults_of_page
 
 import bowdenfit as bf
 from bowdenfit.description.device import read_device
-from bowdenfit.device.coulomb import moves_by_itself
+from bowdenfit.device.limits import moves_by_itself
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.questions.bends.loop_draws import loop_draws
 from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure, simulation
-from bowdenfit.questions.compensate.ranking import estimate_compensation
+from bowdenfit.questions.compensate.limits import estimate_compensation
 from bowdenfit.questions.compensate.words import compensation_text
 from bowdenfit.questions.teleoperate import teleoperation_figure
-from bowdenfit.questions.teleoperate.contact import detect_bouncing
-from bowdenfit.questions.teleoperate.stability import find_hardest_wall
-from bowdenfit.questions.teleoperate.words import teleoperation_text
+from bowdenfit.questions.teleoperate.answer import teleoperation_text
+from bowdenfit.questions.teleoperate.stability import detect_bouncing, find_hardest_wall
 
 pytestmark = pytest.mark.extended
 

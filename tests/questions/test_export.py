@@ -9,10 +9,9 @@ from exported import HOSTILE, cable
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.lookup import draws_table
-from bowdenfit.questions.export.tables import tabulate_transmission
-from bowdenfit.questions.export.transmission import LEVELS
-from bowdenfit.questions.export.words import ascii_text
+from bowdenfit.questions.export.tables import LEVELS, tabulate_transmission
+from bowdenfit.questions.export.text import ascii_text
+from bowdenfit.questions.export.writers import draws_table
 
 pytestmark = pytest.mark.extended
 

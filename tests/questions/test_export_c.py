@@ -10,7 +10,7 @@ import pytest
 from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
 
 from bowdenfit.questions.export.c import c_header
-from bowdenfit.questions.export.transmission import LEVELS
+from bowdenfit.questions.export.tables import LEVELS
 
 pytestmark = pytest.mark.extended
 

@@ -11,8 +11,7 @@ import pytest
 from exported import HOSTILE, cable, motion
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.c import c_header
-from bowdenfit.questions.export.fmu import build_fmu
+from bowdenfit.questions.export.c import build_fmu, c_header
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")

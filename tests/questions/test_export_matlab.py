@@ -11,7 +11,7 @@ from exported import CASES, HOSTILE, cable, followed, motion, of_equations, poin
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.matlab import function_name, matlab_function
-from bowdenfit.questions.export.transmission import LEVELS
+from bowdenfit.questions.export.tables import LEVELS
 
 pytestmark = pytest.mark.extended
 

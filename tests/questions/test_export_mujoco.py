@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from exported import HOSTILE, cable, with_rope
 
-from bowdenfit.device.transmission import LoopTransmission as Loop
+from bowdenfit.device.plant import LoopTransmission as Loop
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.mujoco import mujoco_model
 

@@ -7,8 +7,8 @@ import pytest
 import yaml
 from exported import CASES, HOSTILE, cable
 
-from bowdenfit.questions.export.parameters import yaml_lines, yaml_parameters
-from bowdenfit.questions.export.transmission import LEVELS
+from bowdenfit.questions.export.tables import LEVELS
+from bowdenfit.questions.export.yaml import yaml_lines, yaml_parameters
 
 pytestmark = pytest.mark.extended
 

@@ -10,8 +10,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.inference import engines
 from bowdenfit.inference.engines import Engine, EngineError, versions
-from bowdenfit.questions.fleet.cases import read_cases
-from bowdenfit.questions.fleet.inspections import read_inspections
+from bowdenfit.questions.fleet.inspections import read_cases, read_inspections
 from bowdenfit.questions.fleet.store import PIECES_FOLDER, FleetStore
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
 

@@ -20,13 +20,12 @@ from bowdenfit.inference.population.sampling import PopulationDraws, draw_popula
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.pool import pooling
 from bowdenfit.questions.pool.answer import ServiceLimit
-from bowdenfit.questions.pool.figures import captions, draw_figures
-from bowdenfit.questions.pool.inspected import select_inspections
-from bowdenfit.questions.pool.life import cycles_to_failure, summarize_life
-from bowdenfit.questions.pool.next import rank_next_inspections
+from bowdenfit.questions.pool.figures import draw_figures
+from bowdenfit.questions.pool.lifetime import cycles_to_failure, rank_next_inspections, summarize_life
+from bowdenfit.questions.pool.outlier_cables import anderson_darling_p_value, outlier_p_values
+from bowdenfit.questions.pool.pooled_data import select_inspections
 from bowdenfit.questions.pool.pooling import pool_cables
-from bowdenfit.questions.pool.unlike import anderson_darling_p_value, outlier_p_values
-from bowdenfit.questions.pool.words import pool_text
+from bowdenfit.questions.pool.words import captions, pool_text
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
 
@@ -123,9 +122,9 @@ def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(found):
     known = {**no_spread, "wear": found.spreads["wear"]}
     assert "all cables are alike" not in pool_text(replace(found, spreads=known))
     wide = replace(found.coefficients["mu_1"], q05=0.02, q95=0.2)
-    apart = replace(found, coefficients={"mu_0": wide, "mu_1": wide}, mixed={})
+    apart = replace(found, coefficients={"mu_0": wide, "mu_1": wide}, mixtures={})
     assert "All cables are unlike" not in pool_text(apart)
-    nobody = tuple(replace(each, unlike="") for each in found.cables)
+    nobody = tuple(replace(each, departure="") for each in found.cables)
     assert "All cables are unlike in mu_0 (" in " ".join(pool_text(replace(apart, cables=nobody)).split())
     assert "mu_1 (0.02 to 0.2 of nine in ten)" in " ".join(pool_text(replace(apart, cables=nobody)).split())
 
@@ -392,7 +391,7 @@ def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, an
         return found
 
     if not anew:
-        monkeypatch.setattr(pooling, "pooled", as_found)
+        monkeypatch.setattr(pooling, "pool_cables", as_found)
     finished_fleet(tmp_path, fleet[0])
     angles = ("--until", "60%", "--wrap-angle", f"mu_0={np.pi}rad", "--wrap-angle", "mu_1=0.3rad", "--cycles", 100_000)
     code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")

@@ -12,7 +12,7 @@ from scipy import stats
 from bowdenfit.inference.population.likelihoods import Summaries, summarize_likelihoods
 from bowdenfit.inference.population.model import Inspections
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool import unlike
+from bowdenfit.questions.pool import outlier_cables
 
 pytestmark = pytest.mark.extended
 
@@ -62,7 +62,7 @@ def least_chances(fleets, seed, sweeps=600):
         def without(cables, fleet=fleet, i=i):
             return gibbs([fleet], [cables], seed + i, sweeps)[0]
 
-        found.append(unlike.separate_outliers(fleet, population, without, seed)[1])
+        found.append(outlier_cables.separate_outliers(fleet, population, without, seed)[1])
     return np.array([chances.min() for chances in found]), found
 
 
@@ -72,29 +72,29 @@ def test_who_is_named_is_unlike_a_population_that_was_drawn_without_it(monkeypat
 
     Chances of two sets of draws differ by less than a factor of two.
     """
-    monkeypatch.setattr(unlike, "_POPULATIONS", 250)
+    monkeypatch.setattr(outlier_cables, "_POPULATIONS", 250)
     fleets = [like_cables([1, i], 8) for i in range(40)]
     _, found = least_chances(fleets, 1)
-    named = [(i, int(cable)) for i, each in enumerate(found) for cable in np.flatnonzero(each < unlike.FALSE_ALARM)]
+    named = [(i, int(cable)) for i, each in enumerate(found) for cable in np.flatnonzero(each < outlier_cables.FALSE_ALARM)]
     others = gibbs([fleets[i] for i, _ in named], [(cable,) for _, cable in named], 77)
     for (i, cable), population in zip(named, others, strict=True):
-        assert 8 * unlike.outlier_p_values(fleets[i], population, 2, (cable,))[cable] < 2 * unlike.FALSE_ALARM
+        assert 8 * outlier_cables.outlier_p_values(fleets[i], population, 2, (cable,))[cable] < 2 * outlier_cables.FALSE_ALARM
 
 
 def test_a_cable_that_is_unlike_few_others_is_found(monkeypatch):
     """Five spreads off among ten: in two fleets of three at the least; the seed is fixed."""
-    monkeypatch.setattr(unlike, "_POPULATIONS", 250)
+    monkeypatch.setattr(outlier_cables, "_POPULATIONS", 250)
     _, found = least_chances([like_cables([2, i], 10, shift=1.0) for i in range(9)], 2)
-    assert sum(chances[0] < unlike.FALSE_ALARM for chances in found) >= 6
+    assert sum(chances[0] < outlier_cables.FALSE_ALARM for chances in found) >= 6
     assert sum(int(np.argmin(chances)) == 0 for chances in found) >= 8
 
 
 def test_what_is_off_is_what_its_own_inspections_say(monkeypatch):
     """Of a cable inspected once, ten spreads off, which draws of the population pull to the others: its errors have tails."""
-    monkeypatch.setattr(unlike, "_POPULATIONS", 250)
+    monkeypatch.setattr(outlier_cables, "_POPULATIONS", 250)
     fleet = like_cables([5, 0], 20, inspections=1, freedom=3.0, shift=2.0)
     (core,) = gibbs([fleet], [(0,)], 5, 600)
-    number, off = unlike.find_departure(fleet, core, 0, 1)
+    number, off = outlier_cables.find_departure(fleet, core, 0, 1)
     assert number in (0, 1) and 6 < off < 15
 
 
@@ -136,6 +136,6 @@ def test_of_fleets_of_like_cables_one_in_twenty_has_a_cable_named(fleets, cables
     """No more than is chance in a thousand runs where one in twenty is meant; single fits give 1024 draws."""
     made = [like_cables([11, i], cables, draws=1024, **shape) for i in range(fleets)]
     least, _ = least_chances(made, 11, 1000)
-    named = int(np.sum(least < unlike.FALSE_ALARM))
+    named = int(np.sum(least < outlier_cables.FALSE_ALARM))
     print(cables, shape, "named in", named, "of", fleets, "at 1 %", int(np.sum(least < 0.01)))
-    assert stats.binom.sf(named - 1, fleets, unlike.FALSE_ALARM) > 0.001
+    assert stats.binom.sf(named - 1, fleets, outlier_cables.FALSE_ALARM) > 0.001

@@ -23,7 +23,7 @@ from bowdenfit.inference.population.model import (
     log_likelihood,
 )
 from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool.inspected import select_inspections
+from bowdenfit.questions.pool.pooled_data import select_inspections
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.results.fleet_folder import read_fleet_draws
 

@@ -12,8 +12,7 @@ from joint_fleets import joint_draws
 import bowdenfit as bf
 from bowdenfit.inference.population.sampling import draw_population
 from bowdenfit.questions.pool import pooling
-from bowdenfit.questions.pool.inspected import select_inspections
-from bowdenfit.questions.pool.worth import count_effective_draws, load_readings
+from bowdenfit.questions.pool.pooled_data import count_effective_draws, load_readings, select_inspections
 from bowdenfit.results.fleet_folder import FLEET_TABLE, read_fleet_draws
 
 pytestmark = pytest.mark.extended
@@ -64,7 +63,7 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
 @pytest.mark.slow
 def test_cables_of_which_single_fits_tell_too_little_are_named_with_a_remedy(run, fleet, monkeypatch):
     _, fits = fleet
-    monkeypatch.setattr(pooling, "LEAST", 1e9)
+    monkeypatch.setattr(pooling, "LEAST_EFFECTIVE_DRAWS", 1e9)
     code, out, _ = run("pool", fits)
     words = " ".join(out.split())
     assert code == 3 and "DO NOT USE these numbers: what was drawn from the inspections of cable-01" in words
@@ -90,7 +89,7 @@ def test_measurements_that_are_not_those_of_the_fleet_are_refused(run, fleet, tm
 def test_readings_that_are_named_are_looked_at_and_trusted(run, fleet, monkeypatch, seed):
     """Of one cable, of which wear, lubrication and temperature are hardly told apart."""
     folder, fits = fleet
-    monkeypatch.setattr(pooling, "LEAST", 1e9)
+    monkeypatch.setattr(pooling, "LEAST_EFFECTIVE_DRAWS", 1e9)
     code, out, _ = run("pool", fits, "--measurements", folder, "--seed", seed, "--json")
     page = json.loads(out)
     assert code == 0 and page["cables"][0]["measured"] == 2 and not page["reasons"]

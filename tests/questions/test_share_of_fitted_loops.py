@@ -9,11 +9,9 @@ import pytest
 from mounted_loops import ANGLE, RADIUS, fitted, measured
 
 from bowdenfit.description.device import read_device
-from bowdenfit.device.control import Controller
-from bowdenfit.device.motion import Hand, simulate_device
-from bowdenfit.device.plant import Motion, Plant
-from bowdenfit.device.transmission import LoopTransmission
-from bowdenfit.questions.compensate.ranking import estimate_compensation
+from bowdenfit.device.motion import Controller, Hand, simulate_device
+from bowdenfit.device.plant import LoopTransmission, Motion, Plant
+from bowdenfit.questions.compensate.limits import estimate_compensation
 
 pytestmark = pytest.mark.extended
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.physics.friction import force_from_scale, force_scale, play_operator, rate_factor
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
-from bowdenfit.questions.export.transmission import (
+from bowdenfit.questions.export.tables import (
     DRAW,
     LEVELS,
     FitLabel,

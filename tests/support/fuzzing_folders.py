@@ -13,8 +13,7 @@ from mangling import DESCRIPTIONS, ODD_CELLS, TABLES
 import bowdenfit as bf
 from bowdenfit.description.device import read_device
 from bowdenfit.description.device_keys import KEYS
-from bowdenfit.questions.fleet.cases import read_cases, refuse_if_none_usable
-from bowdenfit.questions.fleet.inspections import read_inspections
+from bowdenfit.questions.fleet.inspections import read_cases, read_inspections, refuse_if_none_usable
 from bowdenfit.questions.metabolic.words import metabolic_text
 from bowdenfit.results.serialization import plain_data
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpyro.infer import MCMC, NUTS
 
 from bowdenfit.inference.population.sampling import PopulationDraws
-from bowdenfit.questions.fleet.cases import read_cases
-from bowdenfit.questions.fleet.inspections import read_inspections
+from bowdenfit.questions.fleet.inspections import read_cases, read_inspections
 
 SPREAD, WEAR, WEAR_SPREAD, OIL, DEGREE = 0.5, 1.0, 0.3, 1.0, 0.05  # scales of the priors, as the model is written down
 WARM_UP, CHAINS = 400, 4

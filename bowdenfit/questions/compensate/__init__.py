@@ -1,1 +1,5 @@
-"""How much of a cable's friction may a controller hide?"""
+"""How much of the friction of a cable a controller may compensate."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

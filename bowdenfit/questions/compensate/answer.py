@@ -1,12 +1,14 @@
-"""How much friction may be hidden: what is fed forward and fed back, with which probability, and what is left to feel."""
+"""Results of `bowdenfit compensate`: limits of feed-forward and feedback, what remains, and simulations of the device."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from bowdenfit.display import Display, Part, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.compensate.simulated import DeviceSimulation
 
+NONE, KARNOPP, ACTIVE = "none", "karnopp", "active"
 ROPE_DAMPING = "the damping of the rope"
 """The input that usually decides the largest gain, and that a ring-down tells."""
 
@@ -81,7 +83,7 @@ class PreloadOption(Part):
 
     Args:
         preload: At the reference angle [N].
-        felt: Friction of the loop where it is most [N m].
+        friction: Friction of the loop where it is most [N m].
         slack_from: Torque of the motor from which a side is slack, where that is least [N m].
     """
 
@@ -90,6 +92,61 @@ class PreloadOption(Part):
     slack_from: Interval
 
     JSON: ClassVar = ("preload", ("felt", "friction"), "slack_from")
+
+
+@dataclass(frozen=True, repr=False)
+class TorqueTrace(Part):
+    """The torques of one device, that of the middle friction, while a hand moves it to and fro.
+
+    Args:
+        time: [s].
+        motor, joint: What the rope takes from the motor and gives the joint [N m].
+    """
+
+    time: np.ndarray
+    motor: np.ndarray
+    joint: np.ndarray
+
+
+@dataclass(frozen=True, repr=False)
+class SimulatedLaw(Part):
+    """One law, in every simulated device.
+
+    Args:
+        name: "none", "karnopp" or "active".
+        mean_torque: Mean torque at the joint against the motion [N m].
+        peak_torque: The largest, where the motion turns round [N m].
+        trace: Of one device.
+    """
+
+    name: str
+    mean_torque: Interval
+    peak_torque: Interval
+    trace: TorqueTrace
+
+    JSON: ClassVar = ("name", ("felt", "mean_torque"), ("peak", "peak_torque"), "trace")
+
+
+@dataclass(frozen=True, repr=False)
+class DeviceSimulation(Part):
+    """The device through time.
+
+    Args:
+        draws: Devices that were simulated.
+        wrap_angle: At which the hand moved them [deg].
+        laws: Each law.
+        runaway_share: Share of the devices that keep moving by themselves after a push without a hand, each at its critical
+            bend; None without feed-forward.
+        speed: Largest of the hand [rad/s].
+    """
+
+    draws: int
+    wrap_angle: float
+    laws: tuple[SimulatedLaw, ...]
+    runaway_share: float | None
+    speed: float
+
+    JSON: ClassVar = ("draws", "wrap_angle", "laws", ("went_on", "runaway_share"), "speed")
 
 
 @dataclass(frozen=True, repr=False)

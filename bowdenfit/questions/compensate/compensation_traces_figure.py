@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, SERIES_LINES, VERMILLION, in_paper_style
-from bowdenfit.questions.compensate.simulated import ACTIVE, KARNOPP, NONE
+from bowdenfit.questions.compensate.answer import ACTIVE, KARNOPP, NONE
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.compensate.answer import Compensation
-    from bowdenfit.questions.compensate.simulated import SimulatedLaw
+    from bowdenfit.questions.compensate.answer import Compensation, SimulatedLaw
 
 HEADING = "Torques while a hand moves the device"
 _TITLES = {NONE: "Nothing hidden", KARNOPP: "Fed forward", ACTIVE: "Fed back"}

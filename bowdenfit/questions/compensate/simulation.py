@@ -1,27 +1,133 @@
-"""From an answer to devices that are simulated: some draws of cable and device, moved by a hand and pushed without one."""
+"""Simulation of the compensated device: a hand moves it (figures 9 to 11 of the haptic paper), and a push tests for runaway."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+import bowdenfit.questions.compensate.words  # noqa: F401  registers the text of the answer
+from bowdenfit.arguments import Bends
 from bowdenfit.description.device import ENCODER, Device, Known, asked_for
-from bowdenfit.device.control import Controller
-from bowdenfit.device.coulomb import safe_shares
-from bowdenfit.device.known import draw_device
-from bowdenfit.device.motion import Hand
-from bowdenfit.device.plant import Plant
-from bowdenfit.device.transmission import LoopTransmission
-from bowdenfit.questions.bends.loop_draws import LoopDraws
-from bowdenfit.questions.compensate.answer import Compensation
-from bowdenfit.questions.compensate.gain import HAND, INTEGRAL, NEEDED
-from bowdenfit.questions.compensate.simulated import (
-    DeviceSimulation,
-    SimulatedDevices,
-    find_runaways,
-    simulate_hand_motion,
+from bowdenfit.device.draws import draw_device
+from bowdenfit.device.limits import safe_shares
+from bowdenfit.device.motion import (
+    Controller,
+    DeviceRuns,
+    Hand,
+    measure_transmitted_torque,
+    oscillating_path,
+    simulate_device,
 )
+from bowdenfit.device.plant import LoopTransmission, Motion, Plant
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.bends.loop_draws import LoopDraws
+from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.compensate.answer import (
+    ACTIVE,
+    KARNOPP,
+    NONE,
+    Compensation,
+    DeviceSimulation,
+    SimulatedLaw,
+    TorqueTrace,
+)
+from bowdenfit.questions.compensate.limits import HAND, INTEGRAL, NEEDED, estimate_compensation, parse_risk
 from bowdenfit.results.record import Record
+
+AMPLITUDE = 0.5  # of the hand's path [rad]
+_PERIOD, _SECONDS, _SINCE = 1.25, 2.5, 0.625  # of the movement to and fro [s]
+_SPEED_FACTOR = 2.0  # times the dead zone, which a push and the movement reach at least
+_PUSH = 3.0  # s
+_LAST_SAMPLES = 50  # samples at the end of a push, which tell whether it goes on
+_TRACE_STEP = 4  # every so many samples are kept of a trace
+_LEAST_SPEED = 0.05  # rad/s, where there is no dead zone
+
+
+@dataclass(frozen=True)
+class SimulatedDevices:
+    """Devices that are simulated, a number each, or one for all.
+
+    Args:
+        plant: At the bend where friction is most, without a hand.
+        hand: That moves it.
+        hand_inertia: Which then counts with the joint [kg m^2].
+        sample: T_s [s].
+        noise: Of the torque sensor [N m].
+        feed_forward: F_cst there [N m].
+        gain: K_f.
+        active_zone: Speed below which it acts; infinite for always [rad/s].
+        control: What the controller is besides.
+        wrap_angle: Of the bend [deg].
+        seed: Of the noise.
+    """
+
+    plant: Plant
+    hand: Hand
+    hand_inertia: np.ndarray
+    sample: float
+    noise: float
+    feed_forward: float | None
+    gain: float | None
+    active_zone: float
+    control: Controller
+    wrap_angle: float
+    seed: int
+
+
+def simulate_hand_motion(devices: SimulatedDevices, middle: int) -> tuple[tuple[SimulatedLaw, ...], float]:
+    """Every law while a hand moves the device to and fro, and the hand's largest speed [rad/s].
+
+    Args:
+        devices: The devices.
+        middle: Number of the one of which traces are kept.
+    """
+    period = min(_PERIOD, 2 * np.pi * AMPLITUDE / (_SPEED_FACTOR * max(float(devices.control.dead_zone), 1e-9)))
+    path = oscillating_path(2 * period, devices.sample, AMPLITUDE, period)
+    plant = replace(devices.plant, joint_inertia=devices.plant.joint_inertia + devices.hand_inertia)
+    laws = {NONE: devices.control}
+    if devices.feed_forward is not None:
+        laws[KARNOPP] = replace(devices.control, coulomb=devices.feed_forward)
+    if devices.gain is not None:
+        laws[ACTIVE] = replace(devices.control, gain=devices.gain, active_zone=devices.active_zone)
+    results = []
+    for name, control in laws.items():
+        runs = simulate_device(
+            plant, control, devices.hand, path, sample=devices.sample, noise=devices.noise, seed=devices.seed
+        )
+        torque = measure_transmitted_torque(
+            runs, max(float(devices.control.dead_zone), _LEAST_SPEED), start=_SINCE * period / _PERIOD
+        )
+        results.append(SimulatedLaw(name, Interval.of(torque.mean), Interval.of(torque.peak), _trace(runs, middle)))
+    return tuple(results), 2 * np.pi * AMPLITUDE / period
+
+
+def _trace(runs: DeviceRuns, middle: int) -> TorqueTrace:
+    return TorqueTrace(
+        runs.time[::_TRACE_STEP],
+        runs.motor_torque[::_TRACE_STEP, middle].copy(),
+        runs.joint_torque[::_TRACE_STEP, middle].copy(),
+    )
+
+
+def find_runaways(plant: Plant, control: Controller, sample: float) -> np.ndarray:
+    """Whether each device goes on by itself after a push, with no hand on.
+
+    Args:
+        plant: Of every device at its own bend.
+        control: Which feeds forward.
+        sample: T_s [s].
+    """
+    zone = np.maximum(np.asarray(control.dead_zone), _LEAST_SPEED)
+    initial_speed = np.broadcast_to(_SPEED_FACTOR * zone, np.shape(plant.loop.preload))
+    start = replace(
+        Motion.at_rest(np.zeros(np.shape(initial_speed))), motor_speed=initial_speed, joint_speed=initial_speed
+    )
+    path = np.zeros((round(_PUSH / sample), 2))
+    runs = simulate_device(plant, control, Hand(0.0, 0.0), path, start=start, sample=sample)
+    still_moving: np.ndarray = np.abs(runs.speed[-_LAST_SAMPLES:]).max(axis=0) > zone / 2
+    return still_moving
+
 
 DRAWS = 400
 ACTIVE_ZONE = "controller.active_zone"
@@ -130,3 +236,35 @@ def _build_plant(loop: LoopDraws, known: dict[str, np.ndarray], picked: np.ndarr
         known["joint.damping"],
         known["rope.damping"],
     )
+
+
+def answer_compensation(
+    fit: Record,
+    device: Path | None,
+    bends: Bends,
+    law: str | None,
+    risk: tuple[float, str] | None,
+    schedule: bool,
+    simulate: bool,
+) -> Compensation:
+    """Estimate how much friction may be compensated, and simulate the compensated device where that is wanted.
+
+    Args:
+        fit: The fit.
+        device: A device.toml; None where nothing is stated of the device.
+        bends: Range of wrap angles; None for that of the measurements.
+        law: "karnopp", "active", or None for both.
+        risk: Accepted probability of moving by itself, and its unit.
+        schedule: Whether the simulated feed-forward torque is scheduled by bend.
+        simulate: Whether devices are simulated.
+
+    Raises:
+        UsageError, DescriptionError: The fit does not provide it, or something that it needs is not stated.
+    """
+    description = None if device is None else device_with_ring_down(fit, device)
+    answer, loop = estimate_compensation(fit, description, bends, law, parse_risk(risk))
+    if not simulate:
+        return answer
+    if description is None:
+        raise asked_for("a simulation", NEEDED)
+    return replace(answer, simulated=simulate_devices(fit, description, loop, answer, schedule))

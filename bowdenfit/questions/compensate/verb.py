@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Quantity, as_pair, number_with_unit, read_first
+from bowdenfit.errors import UsageError
+from bowdenfit.questions import compensate as _compensate
 from bowdenfit.questions.writing import answer_figures, answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -15,9 +17,6 @@ if TYPE_CHECKING:
 
 NAME, TRACES = "compensation", "compensation_traces"
 Law = Literal["karnopp", "active"]
-_PERCENT = (5.0, "%")
-ACCEPTED = _PERCENT[0] / 100
-"""Probability of moving by itself that is accepted if nothing is said."""
 
 
 @read_first
@@ -35,7 +34,7 @@ def compensate(
     """How much of a loop's friction a controller may hide before the device moves by itself, and what is left to feel.
 
     Args:
-        found: The fit.
+        fit: The fit.
         device: A device.toml that says what the fit does not: inertias, damping, the controller.
         wrap_angle: Range of wrap angles that must be safe.
         law: Feed forward by the motion's direction (karnopp), or feed back the measured torque (active).
@@ -49,69 +48,31 @@ def compensate(
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
         StoreError: `output` cannot be written.
     """
-    from dataclasses import replace
-
-    from bowdenfit.description.device import asked_for
-    from bowdenfit.errors import UsageError
-    from bowdenfit.questions.bends.ring_down import device_with_ring_down
-    from bowdenfit.questions.compensate import words  # noqa: F401  (how the answer shows itself)
-    from bowdenfit.questions.compensate.gain import NEEDED
-    from bowdenfit.questions.compensate.ranking import estimate_compensation
-    from bowdenfit.questions.compensate.simulation import simulate_devices
-
     if schedule and not (simulate and law != "active"):
         raise UsageError(
             "--schedule says what --simulate feeds forward; add --simulate, without --law active, or leave it out: what may be "
             "fed forward by bend is part of every answer."
         )
-    description = None if device is None else device_with_ring_down(fit, Path(device))
-    answer, loop = estimate_compensation(fit, description, wrap_angle, law, _parse_risk(risk))
-    if simulate:
-        if description is None:
-            raise asked_for("a simulation", NEEDED)
-        answer = replace(answer, simulated=simulate_devices(fit, description, loop, answer, schedule))
+    path = None if device is None else Path(device)
+    answer = _compensate.answer_compensation(fit, path, wrap_angle, law, as_pair(risk), schedule, simulate)
     if output is not None:
         _write(answer, Path(output), fit.name)
     return answer
 
 
-def _parse_risk(risk: Quantity | None) -> float:
-    """A probability, from 0.1 % to a half.
-
-    Raises:
-        UsageError: It is none.
-    """
-    from bowdenfit.errors import DatasetError, UsageError
-    from bowdenfit.units import conversion_factor
-
-    value, unit = as_pair(risk) or _PERCENT
-    try:
-        share = value * conversion_factor(unit, "ratio")
-    except DatasetError as error:
-        raise UsageError(f"--risk: {error}.") from None
-    if not 0.001 <= share <= 0.5:
-        raise UsageError(f"--risk {value:g}{unit} is not between 0.1 % and 50 %; write it as 5%.")
-    return float(share)
-
-
 def _write(answer: "Compensation", folder: Path, cable: str) -> None:
-    from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure
-    from bowdenfit.questions.compensate.words import compensation_text
-
-    figures = {NAME: compensation_figure}
+    figures = {NAME: _compensate.compensation_figure}
     if answer.simulated is not None:
-        figures[TRACES] = compensation_traces_figure
-    write_answer(folder, NAME, answer, compensation_text(answer), figures, cable)
+        figures[TRACES] = _compensate.compensation_traces_figure
+    write_answer(folder, NAME, answer, _compensate.compensation_text(answer), figures, cable)
 
 
 def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.compensate.words import compensation_text
-
     files = answer_files(options["output"], NAME) if options["output"] else []
     if files and answer.simulated is not None:
         files += answer_figures(options["output"], TRACES)
     notes = tuple(f"Wrote {path}." for path in files)
-    return Reply(compensation_text(answer), lambda: answer, notes, csv=answer.to_csv)
+    return Reply(_compensate.compensation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 
 
 VERB = Verb(

@@ -1,10 +1,17 @@
-"""What `bowdenfit compensate` prints: what to feed forward or back, with which probability, and what is left to feel."""
+"""Text of `bowdenfit compensate`: what to feed forward or back, at which risk, and what friction remains."""
 
 from collections.abc import Iterator
 
 from bowdenfit.display import text_of
-from bowdenfit.questions.compensate.answer import ROPE_DAMPING, Compensation, FeedbackGain, FeedForward
-from bowdenfit.questions.compensate.simulated import ACTIVE, KARNOPP, NONE
+from bowdenfit.questions.compensate.answer import (
+    ACTIVE,
+    KARNOPP,
+    NONE,
+    ROPE_DAMPING,
+    Compensation,
+    FeedbackGain,
+    FeedForward,
+)
 from bowdenfit.words import decimals, filled, listed, percent, table
 
 _ROWS = 3  # of the bends in the table

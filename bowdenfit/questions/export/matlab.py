@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.transmission import TransmissionTables
-from bowdenfit.questions.export.words import ascii_text, comment, fill_template
+from bowdenfit.questions.export.tables import TransmissionTables
+from bowdenfit.questions.export.text import ascii_text, comment, fill_template
 
 _ACROSS = 5  # numbers in a line
 _NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
@@ -18,7 +18,7 @@ def matlab_function(tables: TransmissionTables, name: str) -> str:
     """The file.
 
     Args:
-        found: The tables.
+        tables: The tables.
         name: Of the function, as of the file.
     """
     levels, points = tables.levels, tables.points

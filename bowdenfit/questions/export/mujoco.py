@@ -8,8 +8,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.export.transmission import TransmissionTables
-from bowdenfit.questions.export.words import ascii_text, comment, fill_template
+from bowdenfit.questions.export.tables import TransmissionTables
+from bowdenfit.questions.export.text import ascii_text, comment, fill_template
 
 _STEP = 1e-3  # s, the longest time step
 _MASS, _DAMPING = 4.0, 0.5  # of the node, in units of K h^2, and as a share of the critical one of its springs
@@ -21,8 +21,8 @@ def mujoco_model(tables: TransmissionTables, point: float | None, path: Path) ->
     """The file, and what is to be known of it.
 
     Args:
-        found: The tables.
-        place: Where on the route, or at which wrap angle, the numbers of the file hold; None for the middle of the range.
+        tables: The tables.
+        point: Where on the route, or at which wrap angle, the numbers of the file hold; None for the middle of the range.
         path: The file to be; its ending says which of the two.
 
     Raises:

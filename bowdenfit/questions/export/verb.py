@@ -17,23 +17,16 @@ from bowdenfit.arguments import (
     read_first,
     whole_number,
 )
+from bowdenfit.questions import export as _export
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.export.answer import ExportedFile
+    from bowdenfit.questions.export.writers import ExportedFile
     from bowdenfit.results.record import Record
 
 _FILE = "the name of the cable, in this folder"
 _PLACE = Parameter(metavar="PLACE", show_default="the middle of the range")
 Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
-_ENDINGS: Mapping[str, str] = {
-    "c": ".h",
-    "csv": ".csv",
-    "fmu": ".fmu",
-    "matlab": ".m",
-    "mujoco": ".xml",
-    "yaml": ".yaml",
-}
 
 
 @read_first
@@ -51,7 +44,7 @@ def export(
     """Write a fitted cable as another program reads it, with quantiles, and draws where some are asked for.
 
     Args:
-        found: The fit.
+        fit: The fit.
         to: The format.
         output: The file.
         points: Number of lengths or wrap angles in a table.
@@ -66,42 +59,8 @@ def export(
         DescriptionError: The device does not say what is needed.
         StoreError: The file is there already, or cannot be written.
     """
-    from bowdenfit.errors import StoreError
-    from bowdenfit.questions.export.answer import ExportedFile
-    from bowdenfit.questions.export.refusals import convert_point, refuse_inexpressible
-    from bowdenfit.questions.export.tables import tabulate_transmission
-    from bowdenfit.questions.export.words import identifier
-    from bowdenfit.questions.export.writers import WRITERS, ExportRequest
-    from bowdenfit.questions.summary.verdict import assess_fit
-    from bowdenfit.results.folder import file_to_write
-
-    path = Path(identifier(fit.name) + _ENDINGS[to] if output is None else output)
-    if path.exists() and not (force and path.is_file()):
-        raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
-    fit.draws()
-    refuse_inexpressible(fit, to, draws)
-    compensation = None if device is None else _compensation(fit, to, Path(device))
-    trust = assess_fit(fit)
-    tables = tabulate_transmission(fit, points, draws, " and ".join(trust.troubles))
-    content = WRITERS[to](
-        ExportRequest(fit, tables, path, convert_point(fit, tables.points, to, as_pair(at)), compensation)
-    )
-    with file_to_write(path) as temporary:
-        temporary.write_bytes(content.content)
-    return ExportedFile(path, to, tuple(tables.sentences), trust.trusted, content.remarks)
-
-
-def _compensation(fit: "Record", to: str, device: Path) -> dict[str, Any]:
-    from bowdenfit.questions.bends.ring_down import device_with_ring_down
-    from bowdenfit.questions.compensate.ranking import estimate_compensation
-    from bowdenfit.questions.compensate.verb import ACCEPTED
-    from bowdenfit.questions.export.compensation import compensation_parameters
-    from bowdenfit.questions.export.refusals import refuse_compensation
-
-    refuse_compensation(to)
-    return compensation_parameters(
-        estimate_compensation(fit, device_with_ring_down(fit, device), None, None, ACCEPTED)[0]
-    )
+    options = _export.ExportOptions(to, points, draws, as_pair(at), None if device is None else Path(device), force)
+    return _export.export_fit(fit, None if output is None else Path(output), options)
 
 
 def _reply(answer: "ExportedFile", _: Mapping[str, Any]) -> Reply:

@@ -1,19 +1,192 @@
-"""Which format is written by what."""
+"""Export of a fit: check what a format can express, and write it; CSV tables are built here."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
-from bowdenfit.questions.export.c import c_header
-from bowdenfit.questions.export.fmu import build_fmu
-from bowdenfit.questions.export.lookup import draws_table, lookup_table
+from bowdenfit.display import Display, Rows, csv_heading
+from bowdenfit.errors import DatasetError, StoreError, UsageError
+from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.compensate.limits import estimate_compensation, parse_risk
+from bowdenfit.questions.export.c import build_fmu, c_header
 from bowdenfit.questions.export.matlab import function_name, matlab_function
 from bowdenfit.questions.export.mujoco import mujoco_model
-from bowdenfit.questions.export.parameters import yaml_parameters
-from bowdenfit.questions.export.transmission import LEVELS, TransmissionTables
+from bowdenfit.questions.export.tables import (
+    DRAW,
+    LEVELS,
+    SUPPORTED_OPTIONS,
+    TablePoints,
+    TransmissionTables,
+    tabulate_transmission,
+)
+from bowdenfit.questions.export.text import comment, identifier
+from bowdenfit.questions.export.yaml import compensation_parameters, yaml_parameters
+from bowdenfit.questions.predict.verb import predict
+from bowdenfit.questions.summary.verdict import assess_fit
+from bowdenfit.results.folder import file_to_write
 from bowdenfit.results.record import Record
+from bowdenfit.units import conversion_factor, route_conversion_factor
+from bowdenfit.words import listed
+
+
+def lookup_table(fit: Record, tables: TransmissionTables) -> str:
+    """Efficiency with its intervals by place, as `predict` has it, and the friction exponent behind it.
+
+    Args:
+        fit: The fit.
+        tables: Its tables.
+    """
+    points = tables.points.values
+    if tables.points.unit == "rad":
+        rows = predict(fit, quantity="efficiency", wrap_angles=[(float(angle), "rad") for angle in points])
+    else:
+        rows = predict(fit, [float(x) for x in points] if tables.points.unit else None, quantity="efficiency")
+    heads = [*(name for name in rows[0] if name != "note"), *(f"friction_exponent_{x.name}" for x in tables.levels)]
+    lines = [",".join(map(csv_heading, heads))]
+    for i, row in enumerate(rows):
+        cells = [value for name, value in row.items() if name != "note"]
+        lines.append(",".join(_cell(value) for value in (*cells, *(x.exponent[0, i] for x in tables.levels))))
+    return "\n".join([comment(tables.sentences, "# "), *lines]) + "\n"
+
+
+def draws_table(tables: TransmissionTables) -> str:
+    """A row for each draw and place: friction of one cable in one mounting.
+
+    Args:
+        tables: The tables.
+    """
+    points = tables.points
+    point_heading = [] if not points.unit else [f"{points.variable}_{points.unit}"]
+    heads = ["draw", *point_heading, "friction_exponent_pull", "friction_exponent_return"]
+    heads += ["taut_loss_N"] if tables.is_loop else []
+    heads += ["load_exponent", "drag_N"] if tables.depends_on_load else []
+    heads += (
+        ["stribeck", f"stribeck_speed_{tables.speed_unit}", f"viscous_per_{tables.speed_unit}"]
+        if tables.depends_on_rate
+        else []
+    )
+    lines = [",".join(map(csv_heading, heads))]
+    for level in (level for level in tables.levels if level.name.startswith(DRAW)):
+        for i, point in enumerate(points.values):
+            cells = [level.name.removeprefix(DRAW), *([float(point)] if point_heading else []), *level.exponent[:, i]]
+            cells += [level.taut_loss[i]] if tables.is_loop else []
+            cells += [level.load_exponent, level.drag] if tables.depends_on_load else []
+            cells += level.rate if tables.depends_on_rate else ()
+            lines.append(",".join(_cell(value) for value in cells))
+    return "\n".join([comment(tables.sentences, "# "), *lines]) + "\n"
+
+
+def _cell(value: object) -> str:
+    """Numbers with all their digits, words in quotes where that must be."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(float(value)) if isinstance(value, float) else csv_heading(str(value))
+
+
+_ENDINGS: Mapping[str, str] = {
+    "c": ".h",
+    "csv": ".csv",
+    "fmu": ".fmu",
+    "matlab": ".m",
+    "mujoco": ".xml",
+    "yaml": ".yaml",
+}
+NAMES: Mapping[str, str] = MappingProxyType(
+    {"c": "a C header", "csv": "CSV", "fmu": "an FMU", "matlab": "MATLAB", "mujoco": "MuJoCo", "yaml": "YAML"}
+)
+
+
+def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
+    """Refuse a cable that a format cannot express.
+
+    Args:
+        fit: The fit.
+        to: The format.
+        draws: Number of draws asked for.
+
+    Raises:
+        UsageError: It cannot; another that can is named.
+    """
+    unsupported = [name for name in fit.model.cable.friction.options if name not in SUPPORTED_OPTIONS]
+    if unsupported and (to != "csv" or draws):
+        raise UsageError(
+            f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unsupported)}; export "
+            "the lookup table instead, with --to csv."
+        )
+
+
+def refuse_compensation(to: str) -> None:
+    """Refuse a device for a format that does not write what may be compensated.
+
+    Raises:
+        UsageError: It does not.
+    """
+    if to != "yaml":
+        raise UsageError(
+            f"--device is asked of yaml; {NAMES[to]} tells of the cable alone. Leave it out, or write --to yaml."
+        )
+
+
+def convert_point(fit: Record, points: TablePoints, to: str, at: tuple[float, str] | None) -> float | None:
+    """Where a format that holds at one place does, in the unit of the tables; None if not said.
+
+    Args:
+        fit: The fit.
+        points: Where friction is tabled.
+        to: The format.
+        at: What was said.
+
+    Raises:
+        UsageError: It has another unit, or the format holds everywhere, or friction is the same everywhere.
+    """
+    if at is None:
+        return None
+    if to != "mujoco":
+        raise UsageError(f"--at is asked of mujoco; {NAMES[to]} has tables over the whole range. Leave it out.")
+    if not points.unit:
+        raise UsageError("friction of this cable is the same everywhere; leave --at out.")
+    route = fit.dataset.description.route
+    try:
+        factor = conversion_factor(at[1], "angle") if route is None else route_conversion_factor(at[1], route.unit)
+    except DatasetError as error:
+        raise UsageError(f"--at {at[0]:g}{at[1]}: {error}.") from None
+    return at[0] * factor
+
+
+@dataclass(frozen=True, repr=False)
+class ExportedFile(Display):
+    """A file written for another program.
+
+    Args:
+        file: The file.
+        format: Its format.
+        says: What it says at its top.
+        trusted: Whether the fit may be trusted.
+        remarks: What the format does not hold, or what else was to be known.
+    """
+
+    file: Path
+    format: str
+    says: tuple[str, ...]
+    trusted: bool
+    remarks: tuple[str, ...] = ()
+
+    JSON: ClassVar = (("file", "_path"), "format", "says", "trusted", "remarks")
+
+    def _path(self) -> str:
+        return str(self.file)
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences())
+
+    def sentences(self) -> list[str]:
+        """The file, and what is to be known of it."""
+        return [f"Wrote {self.file}.", *self.remarks]
+
+    def _table(self) -> Rows:
+        return [{"file": str(self.file), "format": self.format}], {}
 
 
 @dataclass(frozen=True)
@@ -22,9 +195,9 @@ class ExportRequest:
 
     Args:
         fit: The fit.
-        found: Its tables.
+        tables: Its tables.
         path: The file.
-        place: Where a format that holds at one place does; None for the middle of the range.
+        point: Where a format that holds at one place does; None for the middle of the range.
         compensation: What may be compensated, by name; None where that was not asked.
     """
 
@@ -80,3 +253,58 @@ WRITERS: Mapping[str, Callable[[ExportRequest], FileContent]] = MappingProxyType
         "yaml": _write_yaml,
     }
 )
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of an export.
+
+    Args:
+        to: The format.
+        points: Number of positions in a table.
+        draws: Number of draws beside the quantiles.
+        at: Position of a format that holds at one; None for the middle of the range.
+        device: A device.toml, of which YAML has the limits of compensation.
+        force: Whether to replace an existing file.
+    """
+
+    to: str
+    points: int
+    draws: int
+    at: tuple[float, str] | None
+    device: Path | None
+    force: bool
+
+
+def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> ExportedFile:
+    """Write a fit in the format of another program.
+
+    Args:
+        fit: The fit.
+        output: The file; named after the cable if None.
+        options: Format and content.
+
+    Raises:
+        UsageError, DescriptionError: The format cannot express the cable, or the device does not state what is needed.
+        StoreError: The file exists already, or cannot be written.
+    """
+    to = options.to
+    path = Path(identifier(fit.name) + _ENDINGS[to]) if output is None else output
+    if path.exists() and not (options.force and path.is_file()):
+        raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
+    fit.draws()
+    refuse_inexpressible(fit, to, options.draws)
+    compensation = None if options.device is None else _estimate_parameters(fit, to, options.device)
+    trust = assess_fit(fit)
+    tables = tabulate_transmission(fit, options.points, options.draws, " and ".join(trust.troubles))
+    point = convert_point(fit, tables.points, to, options.at)
+    file = WRITERS[to](ExportRequest(fit, tables, path, point, compensation))
+    with file_to_write(path) as temporary:
+        temporary.write_bytes(file.content)
+    return ExportedFile(path, to, tuple(tables.sentences), trust.trusted, file.remarks)
+
+
+def _estimate_parameters(fit: Record, to: str, device: Path) -> dict[str, Any]:
+    refuse_compensation(to)
+    answer, _ = estimate_compensation(fit, device_with_ring_down(fit, device), None, None, parse_risk(None))
+    return compensation_parameters(answer)

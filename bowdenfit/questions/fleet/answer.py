@@ -1,12 +1,14 @@
-"""What came of a fleet: every inspection by itself; cables are compared and pooled elsewhere."""
+"""Results of a fleet, one fit per inspection, and the summary that `bowdenfit fleet` prints."""
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Rows
+from bowdenfit.display import Display, Rows, text_of
 from bowdenfit.inference.interval import Interval
+from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
 
 
 @dataclass(frozen=True)
@@ -121,3 +123,82 @@ class Fleet(Display):
             for name, interval in inspection.quantities.items()
         ]
         return rows, dict(self.units)
+
+
+_NAMED = 12  # broken or untrusted inspections that are named
+_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "sampling by gradients"}
+_HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
+
+
+@text_of.register(Fleet)
+def fleet_text(fleet: Fleet) -> str:
+    """A fleet for people: whether all went well, the range of each quantity, and what is broken."""
+    blocks = [
+        filled(status_sentence(fleet)),
+        "\n".join([*_listed("broken", [(b.inspection, b.why) for b in fleet.broken]), *_untrusted(fleet)]),
+        f"{table(_HEADS, _rows(fleet))}\n\n{filled(_how_to_read(fleet))}" if fleet.fitted else "",
+        "\n".join(filled(line) for line in _method_sentences(fleet)),
+    ]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def status_sentence(fleet: Fleet) -> str:
+    """Whether every inspection was fitted and may be trusted."""
+    total = len(fleet.fitted) + len(fleet.broken)
+    what = f"{counted(total, 'inspection')} of {counted(len(fleet.cables), 'cable')}"
+    if fleet.is_trusted:
+        return f"{fleet.name}: {what}, every one fitted, and every fit may be trusted."
+    wrong = [f"{len(fleet.broken)} could not be fitted"] if fleet.broken else []
+    wrong += [f"{len(fleet.untrusted)} must not be trusted"] if fleet.untrusted else []
+    return f"{fleet.name}: of {what} {listed(wrong)}; the others are as they would be without these."
+
+
+def _listed(what: str, named: list[tuple[str, str]]) -> list[str]:
+    """Inspections with what is wrong, and how many more."""
+    lines = [filled(f"- {label}: {' '.join(why.split())}", hangs=True) for label, why in named[:_NAMED]]
+    more = len(named) - _NAMED
+    return [*lines, f"- and {more} more {what} ones, in fleet.json."] if more > 0 else lines
+
+
+def _untrusted(fleet: Fleet) -> list[str]:
+    return _listed(
+        "untrusted",
+        [(inspection.inspection, f"not to be trusted: {inspection.reasons[0]}.") for inspection in fleet.untrusted],
+    )
+
+
+def _rows(fleet: Fleet) -> list[tuple[str, ...]]:
+    """Every quantity, under `_HEADS`."""
+    rows = []
+    for name, unit in fleet.units.items():
+        low, middle, high, sd = fleet.summarize_quantity(name)
+        digits = decimals(max(high - low, sd, abs(middle) * 1e-6))
+        shown = [f"{value:z.{digits}f}" for value in (middle, low, high)]
+        rows.append((name, "" if unit == "1" else unit, *shown, f"{sd:z.{digits}f}"))
+    return rows
+
+
+def _how_to_read(fleet: Fleet) -> str:
+    first = next(iter(fleet.units))
+    _, middle, _, sd = fleet.summarize_quantity(first)
+    return (
+        f"Middle, from and to: median, 5 % and 95 % of all inspections, each fitted by itself; a single {first} is known to "
+        f"about {give_or_take(middle, sd)}, which is in these ranges too."
+    )
+
+
+def _method_sentences(fleet: Fleet) -> list[str]:
+    """Models, engines, and what is known of the inspections."""
+    lines = []
+    if len(fleet.shapes) > 1:
+        models = listed(list(fleet.shapes))
+        lines.append(f"The descriptions or designs differ, so {len(fleet.shapes)} models were fitted: {models}.")
+    engines = listed([f"{_ENGINES.get(name, name)} ({n})" for name, n in fleet.engines.items()])
+    lines.append(f"Fitted by {engines}; seed {fleet.seed}." if fleet.fitted else f"Seed {fleet.seed}.")
+    unknown = sum(math.isnan(inspection.cycles) for inspection in fleet.fitted)
+    if unknown:
+        some = counted(unknown, "inspection")
+        lines.append(f"Of {some} nobody says after how many cycles, so nothing follows from them on wear.")
+    if len(fleet.cables) == 1:
+        lines.append("It is one cable only, so there is no population to compare it with.")
+    return lines

@@ -1,26 +1,37 @@
-"""From the data sets of a fleet to its draws and its answer: pieces of work by shape, and what they give in order."""
+"""Divide a fleet into pieces of work of one model each, and gather the fits into the answer and its draws."""
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+import secrets
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
+from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.description import SamplerSettings
-from bowdenfit.errors import StoreError
-from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit
+from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit, fit_piece
 from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
 from bowdenfit.inference.draws import derived_units
-from bowdenfit.inference.engines import versions
+from bowdenfit.inference.engines import JOBS_FOLDER, Engine, open_engine, versions
 from bowdenfit.inference.interval import Interval
+from bowdenfit.inference.resources import keep_compiled_programs
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.fleet.answer import FailedInspection, FittedInspection, Fleet
-from bowdenfit.questions.fleet.cases import Case
-from bowdenfit.questions.fleet.store import SEPARATOR
-from bowdenfit.results.fleet_folder import FleetDraws
-from bowdenfit.words import counted
+from bowdenfit.questions.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
+from bowdenfit.questions.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
+from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
+from bowdenfit.reading import Reading
+from bowdenfit.results.answer_cache import file_checksum
+from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
+from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically, write_text
+from bowdenfit.results.serialization import plain_data
+from bowdenfit.words import counted, printable
 
 # Standard deviations to a twentieth: a tenth is then hardly ever exceeded by more than half as much.
 SETTINGS = BatchSettings(
@@ -40,7 +51,7 @@ def divide_into_pieces(
         seed: Of the fleet.
         settings: How carefully.
         workers: At a time.
-        most: Data sets of a piece.
+        largest: Data sets of a piece.
     """
     pieces = list[Piece]()
     for key, members in _group_by_shape(cases).items():
@@ -179,3 +190,108 @@ def _collect_draws(
     about["meanings"] = meanings
     about["quantities"] = {key: list(shape_quantities) for key, shape_quantities in quantities.items()}
     return FleetDraws(labels, cables, cycles, temperature, lubricated, values, stats, attributes, about)
+
+
+@dataclass(frozen=True)
+class FleetOptions:
+    """How a fleet is fitted and where its results go.
+
+    Args:
+        results: Results folder; None to write nothing.
+        engine: Name of an engine, or an executor.
+        workers: Number of processes or jobs; None for the default of the engine.
+        seed: Seed of everything random; None for that of the fleet to resume, or a new one.
+        resume: Whether to continue an interrupted fleet.
+        force: Whether to replace an earlier fleet.
+    """
+
+    results: Path | None
+    engine: str | Executor
+    workers: int | None
+    seed: int | None
+    resume: bool
+    force: bool
+
+
+def fit_fleet(
+    folder: Path,
+    inspections: list[Inspection],
+    reading: Reading,
+    options: FleetOptions,
+    report: Callable[[int, int, float], None] | None,
+) -> Fleet:
+    """Fit all inspections of a fleet, and write the results.
+
+    Args:
+        folder: Folder of the measurements.
+        inspections: Its inspections.
+        reading: Keywords of `bowdenfit.read`.
+        options: How, and where to.
+        report: Called after every piece with inspections done, their total, and seconds per inspection.
+    """
+    place = options.results
+    store, seed = _open_store(place, options.seed, options.resume)
+    keep_compiled_programs()
+    with jax.enable_x64(True):
+        cases, broken = _read_all(folder, inspections, reading)
+        jobs = place and place / JOBS_FOLDER
+        with open_engine(options.engine, options.workers, jobs, options.workers or 1) as opened:
+            fits = store.open(options.resume, options.force) if store else {}
+            _fit_pieces(opened, cases, seed, store, fits, report)
+        answer, draws = gather_results(folder.resolve().name, cases, fits, broken, seed)
+    if store is not None:
+        _write_results(answer, draws, store)
+    return answer
+
+
+def _read_all(
+    folder: Path, inspections: list[Inspection], reading: Reading
+) -> tuple[list[Case], list[FailedInspection]]:
+    """Read all data sets, and collect those that cannot be read or used."""
+    cases_and_failures = list(read_cases(folder, inspections, reading))
+    broken = [case for case in cases_and_failures if isinstance(case, FailedInspection)]
+    cases = [case for case in cases_and_failures if not isinstance(case, FailedInspection)]
+    refuse_if_none_usable(cases, broken)
+    return cases, broken
+
+
+def _open_store(place: Path | None, seed: int | None, resume: bool) -> tuple[FleetStore | None, int]:
+    """Return the results folder and the seed: the stated one, that of the fleet to resume, or a new one."""
+    if resume and place is None:
+        raise UsageError("--resume needs the results folder of a fleet; name it with --output.")
+    if seed is None:
+        seed = int(read_start(place)["seed"]) if resume and place is not None else secrets.randbelow(LARGEST_SEED)
+    return (None if place is None else FleetStore(place, {"seed": seed, "versions": versions()})), seed
+
+
+def _fit_pieces(
+    opened: Engine[Any, list[PieceFit]],
+    cases: list[Case],
+    seed: int,
+    store: FleetStore | None,
+    fits: dict[str, PieceFit],
+    report: Callable[[int, int, float], None] | None,
+) -> None:
+    """Fit the remaining cases, and save each piece when it is done."""
+    todo = [case for case in cases if case.hash not in fits]
+    begin, before, total = time.monotonic(), len(cases) - len(todo), len(cases)
+    done = before
+    pieces = divide_into_pieces(todo, seed, SETTINGS, opened.workers, opened.max_datasets)
+    for piece_fits in opened.results(fit_piece, pieces):
+        if store is not None:
+            store.keep(piece_fits)
+        fits |= {fit.name: fit for fit in piece_fits}
+        done += len(piece_fits)
+        if report is not None:
+            report(done, total, (time.monotonic() - begin) / (done - before))
+
+
+def _write_results(answer: Fleet, draws: FleetDraws | None, store: FleetStore) -> None:
+    """Write draws, summary and, last, fleet.json, all of them or none; then remove the saved pieces."""
+    with fill_folder_atomically(store.folder, FLEET_PAGE) as folder:
+        if draws is not None:
+            write_fleet_draws(folder / FLEET_DRAWS, draws)
+        write_text(folder / SUMMARY_TEXT, printable(fleet_text(answer)))
+        page = plain_data(answer) | {CHECKSUM: file_checksum(folder / FLEET_DRAWS)}
+        write_text(folder / FLEET_PAGE, json.dumps(page, indent=1) + "\n")
+    store.finish()

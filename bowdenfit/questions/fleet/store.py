@@ -1,4 +1,4 @@
-"""The results folder of a fleet: what is fitted is kept as soon as it is there, each piece in a file of its own."""
+"""Results folder of a fleet: every finished piece of work is saved at once, so that an interrupted fleet can be resumed."""
 
 import hashlib
 import json
@@ -40,7 +40,7 @@ class FleetStore:
 
     Args:
         folder: The folder.
-        begun: What must not change between an interrupted fleet and its continuation.
+        start: What must not change between an interrupted fleet and its continuation.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""What a fleet says when its cables are looked at together."""
+"""Results of pooling a fleet: its cables, the population, wear, life and the next inspections."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -48,19 +48,19 @@ class PooledCable(Part):
     """A cable, drawn toward the population as far as its data allow, or by its own inspections alone if it is unlike the rest.
 
     Args:
-        cable: Its name.
-        inspections: How many it has.
-        last: Cycles at the last of them; NaN where nobody says.
-        coefficients: When new, dry and at the reference temperature, by name.
-        alone: The same from its own inspections, without the population; None where they cannot tell.
-        wear: Growth of friction in the reference cycles as a share; None where wear is not told.
-        life: See `Life`; None where it is not asked for.
-        chance: Probability that a cable of this population is as far from the others; in how many fleets one is.
-        unlike: How it differs from the rest, in words; empty if it does not.
-        pooled: Names of what the population was looked at for: all that a cable like the rest has, and of one that is unlike
-            them none but "wear", and that only where its own inspections do not tell it.
-        worth: Effective number of its draws by themselves, of the inspection where what is said of it agrees with them least.
-        measured: How many of its inspections were pooled by their readings, because that number is too small.
+        cable: Name of the cable.
+        inspections: Number of its inspections.
+        last: Cycles at the last of them; NaN if unknown.
+        coefficients: Coefficients when new, dry and at the reference temperature, by name.
+        unpooled: The same from its own inspections alone, without the population; None where these do not identify them.
+        wear: Growth of friction in the reference cycles as a share; None where wear is not identifiable.
+        life: Its life; None unless a limit was given.
+        p_value: Probability that some cable of such a fleet is as far from the others; Holm-adjusted.
+        departure: How it differs from the other cables, in words; empty if it does not.
+        pooled: Names of what is shrunk toward the population: everything of an ordinary cable; of an outlier at most "wear",
+            and only where its own inspections do not identify it.
+        n_effective: Effective number of its draws under the pooled posterior, at its worst inspection (importance sampling).
+        n_from_readings: Number of its inspections of which the readings were refitted, because `n_effective` was too small.
     """
 
     cable: str
@@ -167,11 +167,11 @@ class Pool(Display):
         effects: Of what else was told.
         reference_cycles: Cycles that wear is stated for: the longest inspected.
         reference_temperature: Temperature that coefficients are stated for [°C].
-        asked: What life is until; None where it is not asked for.
-        new: Life of a new cable of this population; None where there is none.
-        mixed: Coefficients of which cables do not look like one population, with the probability of that by chance.
+        limit: What life is until; None where it is not asked for.
+        new_cable: Life of a new cable of this population; None where there is none.
+        mixtures: Coefficients of which cables do not look like one population, with the probability of that by chance.
         curves: What is drawn over cycles; None where wear cannot be told.
-        next: The inspections that tell most, the best first.
+        next_inspections: The inspections that tell most, the best first.
         notes: What is not told and why, and what was taken for granted, a sentence each.
         reasons: Why the answer should not be trusted; empty if it may.
         seed: Of everything random.

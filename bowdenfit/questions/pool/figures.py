@@ -1,7 +1,9 @@
-"""A pooled fleet in figures: coefficients of its cables drawn toward the population, wear, and how many have failed."""
+"""Figures of a pooled fleet: coefficients of its cables, wear, and the probability of having failed."""
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +32,12 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.plots.write import write_all
+from bowdenfit.questions.pool.words import HEADINGS, pool_page, pool_text
+from bowdenfit.questions.writing import write_page
+from bowdenfit.results.folder import fill_folder_atomically, write_text
+from bowdenfit.results.serialization import plain_data
+from bowdenfit.words import printable
 
 if TYPE_CHECKING:
     from bowdenfit.inference.interval import Interval
@@ -38,18 +46,13 @@ if TYPE_CHECKING:
 
 MOST_CABLES, LONGEST_NAME, MOST_COEFFICIENTS = 60, 18, 2
 _ROW, _BELOW, _HEIGHT = 0.115, 0.45, 2.3  # in
-HEADINGS = {
-    "pooled-coefficients": "Cables drawn toward the others",
-    "pooled-wear": "Wear",
-    "pooled-life": "How many have failed",
-}
 
 
 def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
     """All figures of a pooled fleet, by name.
 
     Args:
-        found: The pooled fleet.
+        pool: The pooled fleet.
         width: Of the page [in]; what suits each if omitted.
     """
     figures = {"pooled-coefficients": draw_coefficients(pool, width)}
@@ -58,28 +61,6 @@ def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
         if pool.curves.fails is not None and pool.curves.new_fails is not None:
             figures["pooled-life"] = draw_life(pool, pool.curves, pool.curves.fails, pool.curves.new_fails, width)
     return figures
-
-
-def captions(pool: Pool) -> dict[str, str]:
-    """What each figure shows, in plain words."""
-    limit = pool.limit
-    what = f"efficiency falls below {100 * limit.efficiency:g} %" if limit is not None else ""
-    return {
-        "pooled-coefficients": (
-            "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
-            "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
-            f"{len(pool.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
-        ),
-        "pooled-wear": (
-            f"{'Efficiency' if limit else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
-            f"with 90 % interval), dry and at {pool.reference_temperature:g} °C. n = {len(pool.cables)} cables, inspected up "
-            "to the dotted line; beyond it wear is taken to go on as it did."
-        ),
-        "pooled-life": (
-            f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
-            f"{len(pool.cables)} cables."
-        ),
-    }
 
 
 @in_paper_style
@@ -211,3 +192,19 @@ def _add_title(figure: Figure, name: str, pool: Pool) -> Figure:
 
 def _median(interval: Interval | None) -> float:
     return interval.median if interval is not None else 0.0
+
+
+def write_pool(pool: Pool, folder: Path, name: str) -> None:
+    """Write figures, page, text and, last, JSON, all of them or none: a folder with the JSON has everything.
+
+    Args:
+        pool: The pooled fleet.
+        folder: Where to.
+        name: Of the files.
+    """
+    with fill_folder_atomically(folder, f"{name}.json") as place:
+        for figure_name, figure in draw_figures(pool).items():
+            write_all(figure, place, figure_name)
+        write_page(pool_page(pool), place, place / f"{name}.html")
+        write_text(place / f"{name}.txt", printable(pool_text(pool)))
+        write_text(place / f"{name}.json", json.dumps(plain_data(pool), indent=1, allow_nan=False) + "\n")

@@ -1,22 +1,36 @@
-"""A fleet's cables looked at together: from draws of single fits to the answer."""
+"""Pool the cables of a fleet: from the draws of single fits to the answer."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import jax
 import numpy as np
 
+import bowdenfit.questions.pool.words  # noqa: F401  registers the text of the answer
+from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws, draw_population, draw_unpooled
+from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable, ServiceLimit
-from bowdenfit.questions.pool.curves import compute_curves
-from bowdenfit.questions.pool.inspected import PoolingData, select_inspections
-from bowdenfit.questions.pool.life import cycles_to_failure, summarize_life
-from bowdenfit.questions.pool.next import rank_next_inspections
-from bowdenfit.questions.pool.unlike import FALSE_ALARM, find_departure, find_mixtures, separate_outliers
-from bowdenfit.questions.pool.worth import LEAST_EFFECTIVE_DRAWS, count_effective_draws, load_readings
-from bowdenfit.results.fleet_folder import FleetDraws
+from bowdenfit.questions.pool.lifetime import (
+    compute_curves,
+    cycles_to_failure,
+    parse_service_limit,
+    rank_next_inspections,
+    summarize_life,
+)
+from bowdenfit.questions.pool.outlier_cables import FALSE_ALARM, find_departure, find_mixtures, separate_outliers
+from bowdenfit.questions.pool.pooled_data import (
+    LEAST_EFFECTIVE_DRAWS,
+    PoolingData,
+    count_effective_draws,
+    load_readings,
+    select_inspections,
+)
+from bowdenfit.results.fleet_folder import FleetDraws, read_fleet_draws
 from bowdenfit.words import few
 
 _NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
@@ -28,13 +42,13 @@ class _PooledDraws:
     """What a look at all cables gave.
 
     Args:
-        every: The population of all cables.
-        shown: The population without cables that are unlike the rest, and these by their own inspections alone.
-        chance: Probability that a cable of this population is as far from the others, (cable,).
-        unlike: How it differs from the rest by the number of each that does, in words.
-        told: Those of them whose own inspections tell their wear.
-        worth: How much single fits know of each inspection where it is said to be, (inspection,).
-        rows: Inspections of which the readings were looked at.
+        full_population: The population of all cables.
+        population: The population without cables that are unlike the rest, and these by their own inspections alone.
+        p_values: Probability that a cable of this population is as far from the others, (cable,).
+        departures: How it differs from the rest by the number of each that does, in words.
+        wear_identified: Those of them whose own inspections tell their wear.
+        n_effective: How much single fits know of each inspection where it is said to be, (inspection,).
+        reread: Inspections of which the readings were looked at.
     """
 
     full_population: PopulationDraws
@@ -46,12 +60,38 @@ class _PooledDraws:
     reread: tuple[int, ...]
 
 
+def pool_results(
+    results: Path,
+    until: NumberWithUnit | None,
+    wrap_angles: Sequence[str],
+    cycles: int | None,
+    measurements: Path | None,
+    seed: int | None,
+) -> Pool:
+    """Read the results of a fleet, and pool its cables.
+
+    Args:
+        results: Results folder of the fleet.
+        until: Efficiency until which a cable serves; None if its life is not wanted.
+        wrap_angles: Options such as mu_sheath=180deg, one for each coefficient.
+        cycles: Number of cycles before which the probability of failure is wanted.
+        measurements: Folder of the fleet's measurements.
+        seed: Seed of everything random; that of the fleet if None.
+    """
+    draws = read_fleet_draws(results)
+    if measurements is not None:
+        read_inspections(measurements)  # refuses a wrong folder before anything is drawn
+    coefficients = [name for name, about in draws.attributes.items() if about.get("role") == "friction"]
+    limit = parse_service_limit(until, wrap_angles, cycles, coefficients)
+    return pool_cables(draws, limit, int(draws.about.get("seed", 0)) if seed is None else seed, measurements)
+
+
 def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measurements: Path | None = None) -> Pool:
     """The answer.
 
     Args:
-        drawn: Draws of all inspections.
-        asked: What life is until; None where it is not asked for.
+        fleet: Draws of all inspections.
+        limit: What life is until; None where it is not asked for.
         seed: Of everything random.
         measurements: Folder of the fleet's measurements, for inspections of which single fits tell too little.
 
@@ -59,6 +99,11 @@ def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measur
         StoreError: Nothing can be pooled, or the measurements are others.
         DatasetError, DescriptionError, UsageError: There are no such measurements.
     """
+    with jax.enable_x64(True):
+        return _pool_cables(fleet, limit, seed, measurements)
+
+
+def _pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measurements: Path | None) -> Pool:
     data = select_inspections(fleet)
     result = _draw_with_readings(data, seed, measurements)
     population = result.population

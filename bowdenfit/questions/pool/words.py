@@ -1,12 +1,18 @@
-"""What `bowdenfit pool` prints."""
+"""Texts, captions and page of a pooled fleet: what `bowdenfit pool` prints and writes."""
 
 import math
 
 from bowdenfit.display import text_of
 from bowdenfit.inference.interval import Interval
+from bowdenfit.pages.section import HtmlPage, PageTable, Picture, prose_section
 from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable
 from bowdenfit.words import counted, decimals, few, filled, listed, percent, table
 
+HEADINGS = {
+    "pooled-coefficients": "Cables drawn toward the others",
+    "pooled-wear": "Wear",
+    "pooled-life": "How many have failed",
+}
 _NAMED, _SHOWN = 5, 12  # unlike cables, and cables in the table
 _SURE = 0.999
 _INDISTINGUISHABLE = 0.1  # 5 % of a spread over its 95 %, below which it cannot be told from none
@@ -277,3 +283,58 @@ def _probability(p: float | None) -> str:
 
 def _count_cables(pool: Pool) -> str:
     return counted(len(pool.cables), "cable")
+
+
+def captions(pool: Pool) -> dict[str, str]:
+    """What each figure shows, in plain words."""
+    limit = pool.limit
+    what = f"efficiency falls below {100 * limit.efficiency:g} %" if limit is not None else ""
+    return {
+        "pooled-coefficients": (
+            "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
+            "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
+            f"{len(pool.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
+        ),
+        "pooled-wear": (
+            f"{'Efficiency' if limit else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
+            f"with 90 % interval), dry and at {pool.reference_temperature:g} °C. n = {len(pool.cables)} cables, inspected up "
+            "to the dotted line; beyond it wear is taken to go on as it did."
+        ),
+        "pooled-life": (
+            f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
+            f"{len(pool.cables)} cables."
+        ),
+    }
+
+
+def pool_page(pool: Pool) -> HtmlPage:
+    """The page of a pooled fleet.
+
+    Args:
+        pool: The pooled fleet.
+    """
+    texts = captions(pool)
+    pictures = {name: Picture(name, heading, texts[name]) for name, heading in HEADINGS.items()}
+    heads, rows = population_rows(pool)
+    cable_heads, cables = cable_rows(pool)
+    left_out = [f"{inspection.inspection}: {inspection.why}." for inspection in pool.left_out]
+    sections = (
+        prose_section(
+            "The answer",
+            [*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool), *next_sentences(pool)],
+            headline=headline(pool),
+            pictures=(pictures["pooled-life"], pictures["pooled-wear"]),
+        ),
+        prose_section("What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [PageTable(heads, tuple(rows))]),
+        prose_section(
+            "Every cable",
+            [
+                "Drawn toward the others as far as its own inspections leave it open, or by its own inspections alone if it is "
+                "unlike the rest; median ± standard deviation."
+            ],
+            [PageTable(cable_heads, tuple(cables))],
+            pictures=(pictures["pooled-coefficients"],),
+        ),
+        prose_section("What is not told", pool.notes or ["Everything that was measured is pooled."], items=left_out),
+    )
+    return HtmlPage(pool.name or "Fleet", f"Pooled by bowdenfit; seed {pool.seed}", sections)

@@ -13,7 +13,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.groups.words import groups_text
+from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE

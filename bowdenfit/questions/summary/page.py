@@ -15,7 +15,7 @@ from bowdenfit.kinds.recordings.kind import preparation_pages
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.groups.answer import contrast_groups
+from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss.answer import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force

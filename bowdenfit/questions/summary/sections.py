@@ -6,7 +6,7 @@ from bowdenfit.kinds import each_table
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import describe_checks
-from bowdenfit.questions.groups.words import groups_text
+from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.next.next_section import TITLE
 from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
 from bowdenfit.questions.summary.brief import READING_HEADS, format_reading, say_no_outliers

@@ -1,12 +1,14 @@
-"""What a hand feels through a cable, and which walls it may touch."""
+"""Results and text of `bowdenfit teleoperate`: torque in free motion, stiffness in contact, and which walls are stable."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows
+from bowdenfit.display import Display, Part, Rows, text_of
 from bowdenfit.inference.interval import Interval
+from bowdenfit.words import filled, percent, significant, table
 
 
 @dataclass(frozen=True, repr=False)
@@ -15,9 +17,9 @@ class CouplingScheme(Part):
 
     Args:
         name: In words.
-        free: What is felt in slow free motion, where the cable's friction is most [N m].
+        free_torque: What is felt in slow free motion, where the cable's friction is most [N m].
         stiffness: What is felt of the stated wall [N m/rad]; None where no position comes back, so that none is defined.
-        in_the_open: Probability that it is stable in free motion.
+        free_motion_stable: Probability that it is stable in free motion.
         stable: Probability that contact is stable, by wall stiffness.
         hardest: Hardest wall up to which every softer one is stable with the probability asked for [N m/rad]; 0 where free
             motion is not, None where no wall looked at is too hard.
@@ -103,3 +105,104 @@ class Teleoperation(Display):
             for i, wall in enumerate(self.walls)
         ]
         return rows, {"wall_stiffness": "N*m/rad"}
+
+
+@text_of.register(Teleoperation)
+def teleoperation_text(answer: Teleoperation) -> str:
+    """The answer for people, the answer first, in at most 25 lines."""
+    lines = "\n".join(filled(line) for line in sentences(answer))
+    return f"{lines}\n\n{_scheme_table(answer)}\n"
+
+
+def sentences(answer: Teleoperation) -> list[str]:
+    """What is felt, whether the wall is stable, and what other couplings would do."""
+    return [
+        sentence
+        for sentence in (
+            *_wall_sentences(answer),
+            *_transmission_sentences(answer),
+            *_instability_sentences(answer),
+            *_simulation_sentences(answer),
+        )
+        if sentence
+    ]
+
+
+def _range(answer: Teleoperation) -> str:
+    low, high = (f"{angle:.4g}" for angle in answer.bends)
+    return f"bent to {low} deg" if low == high else f"bent from {low} to {high} deg"
+
+
+def _wall_sentences(answer: Teleoperation) -> Iterator[str]:
+    hardest, sure = answer.stated.hardest, percent(answer.probability, 0)
+    at = f"one of {answer.wall:.4g} N*m/rad with {percent(answer.at_wall, 0)}"
+    if hardest is None:
+        yield (
+            f"Through this cable a hand feels walls of up to {answer.walls[-1]:.0f} N*m/rad, the hardest looked at, without "
+            f"bouncing with at least {sure} probability, {_range(answer)}; {at}."
+        )
+    elif hardest <= 0:
+        yield f"Through this cable a hand feels no wall without bouncing with {sure} probability, {_range(answer)}; {at}."
+    else:
+        yield (
+            f"Through this cable a hand feels walls of up to {significant(hardest)} N*m/rad without bouncing with at least "
+            f"{sure} probability, {_range(answer)}; {at}."
+        )
+
+
+def _transmission_sentences(answer: Teleoperation) -> Iterator[str]:
+    stated = answer.stated
+    torque = stated.free_torque
+    free = f"{torque.median:.3f} N*m in slow free motion (90 % interval {torque.q05:.3f} to {torque.q95:.3f})"
+    if stated.stiffness is None:
+        yield f"The hand feels {free}."
+        return
+    stiffness = stated.stiffness
+    yield (
+        f"The hand feels {free}, and of the wall {significant(stiffness.median)} N*m/rad "
+        f"({significant(stiffness.q05)} to {significant(stiffness.q95)}) while both sides of the loop are taut. "
+        "Walls are judged as if there were no dry friction, which only calms."
+    )
+
+
+def _instability_sentences(answer: Teleoperation) -> Iterator[str]:
+    """Couplings that oscillate without any wall."""
+    for scheme in answer.schemes:
+        if scheme.free_motion_stable < answer.probability:
+            yield (
+                f"Caution, {scheme.name}: it oscillates in free motion already, with "
+                f"{percent(1 - scheme.free_motion_stable, 0)} probability; from sample to sample "
+                f"oscillations grow by a factor of {scheme.radius:.4g} (median), and only up to 1 is stable. "
+                "Lower the stiffnesses of the coupling, or sample faster."
+            )
+
+
+def _simulation_sentences(answer: Teleoperation) -> Iterator[str]:
+    contact = answer.contact
+    if contact.bounces is None:
+        yield "Simulated with median numbers the slave never reaches the wall: friction holds it."
+    else:
+        does = "still bounces" if contact.bounces else "does not bounce"
+        yield f"Simulated with median numbers it {does} 1.2 s after it touched a wall of {contact.wall_stiffness:.4g} N*m/rad."
+
+
+def _scheme_table(answer: Teleoperation) -> str:
+    rows = [
+        [scheme.name, f"{scheme.free_torque.median:.3f}", _format_stiffness(scheme), _format_hardest(answer, scheme)]
+        for scheme in answer.schemes
+    ]
+    return table(["coupling", "free (N*m)", "wall felt (N*m/rad)", "hardest wall (N*m/rad)"], rows)
+
+
+def _format_stiffness(scheme: CouplingScheme) -> str:
+    return "-" if scheme.stiffness is None else significant(scheme.stiffness.median)
+
+
+def _format_hardest(answer: Teleoperation, scheme: CouplingScheme) -> str:
+    return (
+        f"over {answer.walls[-1]:.0f}"
+        if scheme.hardest is None
+        else "none"
+        if scheme.hardest <= 0
+        else significant(scheme.hardest)
+    )

@@ -1,25 +1,124 @@
-"""From the draws of a fit and what is said of master and slave to what is felt, and which walls are stable."""
+"""Transmitted torque and stiffness, and stability of contact, over draws; one contact simulated at their medians."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.description.device import ENCODER, Device, asked_for
-from bowdenfit.device.coupling import (
+from bowdenfit.description.device import ENCODER, Device, Known, asked_for
+from bowdenfit.device.draws import draw_device
+from bowdenfit.device.motion import Hand
+from bowdenfit.device.plant import LoopTransmission, Plant
+from bowdenfit.device.teleoperation import (
     CouplingGains,
+    MasterController,
     MasterSlave,
+    Slave,
     free_motion_torque,
     is_stable,
+    simulate_teleoperation,
     spectral_radius_in_contact,
     transmitted_stiffness,
 )
-from bowdenfit.device.known import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
-from bowdenfit.questions.teleoperate.answer import CouplingScheme, Teleoperation
-from bowdenfit.questions.teleoperate.contact import simulate_contact
+from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.teleoperate.answer import CouplingScheme, SimulatedContact, Teleoperation
 from bowdenfit.results.record import Record
+
+FREE_SECONDS, SECONDS = 2.0, 4.5  # s in the open, and in all
+SWING = 0.15  # rad, half of the way in the open
+WALL, PUSHED = 0.1, 0.5  # rad: where the wall is, and how far the hand wants to go
+_PERIOD, _PUSHING, SETTLED = 1.0, 1.0, 1.2  # s: of the swing, until the hand is there, from the first touch on
+_TRACE_STEP = 4  # every so many samples are kept
+_LEAST_PRELOAD = 1e-6  # N m
+
+
+def simulate_contact(
+    device: Device, loop: LoopDraws, stated: Mapping[str, Known], gains: CouplingGains, delay: int, bend: int
+) -> SimulatedContact:
+    """Master and slave of median numbers.
+
+    Args:
+        device: The device.
+        loop: Draws of the cable, with its stiffness.
+        stated: Quantities of the device.
+        gains: What is sent.
+        delay: Samples that it is late by.
+        bend: Number of the wrap angle.
+    """
+    assert loop.stiffness is not None
+    values = {key: known.value for key, known in stated.items()}
+    stiffness, preload, exponent = (
+        float(np.median(part[:, bend])) for part in (loop.stiffness, loop.preload, loop.exponent)
+    )
+    plant = Plant(
+        LoopTransmission(stiffness, max(preload, _LEAST_PRELOAD), exponent),
+        values["motor.inertia"],
+        values["motor.damping"],
+        values["motor.friction"],
+        values["joint.inertia"] + values["hand.inertia"],
+        values["joint.damping"],
+        values["rope.damping"],
+    )
+    slave = Slave(
+        values["slave.inertia"],
+        values["slave.damping"],
+        values["slave.friction"],
+        values["slave.largest_torque"],
+        WALL,
+        values["wall.stiffness"],
+        values["wall.damping"],
+    )
+    controller = MasterController(device.count, values["controller.filter_time"], values["motor.largest_torque"])
+    sample = values["controller.sample_time"]
+    runs = simulate_teleoperation(
+        plant,
+        Hand(values["hand.stiffness"], values["hand.damping"]),
+        slave,
+        controller,
+        gains,
+        hand_path(sample),
+        delay=delay,
+        sample=sample,
+    )
+    kept = slice(None, None, _TRACE_STEP)
+    return SimulatedContact(
+        runs.time[kept],
+        runs.joint[kept],
+        runs.slave[kept],
+        runs.hand_torque[kept],
+        runs.wall_torque[kept],
+        values["wall.stiffness"],
+        detect_bouncing(runs.time, runs.wall_torque),
+    )
+
+
+def hand_path(sample: float) -> np.ndarray:
+    """Where the hand wants to be: to and fro in the open, then into the wall; angle [rad] and speed [rad/s] at every sample."""
+    time = np.arange(round(SECONDS / sample)) * sample
+    frequency, speed = 2 * np.pi / _PERIOD, PUSHED / _PUSHING
+    pushed_angle = np.clip(speed * (time - FREE_SECONDS), 0.0, PUSHED)
+    angle = np.where(time < FREE_SECONDS, SWING * (np.cos(frequency * time) - 1), pushed_angle)
+    target_speed = np.where(
+        time < FREE_SECONDS, -SWING * frequency * np.sin(frequency * time), np.where(pushed_angle < PUSHED, speed, 0.0)
+    )
+    return np.stack([angle, target_speed], axis=1)
+
+
+def detect_bouncing(time: np.ndarray, wall_torque: np.ndarray) -> bool | None:
+    """Whether the slave leaves the wall again once it should have settled; None where it never came.
+
+    Args:
+        time: [s].
+        wall_torque: T_e [N m].
+    """
+    contact = np.flatnonzero((wall_torque > 0) & (time > FREE_SECONDS))
+    if not len(contact):
+        return None
+    return bool(np.any(wall_torque[time > time[contact[0]] + SETTLED] == 0))
+
 
 DRAWS = 150
 WALLS = np.geomspace(1.0, 3000.0, 13)  # N m/rad
@@ -63,18 +162,19 @@ Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
 Draws = Mapping[str, np.ndarray]
 
 
-def assess_teleoperation(fit: Record, device: Device, bends: Bends, probability: float) -> Teleoperation:
+def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: float) -> Teleoperation:
     """The answer.
 
     Args:
         fit: The fit.
-        device: Master, slave, hand, wall and what is sent.
+        path: A device.toml that describes master, slave, hand, wall and coupling.
         bends: Range of wrap angles.
         probability: With which contact must be stable.
 
     Raises:
         UsageError, DescriptionError: The fit does not tell it, or something that it needs is not stated.
     """
+    device = device_with_ring_down(fit, path)
     angles = range_of_bends(fit, bends)
     loop = loop_draws(fit, angles, device, np.ones(1))
     _refuse_missing(device, loop)

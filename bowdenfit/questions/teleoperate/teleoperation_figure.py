@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, VERMILLION, in_paper_style
-from bowdenfit.questions.teleoperate.contact import FREE_SECONDS
+from bowdenfit.questions.teleoperate.stability import FREE_SECONDS
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, read_first
+from bowdenfit.questions import teleoperate as _teleoperate
 from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -29,7 +30,7 @@ def teleoperate(
     """What a hand feels through a loop of a slave and its wall, and which walls are touched without bouncing.
 
     Args:
-        found: The fit.
+        fit: The fit.
         device: A device.toml that describes master, slave, hand, wall, and what is sent between them.
         wrap_angle: Range of wrap angles that the cable is bent to.
         output: Folder for teleoperation.json, the text and the figure.
@@ -39,22 +40,17 @@ def teleoperate(
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
         StoreError: `output` cannot be written.
     """
-    from bowdenfit.questions.bends.ring_down import device_with_ring_down
-    from bowdenfit.questions.teleoperate import teleoperation_figure
-    from bowdenfit.questions.teleoperate.stability import assess_teleoperation
-    from bowdenfit.questions.teleoperate.words import teleoperation_text
-
-    answer = assess_teleoperation(fit, device_with_ring_down(fit, Path(device)), wrap_angle, PROBABILITY)
+    answer = _teleoperate.assess_teleoperation(fit, Path(device), wrap_angle, PROBABILITY)
     if output is not None:
-        write_answer(output, NAME, answer, teleoperation_text(answer), {NAME: teleoperation_figure}, fit.name)
+        text = _teleoperate.teleoperation_text(answer)
+        write_answer(output, NAME, answer, text, {NAME: _teleoperate.teleoperation_figure}, fit.name)
     return answer
 
 
 def _reply(answer: "Teleoperation", options: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.teleoperate.words import teleoperation_text
 
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
-    return Reply(teleoperation_text(answer), lambda: answer, notes, csv=answer.to_csv)
+    return Reply(_teleoperate.teleoperation_text(answer), lambda: answer, notes, csv=answer.to_csv)
 
 
 VERB = Verb(

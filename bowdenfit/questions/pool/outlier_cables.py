@@ -48,7 +48,7 @@ def find_distant_cables(inspected: Inspections, draws: PopulationDraws) -> tuple
 
     Args:
         inspected: What is known.
-        drawn: Of the population.
+        draws: Of the population.
     """
     if inspected.cables < _FEWEST_TO_LEAVE_OUT:
         return ()
@@ -72,7 +72,7 @@ def separate_outliers(
 
     Args:
         inspected: What is known.
-        drawn: The population of all.
+        population: The population of all.
         draw: Draws the population without some cables.
         seed: Of everything random.
     """
@@ -114,7 +114,7 @@ def outlier_p_values(
 
     Args:
         inspected: What is known.
-        drawn: Of the population.
+        draws: Of the population.
         seed: Of everything random.
         without: Cables that the population was drawn without.
     """
@@ -241,7 +241,7 @@ def find_mixtures(
 
     Args:
         inspected: What is known.
-        drawn: Of the population.
+        draws: Of the population.
         names: Of the numbers of a cable.
         without: Cables that are said to be unlike the rest, of which the population has none.
     """

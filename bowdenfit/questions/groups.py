@@ -11,7 +11,7 @@ from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.record import Record, cached_per_fit
-from bowdenfit.words import decimals
+from bowdenfit.words import decimals, filled, listed
 
 _ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with the first
 _SURE = 0.999  # beyond which draws are too few to say more
@@ -131,3 +131,19 @@ def _draws(fit: Record, name: str) -> np.ndarray | float:
     """Draws of a coefficient, or what it is fixed at."""
     values = fit.draws().values
     return values[name] if name in values else next(p.fixed or 0.0 for p in fit.model.space.fixed if p.name == name)
+
+
+def groups_text(fit: Record) -> str:
+    """The contrasts of a fit, a line each; empty without groups or draws."""
+    groups = contrast_groups(fit)
+    if groups is None:
+        return ""
+    several = len({c.coefficient for c in groups.contrasts}) > 1
+    lines = [f"  {f'{c.coefficient}, ' if several else ''}{c.sentence()}" for c in groups.contrasts]
+    what = listed(list(dict.fromkeys(c.coefficient for c in groups.contrasts)))
+    note = (
+        "The probability is that of the sign, which is 0.5 where nothing is known. "
+        f"Efficiencies{' and the best length' if fit.dataset.description.route else ''} that name no group are of the group "
+        f"{groups.predicted}; --set group=NAME asks for another."
+    )
+    return "\n".join([f"Friction of the groups, {what}", *lines, filled(note)])

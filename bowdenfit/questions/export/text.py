@@ -1,4 +1,4 @@
-"""Names of people in files of programs: whatever they hold, they stay text."""
+"""Text that is safe inside comments and names of other programs."""
 
 import textwrap
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""What is known of a device as draws: Normal about what was measured and cut off at 0, or those of a fit that tells it."""
+"""Draws of the quantities of a device: Normal and truncated at 0, or taken from a fit."""
 
 from collections.abc import Mapping
 

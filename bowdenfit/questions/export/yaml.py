@@ -1,4 +1,4 @@
-"""YAML: friction and what may be fed forward, as parameters of a controller; ROS 2 reads the file as it is."""
+"""YAML parameters of a controller, in the layout of ROS 2: friction, feed-forward torque and the limits of compensation."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.questions.export.transmission import TransmissionTables
-from bowdenfit.questions.export.words import ascii_text, comment
+from bowdenfit.inference.interval import Interval
+from bowdenfit.questions.compensate.answer import Compensation, FeedbackGain, FeedForward
+from bowdenfit.questions.export.tables import TransmissionTables
+from bowdenfit.questions.export.text import ascii_text, comment
 
 NODES, PARAMETERS = "/**", "ros__parameters"  # of every node
 _LEAST_FRICTION = "mounting_q05"
@@ -19,7 +21,7 @@ def yaml_parameters(tables: TransmissionTables, compensation: Mapping[str, Any] 
     """The file.
 
     Args:
-        found: The tables.
+        tables: The tables.
         compensation: Answer of `bowdenfit compensate`, which is written beside them; None for none.
     """
     page = {
@@ -106,3 +108,59 @@ def yaml_scalar(value: object) -> str:
         return text.replace("inf", ".inf").replace("nan", ".nan")
     number, e, power = text.partition("e")
     return text if not e or "." in number else f"{number}.0e{power}"
+
+
+def compensation_parameters(answer: Compensation) -> dict[str, Any]:
+    """The answer in plain data; what it does not hold is left out.
+
+    Args:
+        answer: Of both laws.
+    """
+    bends = answer.by_bend
+    page: dict[str, Any] = {
+        "device": answer.device,
+        "wrap_angle_deg": [bend.wrap_angle for bend in bends],
+        "accepted_probability": answer.risk,
+        "mounting_scatter": answer.scatter,
+        "mounting_scatter_is_measured": answer.scatter_from_fit,
+        "probability_of_slack": answer.slack,
+        "friction_N_m": {
+            "q05": [bend.friction.q05 for bend in bends],
+            "q50": [bend.friction.median for bend in bends],
+            "q95": [bend.friction.q95 for bend in bends],
+        },
+        "dead_zone_rad_per_s": answer.dead_zone or None,
+        "chatters_below_rad_per_s": answer.chatters_below,
+    }
+    if answer.fixed is not None:
+        page["fixed"] = {"torque_N_m": answer.fixed.torque, **_feed_forward_parameters(answer.fixed)}
+    if answer.scheduled is not None:
+        page["scheduled"] = {
+            "torque_N_m": [bend.scheduled for bend in bends],
+            **_feed_forward_parameters(answer.scheduled),
+        }
+    if answer.gain is not None:
+        page["gain"] = _gain_parameters(answer.gain)
+    return page | {"not_stated": list(answer.missing)}
+
+
+def _feed_forward_parameters(feed_forward: FeedForward) -> dict[str, float]:
+    return {
+        "share": feed_forward.share,
+        "probability_of_moving_by_itself": feed_forward.risk,
+        "left_N_m": feed_forward.left,
+    }
+
+
+def _gain_parameters(gain: FeedbackGain) -> dict[str, Any]:
+    return {
+        "safe": gain.safe,
+        "passive": gain.passive,
+        "stable_up_to": _quantile_parameters(gain.stable),
+        "left_N_m": _quantile_parameters(gain.left),
+        "decided_by": gain.decided_by,
+    }
+
+
+def _quantile_parameters(interval: Interval) -> dict[str, float]:
+    return {"q05": interval.q05, "q50": interval.median, "q95": interval.q95}

@@ -1,0 +1,2 @@
+from .writers import ExportOptions as ExportOptions
+from .writers import export_fit as export_fit

@@ -1,1 +1,0 @@
-"""Do groups of readings differ in friction?"""

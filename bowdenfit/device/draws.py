@@ -10,7 +10,7 @@ _MAX_REDRAWS = 200
 
 
 def draw_device(known: Mapping[str, Known], n: int, seed: int) -> dict[str, np.ndarray]:
-    """So many draws of every quantity; the same number over and over of what is set.
+    """Draw every quantity `n` times; a quantity that is set is constant.
 
     Draws of a fit are picked alike for all quantities that it tells, and what they hold besides is taken from them.
 

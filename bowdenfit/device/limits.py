@@ -26,7 +26,7 @@ def moves_by_itself(feed_forward: Number, friction: Number, damping: Number, dea
 
 
 def largest_safe_share(margin: np.ndarray, nominal: np.ndarray, risk: float) -> float:
-    """Largest c with P(at any bend: c F > T_f + F_m + b dv) of at most a risk.
+    """Return the largest c with P(at any bend: c F > T_f + F_m + b dv) of at most a risk.
 
     Args:
         margin: T_f + F_m + b dv, draws by bends [N m].
@@ -37,7 +37,7 @@ def largest_safe_share(margin: np.ndarray, nominal: np.ndarray, risk: float) -> 
 
 
 def safe_shares(margin: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Share of F that each draw bears at each bend; infinite where nothing is fed forward."""
+    """Return the share of F that each draw tolerates at each bend; infinite where nothing is fed forward."""
     return np.where(nominal > 0, margin / np.maximum(nominal, 1e-300), np.inf)
 
 
@@ -76,12 +76,12 @@ class LinearDevice:
     integral_gain: DrawNumbers = 0.0
 
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """All of them, as long as each other."""
+        """Return all quantities, broadcast to one length."""
         return tuple(np.atleast_1d(part) for part in np.broadcast_arrays(*vars(self).values()))
 
 
 def discretize(device: LinearDevice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A, B and C of the sampled plant: motor and joint angle and speed from one sample to the next, and T_j of them."""
+    """Return A, B and C of the sampled plant: transition of motor and joint angle and speed, input, and T_j."""
     k, c, j_m, j_j, b_m, b_j, k_h, sample, _ = device.arrays()
     zero, one = np.zeros_like(k), np.ones_like(k)
     rows = [
@@ -96,7 +96,7 @@ def discretize(device: LinearDevice) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def matrix_exponential(matrices: np.ndarray) -> np.ndarray:
-    """Matrix exponentials, by scaling, a Taylor series and squaring."""
+    """Return matrix exponentials, by scaling, a Taylor series and squaring."""
     norm = float(np.max(np.abs(matrices).sum(axis=-1), initial=1e-9))
     halvings = max(0, int(np.ceil(np.log2(norm))) + 4)
     scaled = matrices / 2.0**halvings
@@ -112,7 +112,7 @@ def matrix_exponential(matrices: np.ndarray) -> np.ndarray:
 def spectral_radius(
     parts: tuple[np.ndarray, np.ndarray, np.ndarray], gain: np.ndarray, integral: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Largest eigenvalue of the sampled loop by size: below 1 every oscillation dies out.
+    """Return the spectral radius of the sampled loop: below 1 every oscillation decays.
 
     Of [[A, B], [-K_f C, 0]] without integral; with it, what adds up is one more state.
 
@@ -133,7 +133,7 @@ def spectral_radius(
 
 
 def stable_gain(device: LinearDevice) -> np.ndarray:
-    """Largest K_f with which the loop does not oscillate by itself, by draw; `LARGEST` where none does."""
+    """Return the largest K_f without self-excited oscillation, by draw; `LARGEST_GAIN` if none oscillates."""
     parts, integral = discretize(device), (device.arrays()[8] * device.arrays()[7])
     return _largest_gain(lambda gain: spectral_radius(parts, gain, integral) <= 1 + _ROUNDING, len(parts[0]))
 
@@ -167,7 +167,7 @@ def passive_gain(device: LinearDevice, stable: np.ndarray) -> np.ndarray:
 
 
 def _largest_gain(holds: Callable[[np.ndarray], np.ndarray], draws: int) -> np.ndarray:
-    """Largest gain for which something holds, by draw; 0 where it does for none, `LARGEST` where for all."""
+    """Return the largest gain for which a condition holds, by draw, by bisection; 0 if for none, `LARGEST_GAIN` if for all."""
     low, high = np.full(draws, LEAST_GAIN), np.full(draws, LARGEST_GAIN)
     always, never = holds(high), ~holds(low)
     for _ in range(_HALVINGS):

@@ -48,7 +48,7 @@ class Controller:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class ControllerMemory:
-    """What a controller keeps from one sample to the next.
+    """State of a controller from one sample to the next.
 
     Args:
         counted: Angle that the encoder showed [rad].
@@ -64,7 +64,7 @@ class ControllerMemory:
 
     @classmethod
     def empty(cls, template: Numbers) -> "ControllerMemory":
-        """Nothing has been seen."""
+        """Return the state before the first sample."""
         zero = jnp.zeros_like(template)
         return cls(zero, zero, zero, zero)
 
@@ -72,7 +72,7 @@ class ControllerMemory:
 def step_controller(
     control: Controller, memory: ControllerMemory, angle: Numbers, torque: Numbers, sample: float
 ) -> ControllerMemory:
-    """The controller's next command, from the angle [rad] and the torque [N m] at the joint.
+    """Advance the controller by one sample, from angle [rad] and torque [N m] at the joint.
 
     Args:
         control: The controller.
@@ -93,7 +93,7 @@ def step_controller(
 
 
 def karnopp_torque(control: Controller, speed: Numbers) -> Numbers:
-    """F_cst in the direction of motion outside the dead zone; inside nothing, or a share of it [N m]."""
+    """Return F_cst in the direction of motion outside the dead zone; inside it 0, or a linear share [N m]."""
     inside = control.linear * control.coulomb * speed / jnp.maximum(control.dead_zone, 1e-12)
     return jnp.where(jnp.abs(speed) > control.dead_zone, control.coulomb * jnp.sign(speed), inside)
 
@@ -117,7 +117,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class DeviceRuns:
-    """What was seen at every sample (first axis) of every run.
+    """Signals at every sample (first axis) of every run.
 
     Args:
         time: [s].
@@ -150,7 +150,7 @@ def simulate_device(
     noise: float = 0.0,
     seed: int = 0,
 ) -> DeviceRuns:
-    """Runs of a device, those of all entries of its numbers at once.
+    """Simulate a device for all runs at once.
 
     Args:
         plant, control, hand: Of which every number may be an array of runs.
@@ -176,7 +176,7 @@ def simulate_device(
 
 @lru_cache
 def _compile_runs(steps: int) -> Callable[..., dict[str, Any]]:
-    """The compiled program of so many steps a sample, over runs."""
+    """Compile the program for a number of plant steps per sample, over runs."""
 
     def run(
         plant: Plant, control: Controller, hand: Hand, first: Motion, path: Any, sensor_noise: Any, sample: Any
@@ -213,7 +213,7 @@ def _compile_runs(steps: int) -> Callable[..., dict[str, Any]]:
 
 
 def oscillating_path(seconds: float, sample: float, amplitude: float, period: float) -> np.ndarray:
-    """A hand's path to and fro, from rest: angle [rad] and speed [rad/s] at every sample.
+    """Return a hand's path to and fro, from rest: angle [rad] and speed [rad/s] at every sample.
 
     Args:
         seconds, sample, period: [s].
@@ -229,7 +229,7 @@ JUMP_SHARE = 0.1  # of the largest command, from which on a change from one samp
 
 @dataclass(frozen=True)
 class TransmittedTorque:
-    """Of every run.
+    """Torque that a hand feels, by run.
 
     Args:
         mean: Torque at the joint against the motion, where it is faster than the dead zone [N m].
@@ -245,7 +245,7 @@ class TransmittedTorque:
 
 
 def measure_transmitted_torque(runs: DeviceRuns, dead_zone: float, start: float = 0.0) -> TransmittedTorque:
-    """What is felt of runs.
+    """Measure the torque that a hand feels.
 
     Args:
         runs: The runs.

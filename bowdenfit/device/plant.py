@@ -37,7 +37,7 @@ class LoopTransmission:
         return 2 * self.preload * self.exponent
 
     def half_torque(self, twist: Numbers) -> Numbers:
-        """S, torque that half of the loop passes on at a twist [rad]."""
+        """Return S, the torque that half of the loop transmits at a twist [rad]."""
         force = self.stiffness * twist
         return force + jnp.clip(force, -self.preload, self.preload)
 
@@ -49,22 +49,22 @@ class LoopTransmission:
         )
 
     def half_energy(self, twist: Numbers) -> Numbers:
-        """Elastic energy of a half at a twist [J]."""
+        """Return the elastic energy of a half at a twist [J]."""
         force = self.stiffness * twist
         soft = jnp.clip(force, -self.preload, self.preload)
         return (force**2 / 2 + soft * force - soft**2 / 2) / self.stiffness
 
     def lower_joint_torque(self, torque: Numbers) -> Numbers:
-        """f_-, torque at the joint while it moves forward, from that at the motor [N m]; see `loop_output_force`."""
+        """Return f_-, the joint torque in forward motion, from that at the motor [N m]; see `loop_output_force`."""
         growth = jnp.where(torque > 0, jnp.exp(-self.exponent), jnp.exp(self.exponent))
         return jnp.minimum(torque - self.friction, torque * growth)
 
     def settled_node(self, node: Numbers, motor: Numbers, joint: Numbers) -> Numbers:
-        """Where the node comes to stand between the angles of motor and joint, from where it stood [rad]."""
+        """Return the angle of the node between motor and joint, from where it was [rad]."""
         return jnp.clip(node, self._lowest_node(motor, joint), -self._lowest_node(-motor, -joint))
 
     def torques(self, node: Numbers, motor: Numbers, joint: Numbers) -> tuple[Numbers, Numbers]:
-        """T_m and T_j, what the loop takes from the motor and gives the joint [N m]."""
+        """Return T_m and T_j, which the loop takes from the motor and gives the joint [N m]."""
         return self.half_torque(motor - node), self.half_torque(node - joint)
 
     def _lowest_node(self, motor: Numbers, joint: Numbers) -> Numbers:
@@ -128,25 +128,25 @@ class Motion:
 
     @classmethod
     def at_rest(cls, template: Numbers) -> "Motion":
-        """Nothing moves, and nothing is loaded."""
+        """Return an unloaded motion at rest."""
         zero = jnp.zeros_like(template)
         return cls(zero, zero, zero, zero, zero)
 
 
 def settle_node(plant: Plant, motion: Motion) -> Motion:
-    """The node put where it stands now; before torques are read, or they are those of a step ago."""
+    """Return the motion with its node settled; needed before torques are read, which else are one step old."""
     return replace(motion, node=plant.loop.settled_node(motion.node, motion.motor, motion.joint))
 
 
 def rope_torques(plant: Plant, motion: Motion) -> tuple[Numbers, Numbers]:
-    """What the rope takes from the motor and gives the joint, damping included [N m]; of a motion that is settled."""
+    """Return the torques that the rope takes from the motor and gives the joint, with damping [N m]; of a settled motion."""
     at_motor, at_joint = plant.loop.torques(motion.node, motion.motor, motion.joint)
     damping = plant.rope_damping * (motion.motor_speed - motion.joint_speed)
     return at_motor + damping, at_joint + damping
 
 
 def advance(plant: Plant, motion: Motion, motor_torque: Numbers, joint_torque: Numbers, step: float | Numbers) -> Motion:
-    """One step of semi-implicit Euler; dry friction is a proximal step, so that it holds what it can hold.
+    """Advance by one step of semi-implicit Euler; dry friction is a proximal step, so that it can hold the device still.
 
     Args:
         plant: What moves.
@@ -172,12 +172,12 @@ def advance(plant: Plant, motion: Motion, motor_torque: Numbers, joint_torque: N
 
 
 def apply_dry_friction(speed: Numbers, loss: Numbers) -> Numbers:
-    """A speed less what dry friction takes of it in a step, which never turns it round."""
+    """Reduce a speed by what dry friction takes of it in a step, without reversing it."""
     return jnp.sign(speed) * jnp.maximum(jnp.abs(speed) - loss, 0.0)
 
 
 def mechanical_energy(plant: Plant, motion: Motion) -> Numbers:
-    """Kinetic and elastic energy [J]."""
+    """Return kinetic and elastic energy [J]."""
     kinetic = plant.motor_inertia * motion.motor_speed**2 + plant.joint_inertia * motion.joint_speed**2
     loop = plant.loop
     return kinetic / 2 + loop.half_energy(motion.motor - motion.node) + loop.half_energy(motion.node - motion.joint)

@@ -27,7 +27,7 @@ _ROUNDING = 1e-6  # of a spectral radius: the whole device, which nothing holds,
 
 @dataclass(frozen=True)
 class CouplingGains:
-    """What is sent, and how it acts.
+    """Gains of the coupling.
 
     Args:
         master_stiffness, master_damping: k_m [N m/rad] and d_m [N m s/rad].
@@ -51,11 +51,11 @@ class CouplingGains:
     position_to_master: float = 1.0
 
     def two_channels(self) -> "CouplingGains":
-        """The slave's torque back and the master's position on, with the same damping: direct force feedback."""
+        """Return the two-channel coupling: the slave's torque back and the master's position on, with the same damping."""
         return replace(self, master_stiffness=0.0, torque_to_slave=0.0, local_gain=0.0, local_damping=True)
 
     def with_local_gain(self, gain: float) -> "CouplingGains":
-        """The same with another gain on the master's own torque."""
+        """Return the coupling with another gain on the master's own torque."""
         return replace(self, local_gain=gain)
 
 
@@ -129,7 +129,7 @@ def transmitted_stiffness(gains: CouplingGains, stiffness: Number, wall: Number)
 
 
 def spectral_radius_in_contact(system: MasterSlave, gains: CouplingGains, delay: int) -> np.ndarray:
-    """Spectral radius of the sampled loop while master and slave move together, with the wall where there is one.
+    """Return the spectral radius of the sampled loop with the wall, or in free motion without one.
 
     Args:
         system: What moves.
@@ -141,12 +141,12 @@ def spectral_radius_in_contact(system: MasterSlave, gains: CouplingGains, delay:
 
 
 def is_stable(radius: np.ndarray) -> np.ndarray:
-    """Whether every oscillation dies out."""
+    """Return whether every oscillation decays."""
     return np.asarray(radius <= 1 + _ROUNDING)
 
 
 def closed_loop(system: MasterSlave, gains: CouplingGains, delay: int) -> np.ndarray:
-    """From one sample to the next: plant, angles before, filtered speeds, commands, and what is on its way."""
+    """Return the transition matrix: plant, previous angles, filtered speeds, commands, and signals under way."""
     a, b, torques = _discretize_plant(system)
     n, size = len(a), _PLANT + 6 + _SIGNALS * delay
     previous, speeds, commands, queue = slice(6, 8), slice(8, 10), slice(10, 12), slice(12, size)
@@ -187,7 +187,7 @@ def closed_loop(system: MasterSlave, gains: CouplingGains, delay: int) -> np.nda
 
 
 def _discretize_plant(system: MasterSlave) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The sampled plant, and T_j and T_e of its states."""
+    """Return the sampled plant, and T_j and T_e of its states."""
     k, c, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s, k_e, b_e, sample, _ = (
         np.atleast_1d(part) for part in np.broadcast_arrays(*vars(system).values())
     )
@@ -231,7 +231,7 @@ class Slave:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class MasterController:
-    """What samples and drives the master.
+    """Sampling and limits of the master.
 
     Args:
         count: Angle of one count of the encoders [rad].
@@ -246,7 +246,7 @@ class MasterController:
 
 @dataclass(frozen=True)
 class TeleoperationRuns:
-    """What was seen at every sample (first axis) of every run.
+    """Signals at every sample (first axis) of every run.
 
     Args:
         time: [s].
@@ -263,7 +263,7 @@ class TeleoperationRuns:
 
 
 def contact_torque(slave: Slave, angle: Numbers, speed: Numbers) -> Numbers:
-    """T_e, what the wall gives the slave: it pushes and never pulls [N m]."""
+    """Return T_e, which the wall gives the slave: it pushes and never pulls [N m]."""
     depth = angle - slave.wall
     torque = jnp.maximum(slave.wall_stiffness * depth + slave.wall_damping * speed, 0.0)
     return jnp.where(depth > 0, torque, 0.0)
@@ -281,7 +281,7 @@ def simulate_teleoperation(
     sample: float = 1e-3,
     step: float = STEP,
 ) -> TeleoperationRuns:
-    """Runs of master and slave from rest, those of all entries of their numbers at once.
+    """Simulate master and slave from rest, for all runs at once.
 
     Args:
         plant, hand, slave, controller: Of which every number may be an array of runs.
@@ -304,7 +304,7 @@ def simulate_teleoperation(
 
 @lru_cache
 def _compile_teleoperation(steps: int, delay: int) -> Callable[..., dict[str, Any]]:
-    """The compiled program of so many steps a sample, over runs."""
+    """Compile the program for a number of plant steps per sample, over runs."""
 
     def run(
         plant: Plant, hand: Hand, slave: Slave, controller: MasterController, coupling: Any, path: Any, sample: Any
@@ -355,7 +355,7 @@ def _compile_teleoperation(steps: int, delay: int) -> Callable[..., dict[str, An
 
 
 def _commands(coupling: Any, own: Numbers, received: Numbers) -> Numbers:
-    """Torques of master and slave, of what each side sees itself and of what came late from the other [N m]."""
+    """Return torques of master and slave, from what each side measures and what it received from the other [N m]."""
     k_m, d_m, k_s, d_s = (
         coupling[f"{side}_{what}"] for side in ("master", "slave") for what in ("stiffness", "damping")
     )

@@ -19,7 +19,7 @@ _SURE = 0.999  # beyond which draws are too few to say more
 
 @dataclass(frozen=True, repr=False)
 class Contrast(Display):
-    """Friction coefficient of one group less that of another.
+    """Difference of a friction coefficient between two groups.
 
     Args:
         coefficient: Which coefficient.
@@ -56,7 +56,7 @@ class Contrast(Display):
 
     @property
     def row(self) -> dict[str, Any]:
-        """Of a table."""
+        """Its row of a table."""
         named = {"coefficient": self.coefficient, "group": self.group, "less": self.less}
         return named | vars(self.difference) | {"probability": self.probability}
 
@@ -84,7 +84,7 @@ class Groups(Display):
         return rows, dict.fromkeys(rows[0] if rows else (), "1")
 
     def contrast(self, group: str, less: str, coefficient: str = "") -> Contrast:
-        """One of them, either way round.
+        """Return one contrast, in either direction.
 
         Args:
             group: A group.
@@ -108,7 +108,7 @@ class Groups(Display):
 
 @cached_per_fit
 def contrast_groups(fit: Record) -> Groups | None:
-    """The groups of a fit and their contrasts; None where all readings share their coefficients, or without draws."""
+    """Return the groups of a fit and their contrasts; None if all readings share their coefficients, or without draws."""
     names = fit.model.cable.friction.groups
     if not names or fit.sampled is None:
         return None
@@ -128,13 +128,13 @@ def _contrasts(fit: Record, names: tuple[str, ...]) -> Iterator[Contrast]:
 
 
 def _draws(fit: Record, name: str) -> np.ndarray | float:
-    """Draws of a coefficient, or what it is fixed at."""
+    """Return the draws of a coefficient, or its fixed value."""
     values = fit.draws().values
     return values[name] if name in values else next(p.fixed or 0.0 for p in fit.model.space.fixed if p.name == name)
 
 
 def groups_text(fit: Record) -> str:
-    """The contrasts of a fit, a line each; empty without groups or draws."""
+    """Return the contrasts of a fit, a line each; empty without groups or draws."""
     groups = contrast_groups(fit)
     if groups is None:
         return ""

@@ -10,12 +10,12 @@ from bowdenfit.inference.interval import Interval
 
 NONE, KARNOPP, ACTIVE = "none", "karnopp", "active"
 ROPE_DAMPING = "the damping of the rope"
-"""The input that usually decides the largest gain, and that a ring-down tells."""
+"""The input that usually determines the largest gain, and that a ring-down measures."""
 
 
 @dataclass(frozen=True, repr=False)
 class FeedForward(Part):
-    """F_cst that is fed forward, at one value for all bends or scheduled by bend.
+    """Torque F_cst that is fed forward, constant or scheduled by bend.
 
     Args:
         share: c, of the median friction at each bend; for one value, of that where it is most.
@@ -34,7 +34,7 @@ class FeedForward(Part):
 
 @dataclass(frozen=True, repr=False)
 class BendCompensation(Part):
-    """What is known at one wrap angle.
+    """Friction and compensation at one wrap angle.
 
     Args:
         wrap_angle: [deg].
@@ -52,7 +52,7 @@ class BendCompensation(Part):
 
 @dataclass(frozen=True, repr=False)
 class FeedbackGain(Part):
-    """K_f on the torque measured at the joint.
+    """Gain K_f on the torque measured at the joint.
 
     Args:
         safe: Largest gain with which the loop oscillates with at most the risk, hands off or on [1].
@@ -79,7 +79,7 @@ class FeedbackGain(Part):
 
 @dataclass(frozen=True, repr=False)
 class PreloadOption(Part):
-    """What another preload would do.
+    """Effect of another preload.
 
     Args:
         preload: At the reference angle [N].
@@ -96,7 +96,7 @@ class PreloadOption(Part):
 
 @dataclass(frozen=True, repr=False)
 class TorqueTrace(Part):
-    """The torques of one device, that of the middle friction, while a hand moves it to and fro.
+    """Torques of the device with median friction, while a hand moves it to and fro.
 
     Args:
         time: [s].
@@ -110,7 +110,7 @@ class TorqueTrace(Part):
 
 @dataclass(frozen=True, repr=False)
 class SimulatedLaw(Part):
-    """One law, in every simulated device.
+    """One control law, in every simulated device.
 
     Args:
         name: "none", "karnopp" or "active".
@@ -129,7 +129,7 @@ class SimulatedLaw(Part):
 
 @dataclass(frozen=True, repr=False)
 class DeviceSimulation(Part):
-    """The device through time.
+    """Simulation of the compensated device.
 
     Args:
         draws: Devices that were simulated.
@@ -151,7 +151,7 @@ class DeviceSimulation(Part):
 
 @dataclass(frozen=True, repr=False)
 class Compensation(Display):
-    """How much of a cable's friction a controller may hide.
+    """Limits of friction compensation for a cable and device.
 
     Args:
         cable: Name of the cable.
@@ -197,7 +197,7 @@ class Compensation(Display):
 
     @property
     def most(self) -> BendCompensation:
-        """The bend at which friction is most."""
+        """The bend with the largest friction."""
         return max(self.by_bend, key=lambda bend: bend.friction.median)
 
     def _table(self) -> Rows:

@@ -64,7 +64,7 @@ def parse_risk(risk: tuple[float, str] | None) -> float:
 def estimate_feedback_gain(
     fit: Record, device: Device, loop: LoopDraws, friction: np.ndarray, risk: float
 ) -> FeedbackGain:
-    """The largest gain, hands off and on.
+    """Estimate the largest gain, hands off and on.
 
     Args:
         fit: The fit.
@@ -115,7 +115,7 @@ def estimate_feedback_gain(
 
 
 def _linearize(draws: dict[str, np.ndarray], stiffness: np.ndarray, integral: float, with_hand: bool) -> LinearDevice:
-    """The device of every draw and bend while its rope slides, with or without the hand."""
+    """Return the linear device of every draw and bend while its rope slides, with or without the hand."""
     repeated = {name: np.repeat(values, stiffness.shape[1]) for name, values in draws.items()}
     inertia, damping, hand = (repeated[name] if with_hand else 0.0 for name in HAND)
     return LinearDevice(
@@ -132,7 +132,7 @@ def _linearize(draws: dict[str, np.ndarray], stiffness: np.ndarray, integral: fl
 
 
 def _squared_rank_correlation(values: np.ndarray, gain: np.ndarray) -> float:
-    """Square of the rank correlation: the share of a gain's scatter that goes with an input."""
+    """Return the squared rank correlation: the share of the scatter of a gain that an input explains."""
     if np.ptp(values) == 0 or np.ptp(gain) == 0:
         return 0.0
     first, second = (np.argsort(np.argsort(sample)).astype(float) for sample in (values, gain))
@@ -152,7 +152,7 @@ def estimate_compensation(
     fit: Record, device: Device | None, stated: str | tuple[tuple[float, str], tuple[float, str]] | None, law: str | None,
     risk: float,
 ) -> tuple[Compensation, LoopDraws]:  # fmt: skip
-    """The answer without simulation, and the draws of the cable that it was worked out from.
+    """Estimate the compensation without simulation; return also the draws of the cable.
 
     Args:
         fit: The fit.
@@ -199,7 +199,7 @@ def estimate_compensation(
 
 
 def _draw_stabilizing(known: Mapping[str, Known], n: int, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """Draws of F_m and of b dv [N m], and dv [rad/s]; nothing of what is not stated."""
+    """Draw motor friction F_m and b dv [N m], and return dv [rad/s]; 0 for what is not stated."""
     draws, zero = draw_device(known, n, seed), np.zeros(n)
     dead_zone = known[DEAD_ZONE].value if DEAD_ZONE in known else 0.0
     return (
@@ -210,7 +210,7 @@ def _draw_stabilizing(known: Mapping[str, Known], n: int, seed: int) -> tuple[np
 
 
 def _chatters_below(device: Device | None, known: Mapping[str, Known]) -> float | None:
-    """One count of the encoder in the time of the filter [rad/s], where both are stated."""
+    """Return one count of the encoder per time constant of the filter [rad/s], where both are stated."""
     if device is None or device.controller.encoder_counts is None or FILTER not in known:
         return None
     return device.count / known[FILTER].value
@@ -219,7 +219,7 @@ def _chatters_below(device: Device | None, known: Mapping[str, Known]) -> float 
 def _gain_or_missing(
     fit: Record, device: Device | None, loop: LoopDraws, friction: np.ndarray, risk: float
 ) -> tuple[FeedbackGain | None, list[str]]:
-    """The gain, or what would have to be stated for it."""
+    """Return the feedback gain, or the keys that are missing for it."""
     if device is None:
         return None, list(NEEDED)
     missing = device.lacking(*NEEDED, *(("rope.stiffness",) if loop.stiffness is None else ()))
@@ -229,7 +229,7 @@ def _gain_or_missing(
 def _summarize_feed_forward(
     torque: np.ndarray, margin: np.ndarray, friction: np.ndarray, bends: np.ndarray
 ) -> FeedForward:
-    """What is fed forward by bend."""
+    """Summarize a feed-forward torque by bend."""
     median = np.median(friction, axis=0)
     most = int(np.argmax(median))
     risk = float(np.mean(np.any(moves_by_itself(torque, margin, 0.0, 0.0), axis=1)))

@@ -46,7 +46,7 @@ _LEAST_SPEED = 0.05  # rad/s, where there is no dead zone
 
 @dataclass(frozen=True)
 class SimulatedDevices:
-    """Devices that are simulated, a number each, or one for all.
+    """Devices to simulate; every number is one for all or an array over devices.
 
     Args:
         plant: At the bend where friction is most, without a hand.
@@ -76,7 +76,7 @@ class SimulatedDevices:
 
 
 def simulate_hand_motion(devices: SimulatedDevices, middle: int) -> tuple[tuple[SimulatedLaw, ...], float]:
-    """Every law while a hand moves the device to and fro, and the hand's largest speed [rad/s].
+    """Simulate every law while a hand moves the device to and fro; return also its largest speed [rad/s].
 
     Args:
         devices: The devices.
@@ -111,7 +111,7 @@ def _trace(runs: DeviceRuns, middle: int) -> TorqueTrace:
 
 
 def find_runaways(plant: Plant, control: Controller, sample: float) -> np.ndarray:
-    """Whether each device goes on by itself after a push, with no hand on.
+    """Return whether each device keeps moving by itself after a push, with no hand on.
 
     Args:
         plant: Of every device at its own bend.
@@ -138,7 +138,7 @@ _LEAST_PRELOAD = 1e-6  # N m, of a loop that bending has made slack
 def simulate_devices(
     fit: Record, device: Device, loop: LoopDraws, answer: Compensation, schedule: bool, draws: int = DRAWS
 ) -> DeviceSimulation:
-    """The device through time.
+    """Simulate devices under every law, and after a push.
 
     Args:
         fit: The fit.
@@ -213,14 +213,14 @@ def _build_controller(device: Device, stated: Mapping[str, Known], optional: Map
 
 
 def draw_friction_margin(fit: Record, device: Device, n: int) -> np.ndarray:
-    """F_m + b dv [N m], which each device bears besides the friction of its loop."""
+    """Draw F_m + b dv [N m], the feed-forward torque that a device tolerates beyond the friction of its loop."""
     stated = device.known("motor.friction", "motor.damping", "joint.damping", "controller.dead_zone")
     dry, motor, joint, zone = draw_device(stated, n, fit.provenance.seed).values()
     return dry + (motor + joint) * zone
 
 
 def _build_plant(loop: LoopDraws, known: dict[str, np.ndarray], picked: np.ndarray, bends: np.ndarray) -> Plant:
-    """The plant of some draws, each at a bend of its own."""
+    """Build the plant of some draws, each at its own bend."""
     assert loop.stiffness is not None
     cable = LoopTransmission(
         loop.stiffness[picked, bends],

@@ -127,7 +127,7 @@ def _describe_remedy(gain: FeedbackGain) -> str:
     """What to do about the input that decides."""
     if gain.decided_by != ROPE_DAMPING:
         return "measure it"
-    return "which a ring-down told; measure more of them" if gain.from_ring_down else "measure it by a ring-down"
+    return "which was measured by a ring-down; measure more of them" if gain.from_ring_down else "measure it by a ring-down"
 
 
 def _cautions(answer: Compensation) -> Iterator[str]:
@@ -177,7 +177,7 @@ def _missing_sentences(answer: Compensation) -> Iterator[str]:
     if answer.missing:
         keys = listed([f"{key.replace('.', ', ')}" for key in answer.missing])
         where = "device.toml lacks" if answer.device else "it needs"
-        yield f"How much of the measured torque may be fed back is not said, because {where} [section], key: {keys}."
+        yield f"How much of the measured torque may be fed back cannot be estimated, because {where} [section], key: {keys}."
 
 
 def _bend_table(answer: Compensation) -> str:

@@ -26,7 +26,7 @@ _ACROSS = 4  # numbers in a line
 
 
 def c_header(tables: TransmissionTables) -> str:
-    """The header.
+    """Return the C header.
 
     Args:
         tables: The tables.
@@ -58,14 +58,14 @@ def c_header(tables: TransmissionTables) -> str:
 
 
 def hexadecimal(values: Iterable[float], before: str) -> str:
-    """Numbers as hexadecimal with commas between them, some in a line."""
+    """Format numbers as hexadecimal constants, some in a line."""
     texts = [float(value).hex() for value in np.ravel(np.asarray(list(values)))]
     lines = [", ".join(texts[i : i + _ACROSS]) for i in range(0, len(texts), _ACROSS)]
     return ",\n".join(before + line for line in lines)
 
 
 def _format_strokes(exponent: np.ndarray) -> str:
-    """Exponents of both strokes."""
+    """Format exponents of both strokes."""
     return "    {\n" + ",\n".join(_format_row(one, "        ") for one in exponent) + "\n    }"
 
 
@@ -74,7 +74,7 @@ def _format_row(values: Iterable[float], before: str) -> str:
 
 
 def _optional_tables(tables: TransmissionTables) -> str:
-    """What not every cable has."""
+    """Return tables that not every cable has."""
     parts = []
     if tables.is_loop:
         rows = ",\n".join(_format_row(level.taut_loss, "    ") for level in tables.levels)
@@ -120,7 +120,7 @@ class _Variable:
 
 
 def build_fmu(tables: TransmissionTables, name: str) -> bytes:
-    """The file.
+    """Build the FMU.
 
     Args:
         tables: The tables.
@@ -149,7 +149,7 @@ def build_fmu(tables: TransmissionTables, name: str) -> bytes:
 
 
 def find_compiler() -> list[str]:
-    """The C compiler, with its options where CC has some.
+    """Find the C compiler, with its options where CC has some.
 
     Raises:
         UsageError: There is none.
@@ -170,7 +170,7 @@ def find_compiler() -> list[str]:
 
 
 def _binary_folder() -> tuple[str, str]:
-    """Folder and ending of a compiled program of this machine."""
+    """Return folder and suffix of compiled programs of this machine."""
     kind = (sys.platform, platform.machine().lower())
     if kind not in _BINARY:
         raise UsageError(
@@ -181,7 +181,7 @@ def _binary_folder() -> tuple[str, str]:
 
 
 def _compile(source: str, text: str, command: list[str]) -> bytes:
-    """The shared library.
+    """Compile the shared library.
 
     Raises:
         UsageError: The compiler fails.
@@ -208,7 +208,7 @@ def _compile(source: str, text: str, command: list[str]) -> bytes:
 
 
 def _variables(tables: TransmissionTables) -> list[_Variable]:
-    """In the order of their value references."""
+    """Return the real variables in the order of their value references."""
     place, speed = tables.points, tables.speed_unit
     return [
         _Variable("input_force", True, "N", "Force at the motor side"),
@@ -226,7 +226,7 @@ def _variables(tables: TransmissionTables) -> list[_Variable]:
 
 
 def _model_description(tables: TransmissionTables, model_name: str, guid: str) -> Iterator[str]:
-    """Lines of modelDescription.xml."""
+    """Yield the lines of modelDescription.xml."""
     variables, about = _variables(tables), tables.about
     starts = {"place": tables.points.values[0], "speed": tables.reference_speed}
     units = dict.fromkeys(v.unit for v in variables if v.unit)
@@ -272,5 +272,5 @@ def _model_description(tables: TransmissionTables, model_name: str, guid: str) -
 
 
 def _quoted(text: str) -> str:
-    """A text as an attribute of XML."""
+    """Quote a text as an attribute of XML."""
     return quoteattr(ascii_text(text))

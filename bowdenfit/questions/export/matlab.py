@@ -15,7 +15,7 @@ _NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
 
 
 def matlab_function(tables: TransmissionTables, name: str) -> str:
-    """The file.
+    """Return the MATLAB function.
 
     Args:
         tables: The tables.

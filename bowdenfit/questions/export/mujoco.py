@@ -18,7 +18,7 @@ TextAndRemarks = tuple[str, tuple[str, ...]]
 
 
 def mujoco_model(tables: TransmissionTables, point: float | None, path: Path) -> TextAndRemarks:
-    """The file, and what is to be known of it.
+    """Return MJCF or a callback, and remarks on it.
 
     Args:
         tables: The tables.
@@ -49,7 +49,7 @@ _MIDDLE = ", the middle of the range; --at names another place."
 
 
 def _refuse_inexpressible(tables: TransmissionTables, path: Path) -> None:
-    """What neither file expresses, and what MJCF alone does not."""
+    """Refuse what neither file expresses, and what MJCF alone does not."""
     if path.suffix not in _ENDS:
         raise UsageError(
             f"--output {ascii_text(path.name)}: MuJoCo reads a model from cable.xml, or a callback from cable.py."
@@ -77,7 +77,7 @@ def _refuse_inexpressible(tables: TransmissionTables, path: Path) -> None:
 
 
 def _mjcf(tables: TransmissionTables, point: float, file: str) -> tuple[str, float]:
-    """The XML, and the torque at the motor [N m] up to which it holds."""
+    """Return the XML, and the torque at the motor [N m] up to which it holds."""
     points, median = tables.points, tables.median
     friction, exponent, stiffness = (
         float(np.interp(point, points.values, table))
@@ -118,7 +118,7 @@ def _space_separated(values: Iterable[float]) -> str:
 
 
 def _callback(tables: TransmissionTables, point: float) -> str:
-    """The module."""
+    """Return the Python module of the callback."""
     levels, has_radii = tables.levels, all(tables.radii)
     motor, joint = (repr(radius / 1000) for radius in tables.radii) if has_radii else ("None", "None")
     words = f"{tables.radii[0]:g} mm and {tables.radii[1]:g} mm radius" if has_radii else "radii that are to be stated"

@@ -31,7 +31,7 @@ DRAW = "draw_"
 
 @dataclass(frozen=True)
 class FitLabel:
-    """Which fit a file was written from.
+    """Label of the fit that a file was written from.
 
     Args:
         cable: Name of the cable.
@@ -54,7 +54,7 @@ class FitLabel:
 
 @dataclass(frozen=True)
 class TablePoints:
-    """Where friction is tabled.
+    """Positions at which friction is tabulated.
 
     Args:
         variable: What is varied: the route variable, or "wrap_angle"; "place" where nothing is.
@@ -75,7 +75,7 @@ class TablePoints:
 
 @dataclass(frozen=True)
 class FrictionLevel:
-    """Friction of one level.
+    """Friction at one level, such as its median.
 
     Args:
         name: One of `LEVELS`, or of a draw.
@@ -142,7 +142,7 @@ class TransmissionTables:
 
     @property
     def sentences(self) -> list[str]:
-        """What every file says at its top."""
+        """Sentences at the top of every file."""
         about, n = self.about, len(self.levels) - len(LEVELS)
         kind = "pull-pull loop" if self.is_loop else "single rope"
         sentences = [
@@ -184,7 +184,7 @@ Arrays = Mapping[str, np.ndarray]
 
 
 def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str = "") -> TransmissionTables:
-    """The tables of a fit.
+    """Tabulate the transmission of a fit.
 
     Args:
         fit: The fit.
@@ -236,7 +236,7 @@ def _radii(fit: Record) -> tuple[float, float]:
 
 
 def _choose_points(fit: Record, points: int) -> tuple[TablePoints, bool]:
-    """Where friction is tabled, and whether at wrap angles: along the route, over the bends measured, or at one place."""
+    """Choose route positions, wrap angles, or one point; return also whether they are wrap angles."""
     route = fit.dataset.description.route
     if route is not None:
         return TablePoints(route.variable, route.unit, np.linspace(*route.range, points)), False
@@ -253,17 +253,17 @@ def _choose_points(fit: Record, points: int) -> tuple[TablePoints, bool]:
 
 
 def _add_midpoints(points: np.ndarray) -> np.ndarray:
-    """Places with those half way between them."""
+    """Return points with the midpoints between them."""
     return np.interp(np.arange(2 * len(points) - 1) / 2, np.arange(len(points)), points)
 
 
 def _interpolation_error(curve: np.ndarray) -> float:
-    """By how much straight lines between every other point of a curve miss those between."""
+    """Return the largest error of linear interpolation between every other point of a curve."""
     return float(np.max(np.abs(curve[1::2] - (curve[:-2:2] + curve[2::2]) / 2), initial=0.0))
 
 
 def _describe_ranges(fit: Record, bent: bool) -> tuple[str, ...]:
-    """Loads, lengths and wrap angles measured at, in words."""
+    """Describe the loads, lengths and wrap angles of the measurements in words."""
     limits, ranges = measured_range(fit), []
     if bent:
         bends = np.rad2deg(elastic_answers(fit).measured_bends)
@@ -276,7 +276,7 @@ def _describe_ranges(fit: Record, bent: bool) -> tuple[str, ...]:
 def _tabulate_draws(
     fit: Record, points: np.ndarray, bent: bool, middle: LoadLaw, mounting: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Friction of every draw (first axis) at places (last axis), in a mounting each.
+    """Tabulate friction of every draw (first axis) at all points (last axis), in a mounting each.
 
     Args:
         fit: The fit.
@@ -313,7 +313,7 @@ def _tabulate_draws(
 
 
 def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
-    """Exponent [1] and preload [N] of one draw at places, which are wrap angles or values of the route variable."""
+    """Return exponent [1] and preload [N] of one draw at wrap angles or route positions."""
     if bent:
         cable = BentCable(model, bending_contact(model), points)
         return cable.exponent(values), cable.preload(values)[0]
@@ -323,7 +323,7 @@ def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Arr
 
 
 def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:
-    """Stiffness at wrap angles, of an unloaded loop or of a rope under the reference force [N/mm]; nothing if not told."""
+    """Return stiffness at wrap angles [N/mm], of an unloaded loop or a rope under the reference force; empty if unknown."""
     if not (bent and has_stretch(model)):
         return jnp.zeros(0)
     load = 0.0 if model.cable.is_loop else model.cable.friction.conditions.reference_force
@@ -331,7 +331,7 @@ def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: b
 
 
 def _effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
-    """Exponents that, with one load exponent and drag for all draws, lose what this draw loses of the reference force."""
+    """Return exponents that give the same loss at the reference force under a common load exponent and drag."""
     reference = friction.conditions.reference_force
     force, (load_exponent, drag) = jnp.asarray(reference), middle
     signs = jnp.array([[1.0], [-1.0]])
@@ -342,7 +342,7 @@ def _effective_exponents(friction: FrictionModel, values: Mapping[str, Array], o
 
 
 def _median_load_law(fit: Record) -> LoadLaw:
-    """Medians of the load exponent [1] and the drag [N]; 0 where the model has none."""
+    """Return medians of the load exponent [1] and the drag [N]; 0 where the model has none."""
     names = {p.name: p for p in fit.model.space.parameters}
 
     def median_of(name: str) -> float:
@@ -355,13 +355,13 @@ def _median_load_law(fit: Record) -> LoadLaw:
 
 
 def _median_rates(tables: Arrays, which: slice) -> tuple[float, float, float]:
-    """Medians of the rate's coefficients over some of the draws."""
+    """Return medians of the rate coefficients over some of the draws."""
     a, v, c = (float(np.median(tables[name][which])) if name in tables else default for name, default in _RATE.items())
     return a, v, c
 
 
 def _quantile_levels(tables: Arrays, middle: LoadLaw, before: str = "") -> list[FrictionLevel]:
-    """Levels over the draws."""
+    """Return levels at quantiles over the draws."""
     effective, taut_loss, rate = tables["effective"], tables["taut_loss"], _median_rates(tables, slice(None))
     stiffness = np.median(tables["stiffness"], axis=0)
     return [
@@ -379,7 +379,7 @@ def _quantile_levels(tables: Arrays, middle: LoadLaw, before: str = "") -> list[
 
 
 def _draw_levels(tables: Arrays, n: int, seed: int) -> list[FrictionLevel]:
-    """Levels of single draws."""
+    """Return levels of single draws."""
     picked = np.random.default_rng([seed, 17]).choice(len(tables["drag"]), n, replace=False)
     return [
         FrictionLevel(

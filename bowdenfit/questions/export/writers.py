@@ -32,7 +32,7 @@ from bowdenfit.words import listed
 
 
 def lookup_table(fit: Record, tables: TransmissionTables) -> str:
-    """Efficiency with its intervals by place, as `predict` has it, and the friction exponent behind it.
+    """Return efficiency with intervals by position, as `predict` gives it, and the friction exponent, as CSV.
 
     Args:
         fit: The fit.
@@ -52,7 +52,7 @@ def lookup_table(fit: Record, tables: TransmissionTables) -> str:
 
 
 def draws_table(tables: TransmissionTables) -> str:
-    """A row for each draw and place: friction of one cable in one mounting.
+    """Return friction of every draw and position as CSV, each draw with a mounting of its own.
 
     Args:
         tables: The tables.
@@ -79,7 +79,7 @@ def draws_table(tables: TransmissionTables) -> str:
 
 
 def _cell(value: object) -> str:
-    """Numbers with all their digits, words in quotes where that must be."""
+    """Format numbers with all their digits, and quote words where necessary."""
     if isinstance(value, bool):
         return str(value).lower()
     return repr(float(value)) if isinstance(value, float) else csv_heading(str(value))
@@ -130,7 +130,7 @@ def refuse_compensation(to: str) -> None:
 
 
 def convert_point(fit: Record, points: TablePoints, to: str, at: tuple[float, str] | None) -> float | None:
-    """Where a format that holds at one place does, in the unit of the tables; None if not said.
+    """Convert the position of a format that holds at one to the unit of the tables; None if not given.
 
     Args:
         fit: The fit.
@@ -182,7 +182,7 @@ class ExportedFile(Display):
         return "\n".join(self.sentences())
 
     def sentences(self) -> list[str]:
-        """The file, and what is to be known of it."""
+        """The file, and remarks on it."""
         return [f"Wrote {self.file}.", *self.remarks]
 
     def _table(self) -> Rows:
@@ -191,7 +191,7 @@ class ExportedFile(Display):
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """What is to be written.
+    """What is to be written, and where.
 
     Args:
         fit: The fit.
@@ -210,7 +210,7 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class FileContent:
-    """Content of a file, and what is to be known of it."""
+    """Content of a file, and remarks on it."""
 
     content: bytes
     remarks: tuple[str, ...] = ()

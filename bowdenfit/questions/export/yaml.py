@@ -18,7 +18,7 @@ _EXCEEDED = 0.95  # probability that one mounting has more friction than that
 
 
 def yaml_parameters(tables: TransmissionTables, compensation: Mapping[str, Any] | None = None) -> str:
-    """The file.
+    """Return friction, and optionally compensation, as YAML.
 
     Args:
         tables: The tables.
@@ -33,7 +33,7 @@ def yaml_parameters(tables: TransmissionTables, compensation: Mapping[str, Any] 
 
 
 def _parameter_tree(tables: TransmissionTables) -> dict[str, Any]:
-    """Everything by name; what a cable has not is left out."""
+    """Return all parameters by name; those that a cable lacks are left out."""
     about, points, levels = tables.about, tables.points, tables.levels
     page: dict[str, Any] = {
         "cable": about.cable, "group": about.group, "version": about.version, "seed": about.seed, "fitted": about.created,

@@ -44,7 +44,7 @@ _SMALLEST, _LARGEST = CHUNK, 8 * CHUNK  # data sets of a piece; what is lost whe
 def divide_into_pieces(
     cases: Sequence[Case], seed: int, settings: BatchSettings, workers: int, largest: int = _LARGEST
 ) -> list[Piece]:
-    """The work, by shape; how it is cut decides nothing of what comes of a data set.
+    """Divide the work by model; no result depends on how it is divided.
 
     Args:
         cases: What is to be fitted.
@@ -72,7 +72,7 @@ def _group_by_shape(cases: Sequence[Case]) -> dict[str, list[Case]]:
 
 
 def describe_quantities(model: Model) -> dict[str, dict[str, str]]:
-    """What a fit draws, in order: of each quantity unit, symbol, meaning, role and prior.
+    """Return unit, symbol, meaning, role and prior of every quantity that a fit draws, in order.
 
     Args:
         model: What was fitted.
@@ -89,7 +89,7 @@ def describe_quantities(model: Model) -> dict[str, dict[str, str]]:
 
 
 def _describe_coefficients(model: Model) -> dict[str, str]:
-    """What each friction coefficient is of, in words; two are the same where these are."""
+    """Describe in words the contacts of each friction coefficient; equal words mean equal coefficients."""
     option = model.description.friction_model
     contacts: dict[str, list[str]] = {}
     for contact in model.description.contact:
@@ -102,7 +102,7 @@ def _describe_coefficients(model: Model) -> dict[str, str]:
 def gather_results(
     name: str, cases: Sequence[Case], fits: Mapping[str, PieceFit], broken: Sequence[FailedInspection], seed: int
 ) -> tuple[Fleet, FleetDraws | None]:
-    """The answer, and the draws of all that could be fitted; None where nothing could be.
+    """Gather the answer, and the draws of all fitted inspections; None where none could be fitted.
 
     Args:
         name: Of the fleet.
@@ -168,7 +168,7 @@ def _collect_draws(
     attributes: Mapping[str, Mapping[str, str]],
     meanings: Mapping[str, Mapping[str, str]],
 ) -> FleetDraws:
-    """All draws in one; NaN where a data set has no such quantity."""
+    """Collect all draws in one data set; NaN where an inspection has no such quantity."""
     draws_by_case = [dict(zip(quantities[c.shaped.key], fits[c.hash].values, strict=True)) for c in cases]
     count = fits[cases[0].hash].values.shape[1]
     missing = np.full(count, np.nan)

@@ -56,7 +56,7 @@ class Inspection:
 
 
 def read_inspections(folder: Path) -> list[Inspection]:
-    """All inspections in a folder, in the order of cables and cycles.
+    """List all inspections in a folder, in the order of cables and cycles.
 
     Args:
         folder: With fleet.csv, or with a folder for each cable; in that either its cable.toml, or one folder for each
@@ -80,7 +80,7 @@ def read_inspections(folder: Path) -> list[Inspection]:
 
 
 def _list_inspections(folder: Path) -> list[Inspection]:
-    """Inspections by the names of folders."""
+    """List inspections by the names of folders."""
     inspections = list[Inspection]()
     for cable in sorted(path for path in folder.iterdir() if path.is_dir()):
         if (cable / DESCRIPTION_FILE).is_file():
@@ -111,7 +111,7 @@ def _parse_folder_name(path: Path) -> float:
 
 
 def _read_inspection_table(path: Path) -> list[Inspection]:
-    """Inspections by fleet.csv."""
+    """Read the inspections listed in fleet.csv."""
     table = read_table(path)
     texts = ("cable", "file", "lubricated", *_TEMPERATURES)
     columns = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
@@ -160,7 +160,7 @@ def _parse_flag(cell: Cell) -> float:
 
 
 def _parse_temperatures(table: RawTable, columns: dict[str, Column]) -> list[float]:
-    """Temperatures [°C]; empty without a column."""
+    """Return temperatures [°C]; empty without a column."""
     headings = [name for name in _TEMPERATURES if name in columns]
     bare = [heading for heading in table.header if heading.strip().lower() in {"temperature", "temp"}]
     if bare or len(headings) > 1:
@@ -179,7 +179,7 @@ def _parse_temperatures(table: RawTable, columns: dict[str, Column]) -> list[flo
 
 
 def _refuse_duplicates(numbered: Sequence[tuple[Inspection, str]]) -> None:
-    """A cable cannot be inspected twice after the same cycles: one would count as two."""
+    """Refuse two inspections of a cable at the same number of cycles, of which one would count as two."""
     seen: dict[str, str] = {}
     for inspection, where in numbered:
         if inspection.label in seen:
@@ -192,7 +192,7 @@ def _refuse_duplicates(numbered: Sequence[tuple[Inspection, str]]) -> None:
 
 
 def _refuse_decreasing_cycles(numbered: Sequence[tuple[Inspection, str]]) -> None:
-    """Inspections of a cable stand in the order in which they were made, so that cycles that fall are a mistake."""
+    """Refuse cycles that decrease between inspections of a cable, which stand in chronological order."""
     last: dict[str, tuple[float, str]] = {}
     wrong = list[str]()
     for inspection, where in numbered:
@@ -227,7 +227,7 @@ class Case:
     hash: str
 
     def seed(self, fleet_seed: int) -> int:
-        """Its own seed: by what was measured, not by its place.
+        """Return the seed of this case, which depends on what was measured and not on its order.
 
         Args:
             fleet_seed: Seed of everything random.
@@ -237,7 +237,7 @@ class Case:
 
 
 def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading) -> Iterator[Case | FailedInspection]:
-    """Every inspection, or why it cannot be fitted.
+    """Read the data set of every inspection, or why it cannot be fitted.
 
     Args:
         folder: Of the fleet.
@@ -293,7 +293,7 @@ def _read_common_description(folder: Path, reading: Reading) -> Description:
 
 
 def _read_table_dataset(path: Path, description: Description, folder: Path) -> Dataset:
-    """The data set of one table under the description of all."""
+    """Read one table under the common description."""
     (kind, settings), *_ = description.tables.stated.items()
     named: dict[str, Any] = {"file": None, "files": None} | {_file_key(settings): escape(_relative_to(path, folder))}
     known = {name: value for name, value in named.items() if name in type(settings).model_fields}
@@ -306,7 +306,7 @@ def _relative_to(path: Path, folder: Path) -> str:
 
 
 def _file_key(settings: Any) -> str:
-    """Under which key a table's file stands."""
+    """Return the key under which a table's file stands."""
     return "file" if "file" in type(settings).model_fields else "files"
 
 
@@ -318,7 +318,7 @@ def _duplicate_message(label: str, other: str) -> str:
 
 
 def refuse_if_none_usable(cases: list[Case], failed: list[FailedInspection]) -> None:
-    """Refuse a fleet of which nothing can be fitted.
+    """Refuse a fleet without any inspection that can be fitted.
 
     Raises:
         DatasetError: What is wrong with the first.

@@ -47,7 +47,7 @@ class FleetStore:
     start: Mapping[str, Any]
 
     def open(self, resume: bool, force: bool) -> dict[str, PieceFit]:
-        """What was fitted before, by the hash of its input, in a folder that is ready for more.
+        """Prepare the folder, and return what was fitted before by the hash of its input.
 
         Args:
             resume: Whether to go on with what is there.
@@ -92,7 +92,7 @@ class FleetStore:
             self._write_start()
 
     def _read_finished(self) -> dict[str, PieceFit]:
-        """What a finished fleet has."""
+        """Return the fits of a finished fleet."""
         draws, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
         with or_damaged(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
             return self._as_fits(draws)
@@ -110,7 +110,7 @@ class FleetStore:
         return fits
 
     def _read_pieces(self) -> dict[str, PieceFit]:
-        """What an interrupted fleet kept; a piece that is damaged is fitted again."""
+        """Return the pieces that an interrupted fleet saved; a damaged one is removed and fitted again."""
         kept: dict[str, PieceFit] = {}
         for path in sorted((self.folder / PIECES_FOLDER).glob("*.npz")):
             damaged = StoreError(f"{path} is damaged")
@@ -126,7 +126,7 @@ class FleetStore:
         return kept
 
     def keep(self, fits: Sequence[PieceFit]) -> None:
-        """Keep what came of a piece; it is there whole, or not at all.
+        """Save the fits of a piece atomically.
 
         Args:
             fits: What came of it.
@@ -136,7 +136,7 @@ class FleetStore:
             write_arrays(kept / f"{name}.npz", {_FITS: tuple(fits)})
 
     def finish(self) -> None:
-        """Remove pieces, once fleet.nc holds them."""
+        """Remove the pieces, once fleet.nc holds them."""
         self._remove_pieces()
 
     def _remove_pieces(self) -> None:
@@ -146,7 +146,7 @@ class FleetStore:
 
 
 def _describe_changes(before: Any, now: Any) -> str:
-    """From what to what, in words; empty where what was begun does not say it."""
+    """Describe a change in words; empty if its former value is unknown."""
     if not (isinstance(before, Mapping) and isinstance(now, Mapping)):
         return f" from {shown(before)} to {shown(now)}" if isinstance(before, int) else ""
     names = [name for name in (*now, *before) if before.get(name) != now.get(name)]
@@ -162,7 +162,7 @@ def _format_version(version: Any) -> str:
 
 
 def read_start(folder: Path) -> dict[str, Any]:
-    """What the fleet in a folder was begun with.
+    """Read the seed and versions that the fleet in a folder was started with.
 
     Raises:
         StoreError: There is none, or it is damaged.
@@ -177,7 +177,7 @@ def read_start(folder: Path) -> dict[str, Any]:
 
 
 def _is_valid(fit: PieceFit) -> bool:
-    """Whether a fit that was read is one that was kept."""
+    """Return whether a fit that was read has the types of one that was saved."""
     texts = (
         isinstance(fit.name, str)
         and isinstance(fit.engine, str)

@@ -11,7 +11,7 @@ from bowdenfit.inference.interval import Interval
 
 @dataclass(frozen=True, repr=False)
 class ServiceLimit(Part):
-    """Until which efficiency a cable serves, and where.
+    """Efficiency until which a cable serves, and the wrap angles at which that holds.
 
     Args:
         efficiency: Below which it has failed.
@@ -26,7 +26,7 @@ class ServiceLimit(Part):
 
 @dataclass(frozen=True, repr=False)
 class Life(Part):
-    """Cycles until the efficiency falls below what is asked for, dry and at the reference temperature.
+    """Cycles until the efficiency falls below the limit, dry and at the reference temperature.
 
     Args:
         median: Of its cycles; infinite where it more likely lasts for ever.
@@ -45,7 +45,7 @@ class Life(Part):
 
 @dataclass(frozen=True, repr=False)
 class PooledCable(Part):
-    """A cable, drawn toward the population as far as its data allow, or by its own inspections alone if it is unlike the rest.
+    """One cable, shrunk toward the population as far as its data allow, or an outlier by its own inspections alone.
 
     Args:
         cable: Name of the cable.
@@ -84,7 +84,7 @@ class PooledCable(Part):
 
 @dataclass(frozen=True, repr=False)
 class Effect(Part):
-    """By which share something changes friction.
+    """Relative change of friction by wear or a covariate.
 
     Args:
         name: "wear" in the reference cycles, "lubrication", or "per_degree".
@@ -99,7 +99,7 @@ class Effect(Part):
 
 @dataclass(frozen=True, repr=False)
 class NextInspection(Part):
-    """The inspection that tells most.
+    """A next inspection and how much it would reduce uncertainty.
 
     Args:
         cable: Of which cable.
@@ -120,7 +120,7 @@ class NextInspection(Part):
 
 @dataclass(frozen=True, repr=False)
 class Curves(Part):
-    """What is drawn over cycles, dry and at the reference temperature.
+    """Curves over cycles, dry and at the reference temperature.
 
     Args:
         cycles: At which.
@@ -152,7 +152,7 @@ class LeftOut(Part):
 
 @dataclass(frozen=True, repr=False)
 class Pool(Display):
-    """Cables of a fleet looked at together.
+    """A hierarchical model of the cables of a fleet.
 
     Args:
         name: Of the fleet.
@@ -210,11 +210,11 @@ class Pool(Display):
 
     @property
     def outliers(self) -> tuple[PooledCable, ...]:
-        """Cables that are unlike the rest, the one furthest off first."""
+        """Outlying cables, the most extreme first."""
         return tuple(sorted((cable for cable in self.cables if cable.departure), key=lambda cable: cable.p_value))
 
     def cable(self, name: str) -> PooledCable:
-        """One of the cables.
+        """Return one of the cables.
 
         Raises:
             KeyError: There is none of this name.

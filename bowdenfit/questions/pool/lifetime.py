@@ -76,7 +76,7 @@ def _parse_wrap_angle(text: str) -> tuple[str, float]:
 
 
 def cycles_to_failure(limit: ServiceLimit, logs: np.ndarray, wear: np.ndarray, reference: float) -> np.ndarray:
-    """Cycles at which each draw falls below the efficiency that is asked for.
+    """Return the cycles at which each draw falls below the required efficiency; infinite where it never does.
 
     Args:
         limit: The efficiency and the wrap angles.
@@ -90,13 +90,13 @@ def cycles_to_failure(limit: ServiceLimit, logs: np.ndarray, wear: np.ndarray, r
 
 
 def friction_log_margin(limit: ServiceLimit, logs: np.ndarray) -> np.ndarray:
-    """By how much log coefficients may grow until then, (...,)."""
+    """Return by how much log coefficients may grow until the required efficiency is reached, (...,)."""
     angles = np.array(list(limit.wrap_angles.values()))
     return np.log(-np.log(limit.efficiency)) - np.log(np.exp(logs) @ angles)
 
 
 def summarize_life(limit: ServiceLimit, cycles: np.ndarray, longest: float) -> Life:
-    """A life of draws of its cycles.
+    """Summarize draws of the cycles to failure.
 
     Args:
         limit: What it is until.
@@ -114,7 +114,7 @@ _FURTHEST = 8.0  # times the longest inspected
 
 
 def compute_curves(data: PoolingData, draws: PopulationDraws, limit: ServiceLimit | None, new: np.ndarray) -> Curves:
-    """What is drawn over cycles.
+    """Compute curves over cycles of every cable and of a new one.
 
     Args:
         data: What is pooled.
@@ -146,19 +146,19 @@ def compute_curves(data: PoolingData, draws: PopulationDraws, limit: ServiceLimi
 
 
 def _friction_quantiles(values: np.ndarray, cycles: np.ndarray, reference: float) -> np.ndarray:
-    """Friction over that when new: 5 %, 50 % and 95 %."""
+    """Return 5 %, 50 % and 95 % of friction relative to that when new."""
     growth: np.ndarray = np.exp(np.quantile(values[:, -1], (0.05, 0.5, 0.95))[:, None] * cycles / reference)
     return growth
 
 
 def _efficiency_quantiles(limit: ServiceLimit, values: np.ndarray, cycles: np.ndarray, reference: float) -> np.ndarray:
-    """Efficiency: 5 %, 50 % and 95 %."""
+    """Return 5 %, 50 % and 95 % of the efficiency."""
     total = np.exp(values[:, :-1]) @ np.array(list(limit.wrap_angles.values()))
     return np.quantile(np.exp(-total[:, None] * np.exp(values[:, -1:] * cycles / reference)), (0.05, 0.5, 0.95), axis=0)
 
 
 def _share_failed(life: np.ndarray, cycles: np.ndarray) -> np.ndarray:
-    """Share of lives that have ended."""
+    """Return the share of lives that have ended by each number of cycles."""
     share: np.ndarray = np.searchsorted(np.sort(life), cycles, side="right") / len(life)
     return share
 
@@ -171,7 +171,7 @@ _LEAST = 1e-3  # share of a variance below which nothing is told
 def rank_next_inspections(
     data: PoolingData, draws: PopulationDraws, limit: ServiceLimit | None, seed: int
 ) -> tuple[NextInspection, ...]:
-    """Those that tell most, the best first; none where nothing is told of wear.
+    """Return the most informative next inspections, the best first; none if wear is not identifiable.
 
     Args:
         data: What is pooled.
@@ -215,7 +215,7 @@ def rank_next_inspections(
 
 
 def _sd_before_and_after(target: np.ndarray, proxy: np.ndarray, readings: np.ndarray) -> tuple[float, float]:
-    """Standard deviation of a target before and after.
+    """Return the standard deviation of a target now, and expected after an inspection.
 
     Args:
         target: Draws of it.

@@ -1,16 +1,15 @@
-r"""Which cable is unlike the rest, and whether all are of one kind.
+r"""Outlying cables of a fleet, and a test for a mixture of several populations.
 
 Each number of a cable, its log coefficients when new and its wear, is compared with what the population of the other cables
-foretells of it, as far as its own inspections tell it:
+predicts for it, as far as its own inspections identify it:
 
 .. math:: t_{ik} = (\hat u_{ik} - m_k) / \sqrt{s_k^2 + v_{ik}}
 
-and its inspections with each other, so that wear that is not straight and an inspection that disagrees are seen too. The least
-of these probabilities, times their number, is the cable's. Cables that are far off by median and median deviation, which
-several of them cannot hide behind, and any other that may be named are left out of the population and compared with it drawn
-without them; for the others its draws are weighted by one over the likelihood of the cable in question, which is enough to see
-that they are not at its end. Whether cables are of one kind is the test of Anderson and
-Darling for a normal distribution.
+and its inspections with each other, so that nonlinear wear and an inspection that disagrees are seen too. The smallest of these
+probabilities, times their number, is the cable's. Cables that are far off by median and median absolute deviation, where
+outliers cannot mask each other, and any other suspect are left out, and compared with the population drawn without them; for the others
+its draws are importance-weighted by one over the likelihood of the cable in question. A mixture of populations is detected by
+the test of Anderson and Darling for a normal distribution.
 
 References:
     Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Rosner 1983, "Percentage points for
@@ -28,23 +27,22 @@ from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 from bowdenfit.multiple_testing import adjust_p_values
 
-FALSE_ALARM, MIXTURE_LEVEL = (
-    0.05,
-    0.01,
-)  # of fleets in which all cables are alike: of naming any, and of seeing two kinds
+FALSE_ALARM = 0.05  # share of homogeneous fleets in which any cable is named as an outlier
+MIXTURE_LEVEL = 0.01  # significance level of the test for a mixture of populations
 _POPULATIONS = 1000  # draws of the population
-_REPEATS = 20  # stretches of the errors for each
-_TAIL_FACTOR = 4.0  # times fewer degrees of freedom, by which large stretches are drawn oftener
-_LEAST_SQUARE = 1e-200  # that divides without overflow
-_RANK = 1e-9
-_CONSISTENCY = -1  # in place of the number of a cable: its inspections, with each other and with a line
-_FEWEST_TO_LEAVE_OUT, _DISTANT = 5, 3.5  # cables, and typical deviations from the median
+_REPEATS = 20  # draws of the error scales for each of them
+_TAIL_FACTOR = 4.0  # the proposal of the error scales has so many times fewer degrees of freedom, hence heavier tails
+_LEAST_SQUARE = 1e-200  # smallest chi-square draw that divides without overflow
+_RANK = 1e-9  # relative singular value below which a direction is not determined
+_CONSISTENCY = -1  # key of the consistency of inspections with each other and with linear wear
+_FEWEST_TO_LEAVE_OUT = 5  # cables that a fleet must have at least
+_DISTANT = 3.5  # scaled median absolute deviations beyond which a cable is suspect (Iglewicz and Hoaglin 1993)
 _NORMAL_DEVIATION = 0.6745  # median deviation of a normal distribution in standard deviations
-_FEWEST_FOR_MIXTURE = 8  # cables of which can be said whether they are of one kind
+_FEWEST_FOR_MIXTURE = 8  # cables below which the test of normality is not used
 
 
 def find_distant_cables(inspected: Inspections, draws: PopulationDraws) -> tuple[int, ...]:
-    """Cables that may be unlike the rest, by number: at most a third of them.
+    """Return the numbers of cables far from the median of all, by median absolute deviations; at most a third of them.
 
     Args:
         inspected: What is known.
@@ -63,7 +61,7 @@ def find_distant_cables(inspected: Inspections, draws: PopulationDraws) -> tuple
 def separate_outliers(
     inspected: Inspections, population: PopulationDraws, draw: Callable[[tuple[int, ...]], PopulationDraws], seed: int
 ) -> tuple[PopulationDraws, np.ndarray]:
-    """The population without cables that are unlike it, and the chance of each cable among so many, (cable,).
+    """Draw the population without outlying cables, and return it with the adjusted p-value of every cable, (cable,).
 
     Whoever may be named is left out first: draws of a population that has a cable in it say hardly anything of one without it
     where that cable is at its end, however they are weighted. All of them are left out together, so that they cannot hide
@@ -97,7 +95,7 @@ def separate_outliers(
 
 
 def _select_suspects(adjusted: np.ndarray, far: tuple[int, ...]) -> tuple[int, ...]:
-    """Who may be unlike the rest, by number: at most a third of the cables, or one."""
+    """Return the numbers of possible outliers: at most a third of the cables, or one."""
     likely = {*far, *np.flatnonzero(adjusted < FALSE_ALARM)}
     worst = sorted(likely, key=lambda i: (i not in far, adjusted[i]))[: max(len(adjusted) // 3, 1)]
     return tuple(sorted(int(i) for i in worst))
@@ -106,7 +104,7 @@ def _select_suspects(adjusted: np.ndarray, far: tuple[int, ...]) -> tuple[int, .
 def outlier_p_values(
     inspected: Inspections, draws: PopulationDraws, seed: int, without: tuple[int, ...] = ()
 ) -> np.ndarray:
-    """Probability that a cable of this population is as far from the others as each is, (cable,).
+    """Return for each cable the probability that one of this population is as far from the others, (cable,).
 
     Among ten thousand cables only a probability of a few millionths names one, which no counting of simulated cables would
     find. Given a draw of the population, and by how much the errors of each inspection are stretched, all that is compared is
@@ -131,7 +129,7 @@ def _thin(draws: PopulationDraws) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def find_departure(inspected: Inspections, core: PopulationDraws, cable: int, seed: int) -> tuple[int, float] | None:
-    """The number in which a cable is unlike the rest by its own inspections, and by how many spreads.
+    """Return the quantity in which a cable departs most from the population, and its distance in spreads.
 
     None where it is rather its inspections that are unlike each other.
 
@@ -150,7 +148,7 @@ def find_departure(inspected: Inspections, core: PopulationDraws, cable: int, se
 def _outlier_p_value(
     inspected: Inspections, cable: int, *population: np.ndarray, generator: np.random.Generator, is_in: bool
 ) -> float:
-    """Of one cable, which may be in the population or not."""
+    """Return the Bonferroni-adjusted p-value of one cable, which may be part of the population or not."""
     p_values, _ = _compare_with_population(inspected, cable, *population, generator=generator, is_in=is_in)
     return min(1.0, len(p_values) * min(p_values.values()))
 
@@ -165,7 +163,7 @@ def _compare_with_population(
     generator: np.random.Generator,
     is_in: bool,
 ) -> tuple[dict[int, float], dict[int, float]]:
-    """Chance of each number of a cable, and of its inspections together as number -1; how many spreads each number is off."""
+    """Return the p-value of every quantity of a cable (of its consistency as number -1), and their distances in spreads."""
     rows = np.flatnonzero(inspected.cable == cable)
     known = inspected.known[rows].ravel()
     design = inspected.design[rows].reshape(known.size, -1)[known]
@@ -204,7 +202,7 @@ def _compare_with_population(
 def _draw_error_scales(
     freedom: np.ndarray, populations: int, generator: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """By how much the variance of each inspection's errors is stretched, (population, repeat, inspection), and their weights.
+    """Draw the factors of error variance of a t distribution, (population, repeat, inspection), with importance weights.
 
     Large stretches are drawn oftener than they come, of one inspection at a time, as one large error makes a rare sum.
     """
@@ -219,7 +217,7 @@ def _draw_error_scales(
 def _inconsistency_p_values(
     residual: np.ndarray, stretch: np.ndarray, scale: np.ndarray, design: np.ndarray, generator: np.random.Generator
 ) -> np.ndarray:
-    """Probabilities that inspections of a cable disagree as much among each other, or with a line; 1 where they cannot."""
+    """Return p-values of the disagreement of inspections with each other or with linear wear; 1 where none is possible."""
     root = np.linalg.inv(np.linalg.cholesky(scale))
     left, sizes, _ = np.linalg.svd(root @ design)
     free = left[:, np.sum(sizes > _RANK * sizes.max()) :]
@@ -237,7 +235,7 @@ def _inconsistency_p_values(
 def find_mixtures(
     inspected: Inspections, draws: PopulationDraws, names: tuple[str, ...], without: Collection[int] = ()
 ) -> dict[str, float]:
-    """Numbers in which cables do not look like one population, with the probability of that by chance in such a fleet.
+    """Return the quantities that are not normally distributed between cables, with their adjusted p-values.
 
     Args:
         inspected: What is known.
@@ -267,7 +265,7 @@ def find_mixtures(
 
 
 def anderson_darling_p_value(values: np.ndarray) -> float:
-    """Probability of values as far from a normal distribution of unknown mean and variance, by Stephens' approximation.
+    """Return the p-value of Anderson and Darling's test of normality, mean and variance unknown, by Stephens' approximation.
 
     Args:
         values: At least eight.

@@ -26,7 +26,7 @@ _SMALLEST = 1e-12  # that a coefficient may be drawn as
 
 @dataclass(frozen=True)
 class PoolingData:
-    """What of a fleet is pooled.
+    """What is pooled of a fleet.
 
     Args:
         cables: Names, in the order of their numbers.
@@ -58,7 +58,7 @@ class PoolingData:
 
 
 def select_inspections(fleet: FleetDraws) -> PoolingData:
-    """What of a fleet is pooled.
+    """Select the inspections and coefficients of a fleet that are pooled.
 
     Args:
         fleet: Draws of all inspections.
@@ -100,7 +100,7 @@ def select_inspections(fleet: FleetDraws) -> PoolingData:
 
 
 def _summarize_by_pattern(logs: np.ndarray, known: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> Summaries:
-    """Of all inspections, those that have the same coefficients together."""
+    """Summarize likelihoods of all inspections, those with the same coefficients together."""
     count, coefficients = known.shape
     center, scale, freedom = (
         np.zeros((count, coefficients)),
@@ -118,7 +118,7 @@ def _summarize_by_pattern(logs: np.ndarray, known: np.ndarray, mean: np.ndarray,
 def _split_by_meaning(
     fleet: FleetDraws, notes: list[str]
 ) -> tuple[dict[str, np.ndarray], dict[str, Mapping[str, str]]]:
-    """Draws and attributes of coefficients, those of one name that mean different things under names of their own."""
+    """Return draws and attributes of coefficients; one name with several meanings is split into several."""
     shapes = [_text(key) for key in fleet.stats["shape"]]
     meanings: Mapping[str, Mapping[str, str]] = fleet.about.get("meanings", {})
     values: dict[str, np.ndarray] = {}
@@ -148,7 +148,7 @@ def _split_by_meaning(
 
 
 def _log_prior(about: Mapping[str, str]) -> Any:
-    """Mean and standard deviation of the log coefficient in single fits; None where there is none."""
+    """Return mean and standard deviation of the prior of a log coefficient in single fits; None if it has none."""
     try:
         prior = json.loads(about["prior"])
         if prior["kind"] == "LogNormal":
@@ -163,7 +163,7 @@ def _log_prior(about: Mapping[str, str]) -> Any:
 def _select_usable(
     fleet: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str]
 ) -> tuple[np.ndarray, tuple[LeftOut, ...]]:
-    """Which inspections are pooled, and why others are not."""
+    """Return a mask of the inspections that are pooled, and why the others are not."""
     trusted = fleet.stats["trusted"].astype(bool)
     has = np.any([np.isfinite(draws).all(axis=1) for draws in values.values()], axis=0)
     some, dated = np.isfinite(fleet.cycles).any(), np.isfinite(fleet.cycles)
@@ -183,19 +183,19 @@ def _select_usable(
 
 
 def _wear_is_identifiable(cycles: np.ndarray, notes: list[str]) -> bool:
-    """Whether wear can be told."""
+    """Return whether inspections at different numbers of cycles are there."""
     if not np.isfinite(cycles).any():
-        notes.append("Nobody says after how many cycles cables were inspected, so nothing is told of wear and life.")
+        notes.append("The numbers of cycles at the inspections are not given, so wear and life cannot be estimated.")
         return False
     if np.ptp(cycles) == 0:
         every = f"{cycles[0]:,.15g} cycles"
-        notes.append(f"All inspections were made after {every}, so nothing is told of wear and life.")
+        notes.append(f"All inspections were made after {every}, so wear and life cannot be estimated.")
         return False
     return True
 
 
 def _select_covariates(fleet: FleetDraws, kept: np.ndarray, notes: list[str]) -> dict[str, np.ndarray]:
-    """Columns of what else friction may depend on, where every inspection says it and it was not always the same."""
+    """Return columns of covariates that are known for every inspection and vary."""
     columns = {"lubrication": fleet.lubricated[kept], "per_degree": fleet.temperature[kept] - REFERENCE_TEMPERATURE}
     words = {"lubrication": "whether the cable was lubricated", "per_degree": "the temperature"}
     covariates = {}
@@ -222,7 +222,7 @@ LEAST_EFFECTIVE_DRAWS = (
 
 
 def count_effective_draws(data: PoolingData, population: PopulationDraws) -> np.ndarray:
-    """Effective number of each inspection's draws where the pooled ones are, (inspection,).
+    """Return the effective number of draws of each single fit under the pooled posterior, (inspection,).
 
     Args:
         data: What is pooled.
@@ -254,7 +254,7 @@ def _squared_distances(values: np.ndarray, center: np.ndarray, covariance: np.nd
 
 
 def load_readings(data: PoolingData, rows: Sequence[int], folder: Path) -> tuple[JointReadings, ...]:
-    """Readings of some inspections, by the model that they were fitted with.
+    """Load the readings of some inspections, grouped by the model that fitted them.
 
     Args:
         data: What is pooled.

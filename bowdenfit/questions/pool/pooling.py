@@ -39,7 +39,7 @@ _WEAR = "wear"
 
 @dataclass(frozen=True)
 class _PooledDraws:
-    """What a look at all cables gave.
+    """Draws of the population, with and without outliers, and what was found about its cables.
 
     Args:
         full_population: The population of all cables.
@@ -87,7 +87,7 @@ def pool_results(
 
 
 def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measurements: Path | None = None) -> Pool:
-    """The answer.
+    """Pool the cables of a fleet.
 
     Args:
         fleet: Draws of all inspections.
@@ -138,7 +138,7 @@ def _pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measu
 
 
 def _draw_with_readings(data: PoolingData, seed: int, measurements: Path | None) -> _PooledDraws:
-    """At all cables, and again with readings of those of which single fits tell too little."""
+    """Draw the population, and again with the readings of inspections with too few effective draws."""
     inspected, reread = data.inspected, tuple[int, ...]()
     while True:
         readings = load_readings(data, reread, measurements) if measurements is not None and reread else ()
@@ -166,7 +166,7 @@ def _draw_with_readings(data: PoolingData, seed: int, measurements: Path | None)
 def _replace_outliers(
     inspected: Inspections, core: PopulationDraws, outliers: list[int], seed: int
 ) -> tuple[PopulationDraws, tuple[int, ...]]:
-    """Draws with some cables by their own inspections alone, and which of these tell their wear."""
+    """Replace the draws of outliers by those from their own inspections; return also which of these identify their wear."""
     cables, wear_identified = core.cables.copy(), []
     for i in outliers:
         cables[:, i], has_wear = draw_unpooled(inspected, core, i, seed)
@@ -175,7 +175,7 @@ def _replace_outliers(
 
 
 def _find_too_few_draws(data: PoolingData, result: _PooledDraws) -> list[str]:
-    """Why the answer must not be trusted where single fits know too little; empty where they know enough."""
+    """Return reasons for distrust where single fits have too few effective draws."""
     cable_numbers, reasons = data.inspected.cable, []
     low = [
         j
@@ -209,13 +209,13 @@ def _summarize_effect(name: str, logs: np.ndarray) -> Effect:
 
 
 def _estimate_life(data: PoolingData, limit: ServiceLimit, values: np.ndarray) -> Life:
-    """Of draws of log coefficients and wear."""
+    """Estimate a life from draws of log coefficients and wear."""
     cycles = cycles_to_failure(limit, values[:, :-1], values[:, -1], data.reference_cycles)
     return summarize_life(limit, cycles, data.reference_cycles)
 
 
 def _summarize_cables(data: PoolingData, result: _PooledDraws, limit: ServiceLimit | None) -> tuple[PooledCable, ...]:
-    """What is known of each cable."""
+    """Summarize every cable."""
     inspected, population, count = data.inspected, result.population, len(data.coefficients)
     is_reread = np.isin(np.arange(len(inspected.cable)), result.reread)
     cables = []
@@ -246,7 +246,7 @@ def _summarize_cables(data: PoolingData, result: _PooledDraws, limit: ServiceLim
 def _estimate_unpooled(
     data: PoolingData, population: PopulationDraws, row_mask: np.ndarray, has: np.ndarray
 ) -> dict[str, Interval | None]:
-    """Coefficients of a cable when new from its own first inspection, if that was then; effects are those of the fleet."""
+    """Estimate coefficients when new from the first inspection of a cable alone; covariate effects are those of the fleet."""
     row = int(np.flatnonzero(row_mask)[np.argmin(np.nan_to_num(data.cycles[row_mask]))])
     new = data.inspected.cycles is None or data.inspected.cycles[row] == 0
     shift = sum(
@@ -265,7 +265,7 @@ def _estimate_unpooled(
 
 
 def _describe_departure(data: PoolingData, departure: tuple[int, float] | None) -> str:
-    """What is off with a cable that is unlike the rest, by its own inspections."""
+    """Describe in words how an outlier differs by its own inspections."""
     if departure is None:
         return "its inspections do not lie on one line of wear, or one of them disagrees with the others"
     number, distance = departure
@@ -274,7 +274,7 @@ def _describe_departure(data: PoolingData, departure: tuple[int, float] | None) 
 
 
 def _general_notes(data: PoolingData, fleet: FleetDraws) -> list[str]:
-    """What is said of every fleet."""
+    """Return notes that do not depend on the estimates."""
     notes = []
     if len(data.cables) == 1:
         notes.append("It is one cable only: there is no population that it could be compared with or drawn toward.")

@@ -103,8 +103,8 @@ def outlier_sentences(pool: Pool) -> list[str]:
     if pool.mixtures:
         names = listed(list(pool.mixtures))
         lines.append(
-            f"These cables do not look like one population in {names}: there are heaps or stragglers, as where cables of two "
-            "makes are pooled. Pool each make by itself, or a new cable is not what is said here."
+            f"These cables do not look like one population in {names}: there are clusters or outliers, as where cables of two "
+            "makes are pooled. Pool each make by itself; otherwise the prediction for a new cable is wrong."
         )
     return [*(lines or ["No cable is unlike the rest."]), *homogeneity_sentences(pool)]
 
@@ -128,13 +128,13 @@ def homogeneity_sentences(pool: Pool) -> list[str]:
     """Whether all cables are alike, or all unlike."""
     if pool.spreads and all(spread.q05 < _INDISTINGUISHABLE * spread.q95 for spread in pool.spreads.values()):
         most = max(pool.spreads.values(), key=lambda spread: spread.q95)
-        return [f"As far as these inspections tell all cables are alike: they differ by at most {percent(most.q95)}."]
+        return [f"As far as these inspections show, all cables are alike: they differ by at most {percent(most.q95)}."]
     apart = {name: new for name, new in pool.coefficients.items() if new.q95 > _UNRELATED * new.q05}
     if not apart or pool.outliers or pool.mixtures:  # a few that stand apart are said by name
         return []
     named = listed([f"{name} ({new.q05:.2g} to {new.q95:.2g} of nine in ten)" for name, new in apart.items()])
     return [
-        f"All cables are unlike in {named}: one of them tells little of another, and nothing is drawn toward a middle."
+        f"All cables are unlike in {named}: one of them says little about another, and none is shrunk toward a common mean."
     ]
 
 

@@ -13,7 +13,7 @@ from bowdenfit.words import filled, percent, significant, table
 
 @dataclass(frozen=True, repr=False)
 class CouplingScheme(Part):
-    """One way to couple master and slave.
+    """One coupling of master and slave.
 
     Args:
         name: In words.
@@ -47,7 +47,7 @@ class CouplingScheme(Part):
 
 @dataclass(frozen=True, repr=False)
 class SimulatedContact(Part):
-    """One device through time: in the open for 2 s, then against the wall; as figures 12 to 14 of the haptic paper.
+    """One simulated device: in free motion for 2 s, then against the wall, as in figures 12 to 14 of the haptic paper.
 
     Args:
         time: [s].
@@ -68,7 +68,7 @@ class SimulatedContact(Part):
 
 @dataclass(frozen=True, repr=False)
 class Teleoperation(Display):
-    """What a hand feels through a cable, and which walls it may touch.
+    """What a hand feels of a remote wall through a cable, and which walls are stable.
 
     Args:
         cable, device: Their names.
@@ -161,12 +161,12 @@ def _transmission_sentences(answer: Teleoperation) -> Iterator[str]:
     yield (
         f"The hand feels {free}, and of the wall {significant(stiffness.median)} N*m/rad "
         f"({significant(stiffness.q05)} to {significant(stiffness.q95)}) while both sides of the loop are taut. "
-        "Walls are judged as if there were no dry friction, which only calms."
+        "Stability is assessed without dry friction, which only adds damping."
     )
 
 
 def _instability_sentences(answer: Teleoperation) -> Iterator[str]:
-    """Couplings that oscillate without any wall."""
+    """Yield warnings of couplings that oscillate in free motion."""
     for scheme in answer.schemes:
         if scheme.free_motion_stable < answer.probability:
             yield (

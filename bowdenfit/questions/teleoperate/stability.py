@@ -38,7 +38,7 @@ _LEAST_PRELOAD = 1e-6  # N m
 def simulate_contact(
     device: Device, loop: LoopDraws, stated: Mapping[str, Known], gains: CouplingGains, delay: int, bend: int
 ) -> SimulatedContact:
-    """Master and slave of median numbers.
+    """Simulate master and slave with median parameters.
 
     Args:
         device: The device.
@@ -96,7 +96,7 @@ def simulate_contact(
 
 
 def hand_path(sample: float) -> np.ndarray:
-    """Where the hand wants to be: to and fro in the open, then into the wall; angle [rad] and speed [rad/s] at every sample."""
+    """Return the hand's path, to and fro in free motion and then into the wall: angle [rad] and speed [rad/s] by sample."""
     time = np.arange(round(SECONDS / sample)) * sample
     frequency, speed = 2 * np.pi / _PERIOD, PUSHED / _PUSHING
     pushed_angle = np.clip(speed * (time - FREE_SECONDS), 0.0, PUSHED)
@@ -108,7 +108,7 @@ def hand_path(sample: float) -> np.ndarray:
 
 
 def detect_bouncing(time: np.ndarray, wall_torque: np.ndarray) -> bool | None:
-    """Whether the slave leaves the wall again once it should have settled; None where it never came.
+    """Return whether the slave leaves the wall again after it should have settled; None if it never touches it.
 
     Args:
         time: [s].
@@ -163,7 +163,7 @@ Draws = Mapping[str, np.ndarray]
 
 
 def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: float) -> Teleoperation:
-    """The answer.
+    """Assess transmitted torque, stiffness and stability of all coupling schemes.
 
     Args:
         fit: The fit.
@@ -225,7 +225,7 @@ def _coupling_gains(stated: Mapping[str, float], scales: tuple[float, float]) ->
 
 
 def _position_scales(device: Device) -> tuple[float, float]:
-    """C_1 and C_4; 1 where nothing is said, and one from the other."""
+    """Return C_1 and C_4; 1 where neither is stated, and one from the other."""
     known = device.known(*_SCALES)
     to_slave, to_master = (known[key].value if key in known else None for key in _SCALES)
     if to_slave is None or to_master is None:
@@ -247,7 +247,7 @@ def _refuse_missing(device: Device, loop: LoopDraws) -> None:
 
 
 def _master_and_slave(draws: Draws, stiffness: np.ndarray, wall: float) -> MasterSlave:
-    """Every device with a wall of one stiffness, or in free motion."""
+    """Return all devices with a wall of one stiffness, or in free motion."""
     damping = draws["wall.damping"] if wall > 0 else np.zeros_like(stiffness)
     rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s = (draws[key] for key in _PAIR)
     sample, filter_time = draws["controller.sample_time"], draws["controller.filter_time"]
@@ -267,7 +267,7 @@ def _assess_scheme(
     wall: float,
     probability: float,
 ) -> CouplingScheme:
-    """What is felt with one coupling, and which walls are stable."""
+    """Assess one coupling: what is felt, and which walls are stable."""
     radius = spectral_radius_in_contact(_master_and_slave(draws, stiffness, 0.0), gains, delay)
     stable = np.array(
         [
@@ -285,7 +285,7 @@ def _assess_scheme(
 
 
 def find_hardest_wall(walls: np.ndarray, stable: np.ndarray, probability: float) -> float | None:
-    """Hardest wall up to which every softer one is stable with a probability; None where none looked at is too hard.
+    """Return the hardest wall up to which contact is stable with a probability; None if all tested walls are.
 
     Args:
         walls: Stiffnesses from the softest to the hardest [N m/rad].

@@ -5,11 +5,11 @@ predicts for it, as far as its own inspections identify it:
 
 .. math:: t_{ik} = (\hat u_{ik} - m_k) / \sqrt{s_k^2 + v_{ik}}
 
-and its inspections with each other, so that nonlinear wear and an inspection that disagrees are seen too. The smallest of these
-probabilities, times their number, is the cable's. Cables that are far off by median and median absolute deviation, where
-outliers cannot mask each other, and any other suspect are left out, and compared with the population drawn without them; for the others
-its draws are importance-weighted by one over the likelihood of the cable in question. A mixture of populations is detected by
-the test of Anderson and Darling for a normal distribution.
+and its inspections with each other, so that nonlinear wear and an inspection that disagrees are seen too. The smallest of
+these probabilities, times their number, is the cable's. Cables that are far off by median and median absolute deviation,
+where outliers cannot mask each other, and any other suspect are left out, and compared with the population drawn without
+them; for the others its draws are importance-weighted by one over the likelihood of the cable in question. A mixture of
+populations is detected by the test of Anderson and Darling for a normal distribution.
 
 References:
     Gelman, Meng and Stern 1996, "Posterior predictive assessment" (Statistica Sinica 6); Rosner 1983, "Percentage points for

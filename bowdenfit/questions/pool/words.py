@@ -325,7 +325,9 @@ def pool_page(pool: Pool) -> HtmlPage:
             headline=headline(pool),
             pictures=(pictures["pooled-life"], pictures["pooled-wear"]),
         ),
-        prose_section("What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [PageTable(heads, tuple(rows))]),
+        prose_section(
+            "What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [PageTable(heads, tuple(rows))]
+        ),
         prose_section(
             "Every cable",
             [

@@ -143,11 +143,11 @@ def read_arguments(function: Callable[..., Any], arguments: Mapping[str, Any], t
 
 def _validate(type_: Any, value: Any, name: str) -> Any:
     """Return the value as pydantic converts it to a type."""
-    from pydantic import ConfigDict, TypeAdapter, ValidationError
+    import pydantic
 
     try:
-        return TypeAdapter(type_, config=ConfigDict(arbitrary_types_allowed=True)).validate_python(value)
-    except ValidationError as error:
+        return pydantic.TypeAdapter(type_, config=pydantic.ConfigDict(arbitrary_types_allowed=True)).validate_python(value)
+    except pydantic.ValidationError as error:
         (fault, *_) = error.errors()
         if fault["type"] == "literal_error":
             choices = fault["ctx"]["expected"].replace("'", "").replace(" or ", ", ")

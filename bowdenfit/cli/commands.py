@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Collection
 from dataclasses import replace
+from importlib.metadata import version
 from inspect import Parameter as Stated
 from inspect import Signature, unwrap
 from pathlib import Path
@@ -14,12 +15,15 @@ from cyclopts.help import DefaultFormatter, PanelSpec
 from docstring_parser.google import parse
 from rich.box import Box
 
+from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
-from bowdenfit.cli.init_command import HELP, init
 from bowdenfit.cli.running import watch_verb
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
+from bowdenfit.results.answer_cache import read_answers
+from bowdenfit.results.folder import FIT as FIT_FILE
+from bowdenfit.results.folder import refuse_unwritable
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 from bowdenfit.verbs import VERBS
 from bowdenfit.words import listed
@@ -132,8 +136,6 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
 
 def _load_kept_answers(source: Path) -> dict[str, Any]:
     """Return the answers that are kept in a results folder, by question."""
-    from bowdenfit.results.answer_cache import read_answers
-
     return read_answers(source)
 
 
@@ -150,8 +152,6 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     if verb.results and request["output"] is None:
         request["output"] = Path(verb.results) / _results_name(source)
     if request.get("output") is not None:
-        from bowdenfit.results.folder import refuse_unwritable
-
         refuse_unwritable(request["output"])
     function = unwrap(verb.function)  # whose arguments have been read
     if "report" in parameters_of(function):
@@ -168,12 +168,10 @@ def _list_troubles(fit: Any, source: Path) -> Collection[str]:
     """Return why a fit is not to be trusted; empty if the source is not a fit.
 
     Args:
-        found: The fit, where it has been loaded.
+        fit: The fit, if it has been loaded; else the same as `source`.
         source: Its results folder, or what else a verb may be asked of.
     """
-    from bowdenfit.results.folder import FIT
-
-    if fit is source and (source / FIT).exists():
+    if fit is source and (source / FIT_FILE).exists():
         fit = _load_fits(source)
     return () if isinstance(fit, Path) else tuple(fit.verdict().troubles)
 
@@ -186,9 +184,7 @@ def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Repl
 
 def _to_json(reply: Reply) -> str:
     """Return an answer as JSON."""
-    from bowdenfit.results.serialization import plain_data
-
-    return json.dumps(plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
+    return json.dumps(results.plain_data(reply.page()), indent=1, allow_nan=False) + "\n" if reply.page else reply.text
 
 
 def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
@@ -209,6 +205,48 @@ def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
 def _results_name(dataset: Path) -> str:
     """Return the default name of a data set's results folder."""
     return dataset.stem if dataset.suffix else dataset.resolve().name
+
+
+INIT_HELP = """Start a data set: by questions, from files, or from an example.
+
+In a terminal it asks for the files that you measured, and for what they do
+not say: which contacts there are, where their wrap angles come from, what the
+columns are, and their units. With --from it asks only for what these files do
+not say, and where nobody can be asked it refuses what is not said. Without
+files and without a terminal it writes a template to fill in.
+
+  init my-cable                       questions, from the first to the command
+                                      that fits
+  init my-cable --from forces.csv     of this file, or of several
+  init --example on-body-exoskeleton  a data set to try
+"""
+
+
+def init(
+    folder: Annotated[Path | None, Parameter("FOLDER")] = None,
+    /,
+    *,
+    files: Annotated[list[Path] | None, Parameter("--from", metavar="FILE...", consume_multiple=True)] = None,
+    example: Annotated[
+        list[str] | None, Parameter(metavar="[NAME]", consume_multiple=(0, 2), completer=lambda _: _examples())
+    ] = None,
+) -> None:
+    """Write a new data set.
+
+    Args:
+        folder: The folder to write.
+        files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
+        example: Write a data set that comes with bowdenfit; without a name, list them.
+    """
+    from bowdenfit.cli.init_dialog import start_data_set
+
+    start_data_set(folder, files or [], example)
+
+
+def _examples() -> list[str]:
+    from bowdenfit.questions.start.folder import examples
+
+    return list(examples())
 
 
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.
@@ -233,14 +271,12 @@ def _completion(shell: Annotated[Literal["bash", "zsh", "fish"], Parameter("SHEL
 
 
 def _version() -> str:
-    from importlib.metadata import version
-
     return f"bowdenfit, version {version('bowdenfit')}"
 
 
 bowdenfit = App(name="bowdenfit", help=_HELP, version=_version, **LOOK)
 COMMANDS = (
-    App(name="init", help=HELP, default_command=init, **LOOK),
+    App(name="init", help=INIT_HELP, default_command=init, **LOOK),
     *map(command, VERBS),
     App(name="completion", help=_COMPLETION, default_command=_completion, **LOOK),
 )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bowdenfit import plots
 from bowdenfit.plots.style import LEAST, SMALL, TITLE_SIZE, VERMILLION, WIDE
 
 if TYPE_CHECKING:
@@ -30,9 +31,7 @@ _TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13
 
 def empty_page(width: float, height: float) -> Figure:
     """Return an empty figure; sizes in inches."""
-    from bowdenfit.plots.page import Page
-
-    return Page(figsize=(width, height))
+    return plots.page.Page(figsize=(width, height))
 
 
 def panels(
@@ -121,16 +120,13 @@ def count_columns(page: float, most: int, least: float, gap: float) -> int:
 
 def text_width(words: str, size: float = SMALL, weight: str = "normal") -> float:
     """Return the width of a text on the page, of its longest line [in]."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(family="sans-serif", size=size, weight=weight)
+    font = plots.mpl.FontProperties(family="sans-serif", size=size, weight=weight)
 
     def width(line: str) -> float:
         try:
-            return float(text_to_path.get_text_width_height_descent(line, font, line.count("$") > 1)[0])
+            return float(plots.mpl.text_to_path.get_text_width_height_descent(line, font, line.count("$") > 1)[0])
         except ValueError:  # dollar signs without a formula between them
-            return float(text_to_path.get_text_width_height_descent(line, font, False)[0])
+            return float(plots.mpl.text_to_path.get_text_width_height_descent(line, font, False)[0])
 
     return max(map(width, words.split("\n"))) / 72
 
@@ -149,16 +145,12 @@ def wrap_words(words: str, room: float, size: float = SMALL, weight: str = "norm
 
 def line_entry(words: str, linestyle: Any = "", **style: Any) -> Artist:
     """Return an entry of a legend for lines in a style, or for words alone."""
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], label=words, linestyle=linestyle, **style)
+    return plots.mpl.Line2D([], [], label=words, linestyle=linestyle, **style)
 
 
 def area_entry(words: str, color: str) -> Artist:
     """Return an entry of a legend for areas of a color."""
-    from matplotlib.patches import Patch
-
-    return Patch(facecolor=color, label=words)
+    return plots.mpl.Patch(facecolor=color, label=words)
 
 
 def legend_above(figure: Figure, axes: Iterable[Axes], columns: int) -> None:
@@ -257,8 +249,6 @@ def number_below(axes: Axes, whole: bool = False) -> None:
         axes: The panel, with its limits and in its place.
         whole: Whether only whole numbers make sense.
     """
-    from matplotlib.transforms import ScaledTranslation
-
     width = _size(axes)[0]
     low, high = axes.get_xlim()
     most = width / NUMBER_SPACE
@@ -268,7 +258,7 @@ def number_below(axes: Axes, whole: bool = False) -> None:
     for label, value in zip(axes.get_xticklabels(), values, strict=True):  # at the ends they are moved inwards
         half, position = LETTER * len(label.get_text()) / 2, width * (value - low) / (high - low)
         inwards = float(np.clip(position, half - TICK, max(width - half + TICK, half - TICK))) - position
-        label.set_transform(label.get_transform() + ScaledTranslation(inwards, 0.0, axes.figure.dpi_scale_trans))
+        label.set_transform(label.get_transform() + plots.mpl.ScaledTranslation(inwards, 0.0, axes.figure.dpi_scale_trans))
 
 
 def number_left(axes: Axes) -> None:
@@ -297,12 +287,11 @@ def ticks(
         whole: Whether only whole numbers make sense.
         over: How far a number may stand beyond an end, as a share of the axis.
     """
-    from matplotlib.ticker import MaxNLocator
-
     low, high = limits
 
     def round_values(most: int) -> tuple[np.ndarray, float]:
-        candidates = np.asarray(MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole).tick_values(low, high))
+        locator = plots.mpl.MaxNLocator(most, steps=[1, 2, 4, 5, 10], min_n_ticks=1, integer=whole)
+        candidates = np.asarray(locator.tick_values(low, high))
         return candidates[(candidates >= low) & (candidates <= high)], float(candidates[1] - candidates[0])
 
     def apart(values: np.ndarray, texts: list[str]) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit import plots
 from bowdenfit.plots.layout import (
     LEFT,
     RIGHT,
@@ -142,10 +143,8 @@ def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> N
 
 def enlarge_marks(figure: Figure) -> None:
     """Make the small marks of many blocks large enough to be told apart in the legend."""
-    from matplotlib.lines import Line2D
-
     for handle in figure.legends[0].legend_handles:
-        if isinstance(handle, Line2D) and handle.get_linestyle() == "None":
+        if isinstance(handle, plots.mpl.Line2D) and handle.get_linestyle() == "None":
             handle.set_markersize(max(handle.get_markersize(), LEGEND_MARK))
 
 
@@ -157,13 +156,11 @@ def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
         which: "x" or "y".
         ratio: Of its largest to its smallest value.
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < LONG else (1.0,), numticks=6))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_locator(plots.mpl.LogLocator(subs=(1.0, 2.0, 5.0) if ratio < LONG else (1.0,), numticks=6))
+    axis.set_major_formatter(plots.mpl.FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    axis.set_minor_formatter(plots.mpl.NullFormatter())
 
 
 def show_plain_numbers(axes: Axes, which: str) -> None:
@@ -173,10 +170,8 @@ def show_plain_numbers(axes: Axes, which: str) -> None:
         axes: Panel.
         which: "x" or "y".
     """
-    from matplotlib.ticker import FuncFormatter
-
     axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}".replace("-", "\N{MINUS SIGN}")))
+    axis.set_major_formatter(plots.mpl.FuncFormatter(lambda value, _: f"{value:,.6g}".replace("-", "\N{MINUS SIGN}")))
 
 
 def draw_marks(

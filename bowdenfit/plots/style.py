@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
+from bowdenfit import plots
+
 Arguments, Result = ParamSpec("Arguments"), TypeVar("Result")
 
 # Okabe and Ito's palette, which readers with any kind of color vision can tell apart.
@@ -68,21 +70,13 @@ SETTINGS: dict[Any, Any] = {
 }
 
 
-def load_matplotlib() -> None:
-    """Load what every figure needs; they do it otherwise."""
-    import matplotlib.figure  # noqa: F401
-
-
 def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Run a function under the settings of this file; matplotlib's own are back afterwards."""
-
     @functools.wraps(function)
     def styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        import matplotlib as mpl
-
-        if all(mpl.rcParams[name] == value for name, value in SETTINGS.items()):
+        if all(plots.mpl.rcParams[name] == value for name, value in SETTINGS.items()):
             return function(*args, **kwargs)  # called by another such function; a context takes 3 ms
-        with mpl.rc_context(SETTINGS), _boxes_without_words():
+        with plots.mpl.rc_context(SETTINGS), _boxes_without_words():
             return function(*args, **kwargs)
 
     return styled
@@ -107,9 +101,7 @@ def _is_not_about_glyphs(message: logging.LogRecord) -> bool:
 
 def mapped_color(colors: str, position: float) -> Any:
     """Return the color at a position from 0 to 1 of one of matplotlib's color maps."""
-    import matplotlib as mpl
-
-    return mpl.colormaps[colors](position)
+    return plots.mpl.colormaps[colors](position)
 
 
 def percent(fraction: float) -> str:

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from bowdenfit import plots
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 
 if TYPE_CHECKING:
@@ -62,21 +63,16 @@ def save(figure: Figure, target: Path | BinaryIO, ending: str) -> None:
 
 def _save_in_few_colors(png: BytesIO, target: Path | BinaryIO) -> None:
     """Save a picture with a palette of 256 colors, which look the same here and take a third of the bytes."""
-    from PIL import Image
-
-    with Image.open(png) as picture:
-        few = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    with plots.mpl.Image.open(png) as picture:
+        few = picture.convert("RGB").quantize(256, dither=plots.mpl.Image.Dither.NONE)
     few.save(target, PNG, optimize=True, dpi=(DOTS_PER_INCH, DOTS_PER_INCH))
 
 
 def _show_as_written(figure: Figure) -> None:
     """Show texts literally that have dollar signs but are not formulas."""
-    from matplotlib.mathtext import MathTextParser
-    from matplotlib.text import Text
-
-    parser = MathTextParser("path")
-    for text in figure.findobj(Text):
-        assert isinstance(text, Text)
+    parser = plots.mpl.MathTextParser("path")
+    for text in figure.findobj(plots.mpl.Text):
+        assert isinstance(text, plots.mpl.Text)
         try:
             parser.parse(text.get_text())
         except ValueError:

@@ -5,18 +5,18 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import h5netcdf
+import h5py
 import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import or_damaged, refuse_special
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.folder import read_page, replace_atomically
+from bowdenfit.results.netcdf import own_member
 from bowdenfit.types import Vector
-
-if TYPE_CHECKING:
-    import h5py
 
 FLEET_TABLE, FLEET_DESCRIPTION = "fleet.csv", "fleet.toml"  # of the measurements: its inspections, and what all have in common
 COLUMNS = ("cable", "cycles", "temperature_degC", "lubricated", "file")
@@ -61,9 +61,6 @@ def write_fleet_draws(path: Path, fleet: FleetDraws) -> None:
         path: The file.
         fleet: The draws.
     """
-    import h5netcdf
-    import h5py
-
     text = h5py.string_dtype()
     in_memory = io.BytesIO()  # HDF5 does not survive a disk that is full
     with h5netcdf.File(in_memory, "w") as file:
@@ -98,8 +95,6 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     Raises:
         StoreError: There is none, or it is damaged.
     """
-    import h5py
-
     path = folder / FLEET_DRAWS
     refuse_special(path, StoreError)
     if not path.is_file():
@@ -119,9 +114,7 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     return FleetDraws(labels, names, cycles, temperature, lubricated, values, statistics, attributes, about)
 
 
-def _members(file: "h5py.File", group: str) -> "dict[str, h5py.Dataset]":
-    from bowdenfit.results.netcdf import own_member
-
+def _members(file: h5py.File, group: str) -> dict[str, h5py.Dataset]:
     inside = own_member(file, group)
     return {name: own_member(inside, name) for name in inside}
 

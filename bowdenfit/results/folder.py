@@ -8,10 +8,12 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
@@ -256,8 +258,6 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
     Raises:
         StoreError: Another process does, or the folder cannot be made.
     """
-    from filelock import FileLock, Timeout  # only what writes needs it
-
     if folder is None or (folder.exists() and not folder.is_dir()):
         yield
         return
@@ -288,39 +288,6 @@ def _contents(folder: Path) -> list[Path]:
 def remove_earlier_fit(folder: Path) -> None:
     """Remove what an earlier fit wrote, and nothing else; the mark of a finished fit goes first."""
     remove_run_files(folder, _WRITTEN, [FIGURES])
-
-
-def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
-    """Make the sampler's checkpoint, which carries what it was started for.
-
-    Raises:
-        StoreError: The folder cannot be written.
-    """
-    from bowdenfit.inference.checkpoint import checkpoint_header
-
-    with folder_to_write(path.parent), replace_atomically(path) as temporary:
-        temporary.write_bytes(checkpoint_header(fingerprint))
-
-
-def read_checkpoint(folder: Path) -> dict[str, Any]:
-    """Return the fingerprint of the fit for which the checkpoint in a folder was started.
-
-    Raises:
-        StoreError: There is no checkpoint, or it is damaged.
-    """
-    from bowdenfit.inference.checkpoint import damaged_checkpoint_error, read_fingerprint
-
-    path = folder / CHAIN
-    if not path.exists():
-        raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
-    try:
-        fingerprint = read_fingerprint(path)
-        refuse_invalid_seed(fingerprint["seed"])
-        if isinstance(fingerprint["description"], dict) and isinstance(fingerprint["sha256"], dict):
-            return fingerprint
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        pass
-    raise damaged_checkpoint_error(path)
 
 
 def refuse_invalid_seed(seed: Any) -> None:

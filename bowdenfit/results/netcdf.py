@@ -3,17 +3,16 @@
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 from urllib.parse import unquote
 
+import h5netcdf
+import h5py
 import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import replace_atomically
-
-if TYPE_CHECKING:
-    import h5py
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
@@ -36,8 +35,6 @@ def write_groups(
         attributes: Attributes of the file.
         variable_attributes: Unit, symbol and meaning by variable.
     """
-    import h5netcdf
-
     in_memory = io.BytesIO()  # HDF5 does not survive a disk that is full
     with h5netcdf.File(in_memory, "w") as file:
         file.attrs.update(attributes)
@@ -62,7 +59,7 @@ def _write(
         if dimension not in group.dimensions:
             group.dimensions[dimension] = length
             if labels is not None and dimension in of_readings:
-                group.create_variable(dimension, (dimension,), dtype=_text(), data=np.array(labels, dtype=object))
+                group.create_variable(dimension, (dimension,), dtype=h5py.string_dtype(), data=np.array(labels, dtype=object))
             else:
                 group.create_variable(dimension, (dimension,), data=np.arange(length))
     flags = values.dtype == bool
@@ -76,19 +73,11 @@ def _key(name: str) -> str:
     return encoded.replace(".", "%2E") if not encoded.strip(".") else encoded
 
 
-def _text() -> Any:
-    import h5py
-
-    return h5py.string_dtype()
-
-
 def read_groups(path: Path) -> Groups:
     """Return the arrays of posterior.nc by group and name, in the order in which they were written.
 
     Read as the HDF5 that they are: the libraries that give them their labels take longer to load than the draws to read.
     """
-    import h5py
-
     refuse_special(path, StoreError)
     with h5py.File(path) as file:
         groups = {name: own_member(file, name) for name in _members(file)}
@@ -99,7 +88,7 @@ def read_groups(path: Path) -> Groups:
         }
 
 
-def own_member(group: "h5py.Group", name: str) -> Any:
+def own_member(group: h5py.Group, name: str) -> Any:
     """Return a member of a group that lies in this very file and is not larger than it.
 
     Args:
@@ -110,8 +99,6 @@ def own_member(group: "h5py.Group", name: str) -> Any:
         ValueError: It lies elsewhere, or says that it is larger than the file.
         KeyError: Nothing has that name.
     """
-    import h5py
-
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise ValueError(f"{name} lies in another file or place")
     member = group[name]
@@ -123,21 +110,17 @@ def own_member(group: "h5py.Group", name: str) -> Any:
     return member
 
 
-def _members(group: "h5py.Group") -> list[str]:
+def _members(group: h5py.Group) -> list[str]:
     """Return names in a group, in the order in which they were written."""
-    import h5py
-
     names: list[bytes] = []
     group.id.links.iterate(names.append, idx_type=h5py.h5.INDEX_CRT_ORDER)
     return [name.decode() for name in names]
 
 
-def _is_label(member: "h5py.Dataset") -> bool:
+def _is_label(member: h5py.Dataset) -> bool:
     """Whether a dataset labels a dimension of others."""
-    import h5py
-
     return bool(h5py.h5ds.is_scale(member.id))
 
 
-def _array(member: "h5py.Dataset") -> np.ndarray:
+def _array(member: h5py.Dataset) -> np.ndarray:
     return np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)

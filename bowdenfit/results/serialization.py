@@ -12,6 +12,7 @@ import numpy as np
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_packed, refuse_special
 from bowdenfit.results.folder import replace_atomically
+from bowdenfit.types import Flags, Labels, Matrix
 
 
 def plain_data(answer: Any) -> Any:
@@ -111,8 +112,6 @@ def stored_key(field: Field[Any]) -> str:
 
 
 def _array(kind: Any, value: list[Any]) -> np.ndarray:
-    from bowdenfit.types import Flags, Labels, Matrix
-
     if kind in (Labels, Flags):
         return np.array(value, dtype=int if kind is Labels else bool)
     array = np.array(value, dtype=float)

@@ -1,1 +1,5 @@
-"""From a data set to a finished fit: prepare the results folder, fit, sample, write."""
+"""From a data set to a finished fit: prepare the results folder, fit, sample, write; loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

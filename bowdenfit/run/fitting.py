@@ -50,6 +50,7 @@ class Stopwatch:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
+@jax.enable_x64(True)
 def fit_classically(data: Dataset, seed: int) -> Fit:
     """Fit by least squares alone, without a posterior.
 
@@ -64,6 +65,7 @@ def fit_classically(data: Dataset, seed: int) -> Fit:
     return Fit(data, squares, None, not reasons, reasons, provenance(seed, watch))
 
 
+@jax.enable_x64(True)
 def fit_posterior(
     data: Dataset,
     seed: int,

@@ -1,6 +1,7 @@
 """Before a fit starts: may the results folder be written, which seed, which checkpoint."""
 
 import secrets
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,16 @@ from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
+from bowdenfit.inference.checkpoint import checkpoint_header, damaged_checkpoint_error, read_fingerprint
 from bowdenfit.kinds.descriptions import parse_description
-from bowdenfit.results.folder import CHAIN, read_checkpoint, refuse_to_overwrite, remove_earlier_fit, start_checkpoint
+from bowdenfit.results.folder import (
+    CHAIN,
+    folder_to_write,
+    refuse_invalid_seed,
+    refuse_to_overwrite,
+    remove_earlier_fit,
+    replace_atomically,
+)
 
 
 def choose_sampler(data: Dataset, method: str | None, mcmc: bool) -> Dataset:
@@ -89,3 +98,32 @@ def start_checkpointing(folder: Path | None, data: Dataset, seed: int, resume: b
         remove_earlier_fit(folder)
         start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return folder / CHAIN
+
+
+def start_checkpoint(path: Path, fingerprint: Mapping[str, Any]) -> None:
+    """Make the sampler's checkpoint, which carries what it was started for.
+
+    Raises:
+        StoreError: The folder cannot be written.
+    """
+    with folder_to_write(path.parent), replace_atomically(path) as temporary:
+        temporary.write_bytes(checkpoint_header(fingerprint))
+
+
+def read_checkpoint(folder: Path) -> dict[str, Any]:
+    """Return the fingerprint of the fit for which the checkpoint in a folder was started.
+
+    Raises:
+        StoreError: There is no checkpoint, or it is damaged.
+    """
+    path = folder / CHAIN
+    if not path.exists():
+        raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
+    try:
+        fingerprint = read_fingerprint(path)
+        refuse_invalid_seed(fingerprint["seed"])
+        if isinstance(fingerprint["description"], dict) and isinstance(fingerprint["sha256"], dict):
+            return fingerprint
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        pass
+    raise damaged_checkpoint_error(path)

@@ -8,12 +8,13 @@ from warnings import warn
 
 from cyclopts import Parameter
 
+from bowdenfit import run
 from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Seed, read_first
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
-from bowdenfit.results.folder import CHAIN
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
+from bowdenfit.results.folder import CHAIN, reserve_folder
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
 from bowdenfit.words import percent
 
 if TYPE_CHECKING:
@@ -57,30 +58,20 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
-    from bowdenfit.results.folder import reserve_folder
-    from bowdenfit.run.preparing import choose_sampler, choose_seed, start_checkpointing
-    from bowdenfit.verb import show_progress_bar
-
     refuse_low_memory()
     folder = Path(output) if output is not None else None
-    data = choose_sampler(read(dataset, **reading), sampler, mcmc)
+    data = run.choose_sampler(read(dataset, **reading), sampler, mcmc)
     with reserve_folder(folder):
-        seed = choose_seed(folder, data, mcmc, seed, resume, force)
-        import jax
-
-        from bowdenfit.run.fitting import fit_classically, fit_posterior
-        from bowdenfit.run.writing import write_results
-
+        seed = run.choose_seed(folder, data, mcmc, seed, resume, force)
         keep_compiled_programs()
-        with jax.enable_x64(True):
-            if mcmc:
-                with show_progress_bar(WATCH, progress) as show:
-                    checkpoint = partial(start_checkpointing, folder, data, seed, resume)
-                    result = fit_posterior(data, seed, checkpoint, resume, show)
-            else:
-                result = fit_classically(data, seed)
-            for sentence in write_results(result, folder, figures) if folder is not None else ():
-                report(sentence)
+        if mcmc:
+            with show_progress_bar(WATCH, progress) as show:
+                checkpoint = partial(run.start_checkpointing, folder, data, seed, resume)
+                result = run.fit_posterior(data, seed, checkpoint, resume, show)
+        else:
+            result = run.fit_classically(data, seed)
+        for sentence in run.write_results(result, folder, figures) if folder is not None else ():
+            report(sentence)
     return result
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+import jax
+
 from bowdenfit.errors import DiskError, system_error
 from bowdenfit.finished_fit import Fit
 from bowdenfit.plots.write import PNG
@@ -22,6 +24,7 @@ from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable
 
 
+@jax.enable_x64(True)
 def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
     """Write all files of the results folder; fit.json comes last of the fit's own, before figures and texts.
 

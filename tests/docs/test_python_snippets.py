@@ -26,10 +26,10 @@ CELL = re.compile(r"^```(?:python|\{code-cell\}[^\n]*)\n(.*?)^```", re.MULTILINE
 IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
 PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01"}  # and what they print
 CALIBRATING = """
-from bowdenfit.verb import watched
+from bowdenfit.verb import show_progress_bar
 from bowdenfit.questions.calibrate.verb import WATCH
 
-with watched(WATCH, None) as report:
+with show_progress_bar(WATCH, None) as report:
     for n in range(200):
         report(n + 1, 200)
 """

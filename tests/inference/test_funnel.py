@@ -24,7 +24,7 @@ from bowdenfit.inference.moves import default_moves
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.parameters.priors import LogNormal, Normal
 from bowdenfit.parameters.space import Parameter, ParameterSpace
-from bowdenfit.results.folder import start_checkpoint
+from bowdenfit.run.preparing import start_checkpoint
 
 pytestmark = pytest.mark.extended
 

@@ -1,28 +1,41 @@
-"""`bowdenfit init`: a new data set, from questions in a terminal, from measured files, or from an example."""
+"""Start a data set: ask in a terminal what files do not say, and write the folder."""
 
 import glob
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
-
-from cyclopts import Parameter
+from typing import TypeVar
 
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.files import FORMATS
+from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.start.describe import write_description
+from bowdenfit.questions.start.folder import (
+    describe_written_files,
+    examples,
+    measured_files,
+    refuse_existing,
+    refuse_files,
+    verb_of,
+    write_data_set,
+    write_example,
+    write_template,
+)
+from bowdenfit.questions.start.question import Asker, Question, Unattended
 from bowdenfit.words import filled, printable
 
-if TYPE_CHECKING:
-    from bowdenfit.questions.start.question import Asker, Question
-
 Answer = TypeVar("Answer")
+FOLDER = "my-cable"
+_MOST_FILES = 12  # that are proposed
+_LONGEST_NAME = 80  # of a cable
 
 
 class Terminal:
     """A person at a terminal."""
 
-    def ask(self, question: "Question[Answer]") -> Answer:
+    def ask(self, question: Question[Answer]) -> Answer:
         """Ask until there is a valid answer, and return it."""
         say("")
         say(filled(question.words))
@@ -66,47 +79,18 @@ def is_interactive() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
-FOLDER = "my-cable"
-_MOST_FILES = 12  # that are proposed
-_LONGEST_NAME = 80  # of a cable
-HELP = """Start a data set: by questions, from files, or from an example.
-
-In a terminal it asks for the files that you measured, and for what they do
-not say: which contacts there are, where their wrap angles come from, what the
-columns are, and their units. With --from it asks only for what these files do
-not say, and where nobody can be asked it refuses what is not said. Without
-files and without a terminal it writes a template to fill in.
-
-  init my-cable                       questions, from the first to the command
-                                      that fits
-  init my-cable --from forces.csv     of this file, or of several
-  init --example on-body-exoskeleton  a data set to try
-"""
-
-
-def init(
-    folder: Annotated[Path | None, Parameter("FOLDER")] = None,
-    /,
-    *,
-    files: Annotated[list[Path] | None, Parameter("--from", metavar="FILE...", consume_multiple=True)] = None,
-    example: Annotated[
-        list[str] | None, Parameter(metavar="[NAME]", consume_multiple=(0, 2), completer=lambda _: _examples())
-    ] = None,
-) -> None:
+def start_data_set(folder: Path | None, files: Sequence[Path], example: Sequence[str] | None) -> None:
     """Write a new data set.
 
     Args:
-        folder: The folder to write.
-        files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
-        example: Write a data set that comes with bowdenfit; without a name, list them.
+        folder: The folder to write; asked for if None.
+        files: Measured files.
+        example: Name of an example, and its folder; all are listed if empty. None for no example.
     """
-    from bowdenfit.questions.start.folder import refuse_existing, write_template
-    from bowdenfit.questions.start.question import Unattended
-
     if example is not None:
         _example(example, folder, files)
         return
-    target, measured = split_folder_and_files(folder, files or [])
+    target, measured = split_folder_and_files(folder, files)
     if not is_interactive() and target is None and not measured:
         raise UsageError(f"name the folder to write, such as bowdenfit init {FOLDER}.")
     ask: Asker = Terminal() if is_interactive() else Unattended()
@@ -132,16 +116,8 @@ def split_folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[
     return next(iter(folders), None), [path for path in named if path not in folders]
 
 
-def _examples() -> list[str]:
-    from bowdenfit.questions.start.folder import examples
-
-    return list(examples())
-
-
 def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | None) -> None:
     """Write an example, into a folder that may be named behind it, or say which there are."""
-    from bowdenfit.questions.start.folder import examples, verb_of, write_example
-
     if files:
         raise UsageError("--from and --example both say what to write; leave one of them out.")
     if not named:
@@ -153,9 +129,7 @@ def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | 
     say(f"Wrote {folder}. Next: bowdenfit {verb_of(folder)} {shlex.quote(str(folder))}")
 
 
-def _ask_folder(ask: "Asker") -> Path:
-    from bowdenfit.questions.start.folder import refuse_existing
-    from bowdenfit.questions.start.question import Question
+def _ask_folder(ask: Asker) -> Path:
 
     def read(typed: str) -> Path:
         refuse_existing(Path(typed.strip()).expanduser())
@@ -164,12 +138,8 @@ def _ask_folder(ask: "Asker") -> Path:
     return ask.ask(Question("Which folder shall be written?", read, FOLDER))
 
 
-def _ask_files(ask: "Asker") -> list[Path]:
+def _ask_files(ask: Asker) -> list[Path]:
     """Ask for the measured files; none where only a template is to be written."""
-    from bowdenfit.files import FORMATS
-    from bowdenfit.questions.start.folder import measured_files, refuse_files
-    from bowdenfit.questions.start.question import Question
-
     here = measured_files(Path(), list(FORMATS))
 
     def read(typed: str) -> list[Path]:
@@ -188,12 +158,8 @@ def _ask_files(ask: "Asker") -> list[Path]:
     return ask.ask(Question(words, read, proposed))
 
 
-def _start_from_files(folder_: Path, files: Sequence[Path], ask: "Asker") -> None:
+def _start_from_files(folder_: Path, files: Sequence[Path], ask: Asker) -> None:
     """Describe the files, write the folder, and check that `check` accepts it."""
-    from bowdenfit.questions.check.verb import check
-    from bowdenfit.questions.start.describe import write_description
-    from bowdenfit.questions.start.folder import describe_written_files, refuse_files, write_data_set
-
     refuse_files(files)
     called = printable(folder_.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
     text = write_description(files, (called.strip() and called) or "cable", ask)

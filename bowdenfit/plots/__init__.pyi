@@ -1,0 +1,2 @@
+from . import mpl as mpl
+from . import page as page

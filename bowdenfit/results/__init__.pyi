@@ -1,0 +1,1 @@
+from .serialization import plain_data as plain_data

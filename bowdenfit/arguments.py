@@ -204,7 +204,7 @@ def whole_number(least: int, most: float = math.inf) -> Reader:
         if (is_whole or is_text) and least <= int(value) <= most:
             return int(value)
         limits = f" from {least}" + (f" to {most}" if most < math.inf else "")
-        raise UsageError(f"{name} = {shown(value)} is no whole number{limits}; write one.")
+        raise UsageError(f"{name} = {shown(value)} must be a whole number{limits}.")
 
     return Reader(read)
 
@@ -223,9 +223,9 @@ def _is_number_with_unit(value: Any) -> bool:
 def _read_lengths(value: Any, name: str) -> list[float | NumberWithUnit]:
     lengths = _as_list(value)
     if not lengths:
-        raise UsageError(f"{name} = {shown(value)} names no length; name some, or leave it out where all are meant.")
+        raise UsageError(f"{name} = {shown(value)} names no length; name some, or leave it out to use all.")
     if not all(isinstance(item, str | Real) or _is_number_with_unit(item) for item in lengths):
-        raise UsageError(f"{name} = {shown(value)} are no lengths; write them as [455, 470], or ['18 in'].")
+        raise UsageError(f"{name} = {shown(value)} must be lengths, such as [455, 470] or ['18 in'].")
     if all(isinstance(item, str) for item in lengths):  # of which a unit may be one by itself
         return read_lengths(lengths, name)
     read = [read_lengths([item], name) if isinstance(item, str) else [_number_or_pair(item)] for item in lengths]
@@ -239,27 +239,27 @@ def _number_or_pair(value: Any) -> float | NumberWithUnit:
 def _read_texts(value: Any, name: str) -> Sequence[str]:
     texts = tuple(_as_list(value))
     if isinstance(value, Mapping) or not all(isinstance(text, str) for text in texts):
-        raise UsageError(f"{name} = {shown(value)} is no list of texts; write it as ['name=value'].")
+        raise UsageError(f"{name} = {shown(value)} must be a list of texts, such as ['name=value'].")
     return texts
 
 
 def _read_path(value: Any, name: str) -> Any:
     """Return a path, or what was read from one, which is nothing that Python itself has."""
     if isinstance(value, Number | bytes | list | tuple | dict | NoneType):
-        refusal = f"{name} = {shown(value)} is neither a path nor what bowdenfit has read; write it as 'my-cable'."
+        refusal = f"{name} = {shown(value)} must be a path, such as 'my-cable', or data that bowdenfit has read."
         raise UsageError(refusal)
     return Path(value) if isinstance(value, str) else value
 
 
 def _read_fit(value: Any, name: str) -> Any:
     if isinstance(value, str | PathLike):
-        raise UsageError(f"{name} is the fit itself; write bowdenfit.load({str(value)!r}) instead of the folder's name.")
+        raise UsageError(f"{name} must be a fit; write bowdenfit.load({str(value)!r}) instead of the folder's name.")
     return _read_path(value, name)
 
 
 def _read_fits(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise UsageError(f"{name} are the fits by names of yours; write them as {{'one': fit, 'another': other}}.")
+        raise UsageError(f"{name} must be a dictionary of fits by name, such as {{'one': fit, 'another': other}}.")
     return {key: _read_fit(fit, f"{name}[{key!r}]") for key, fit in value.items()}
 
 
@@ -317,7 +317,7 @@ def read_lengths(texts: Sequence[str], name: str) -> list[float | NumberWithUnit
     while text := text.strip():
         match = _LENGTH.match(text)
         if match is None:
-            raise UsageError(f"{name} {shown(text.split()[0])} is no number; write lengths as 455, 455mm or 18 in.")
+            raise UsageError(f"{name} {shown(text.split()[0])} is not a number; write lengths as 455, 455mm or 18 in.")
         value, unit = float(match["value"]), match["unit"]
         lengths.append((value, unit) if unit else value)
         text = text[match.end() :]

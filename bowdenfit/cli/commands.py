@@ -103,7 +103,7 @@ def describe_error(error: CycloptsError) -> str:
     """Return what to say of a command that cannot be understood."""
     see = f"See {' '.join(['bowdenfit', *(error.command_chain or ())])} --help."
     if isinstance(error, UnusedCliTokensError):
-        return f"There is no place for {listed(error.unused_tokens or [])}. {see}"
+        return f"Unexpected argument {listed(error.unused_tokens or [])}. {see}"
     if isinstance(error, MissingArgumentError) and error.argument is not None and error.argument.index is not None:
         name, words = error.argument.name, error.argument.parameter.help or ""
         dots, many = ("...", "some") if get_origin(error.argument.hint) is tuple else ("", "one")

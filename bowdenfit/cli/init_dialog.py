@@ -43,12 +43,12 @@ class Terminal:
             say(filled(f"{i}  {option}", "  "))
         if question.default is None:
             such = "" if question.options else f"such as {question.example}; "
-            say(f"({such}there is no default, because nothing says it)")
+            say(f"({such}no default, because the files do not say it)")
         shown = f"[{question.default}]" if question.default is not None else ""
         while True:
             typed = _read_line(f"{shown}> ") or question.default or ""
             if not typed.strip():
-                say("Something must be written here; Ctrl-C ends it all, and nothing is written.")
+                say("An answer is needed here. Ctrl-C stops without writing anything.")
                 continue
             try:
                 return question.read(typed)
@@ -95,7 +95,7 @@ def start_data_set(folder: Path | None, files: Sequence[Path], example: Sequence
         raise UsageError(f"name the folder to write, such as bowdenfit init {FOLDER}.")
     ask: Asker = Terminal() if is_interactive() else Unattended()
     refuse_existing(target or Path(FOLDER))
-    ask.say("Enter takes the answer that stands in brackets; Ctrl-C ends it all, and nothing is written.")
+    ask.say("Press Enter to accept the answer in brackets. Ctrl-C stops without writing anything.")
     target = target or _ask_folder(ask)
     if not measured and is_interactive():
         measured = _ask_files(ask)
@@ -112,7 +112,7 @@ def split_folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[
     named = [*([folder] if folder else []), *files]
     folders = [path for path in named if not (files and path.is_file())]
     if len(folders) > 1:
-        raise UsageError(f"{folders[-1]} does not exist; name one new folder, and the files behind --from.")
+        raise UsageError(f"{folders[-1]} does not exist; name one new folder, and the files after --from.")
     return next(iter(folders), None), [path for path in named if path not in folders]
 
 
@@ -135,7 +135,7 @@ def _ask_folder(ask: Asker) -> Path:
         refuse_existing(Path(typed.strip()).expanduser())
         return Path(typed.strip()).expanduser()
 
-    return ask.ask(Question("Which folder shall be written?", read, FOLDER))
+    return ask.ask(Question("Which folder should be written?", read, FOLDER))
 
 
 def _ask_files(ask: Asker) -> list[Path]:
@@ -153,7 +153,7 @@ def _ask_files(ask: Asker) -> list[Path]:
         refuse_files(paths)
         return paths
 
-    words = "Which files did you measure? Names with blanks between, or a pattern such as bench/*.csv (- for none yet)."
+    words = "Which files did you measure? Separate names by spaces, or give a pattern such as bench/*.csv (- for none yet)."
     proposed = shlex.join([path.name for path in here]) if 0 < len(here) <= _MOST_FILES else "-"
     return ask.ask(Question(words, read, proposed))
 

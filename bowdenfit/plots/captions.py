@@ -16,12 +16,12 @@ def describe_curve(has_draws: bool, quantity: str = "") -> str:
     of = f" of {quantity}" if quantity else ""
     if not has_draws:
         return f"Line: least-squares estimate{of}; without sampling there is no band."
-    return f"Line: median{of}; band: the interval that holds it with 90 % probability, measurements and priors considered."
+    return f"Line: median{of}; band: 90 % credible interval, from measurements and priors."
 
 
 def describe_strip(unit_words: str) -> str:
     """Return the sentence that explains a strip of residuals."""
-    return f"Below: each reading less the line, {unit_words}; without misfit they scatter evenly about zero."
+    return f"Strip below: residuals, reading minus line, {unit_words}; if the model fits, they scatter evenly about zero."
 
 
 def count_shown(shown: int, total: int, noun: str, several: str = "") -> str:

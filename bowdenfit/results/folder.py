@@ -39,7 +39,7 @@ def replace_atomically(path: Path) -> Iterator[Path]:
         StoreError: A device, a pipe or a folder would be replaced by a file.
     """
     if path.exists() and not path.is_file():
-        raise StoreError(f"{path} is no file and stays as it is; name a file that is new, or that may be replaced.")
+        raise StoreError(f"{path} is not a file and stays as it is; name a new file, or one that may be replaced.")
     temporary = path.with_name(f".{path.name}{_PARTIAL}")
     try:
         yield temporary
@@ -181,7 +181,7 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except ValueError:
-        raise StoreError(f"{path} is damaged: it is no text; fit again, or restore the folder from a copy.") from None
+        raise StoreError(f"{path} is damaged: it is not text; fit again, or restore the folder from a copy.") from None
 
 
 def read_page(path: Path) -> Any:
@@ -239,9 +239,9 @@ def refuse_to_overwrite(folder: Path, force: bool) -> None:
     elif not folder.exists():
         return
     elif not folder.is_dir() or not holds_only_run_files(folder, {*_WRITTEN, FIGURES}):
-        raise StoreError(f"{folder} exists and is no results folder; name another with --output.")
+        raise StoreError(f"{folder} exists and is not a results folder; name another with --output.")
     elif any(path.suffix != ".md" for path in _contents(folder)):
-        problem = "holds what is left of a fit that was ended; add --force to replace it, or name another with --output."
+        problem = "holds the remains of an unfinished fit; add --force to replace it, or name another with --output."
     else:
         return
     if not force:

@@ -86,8 +86,8 @@ class Draws(Display):
         """Number of draws, and their effective sample size."""
         worst = max((d.r_hat for d in self.diagnostics.values()), default=float("nan"))
         return [
-            f"{self.z[..., 0].size} draws of {few(self.values, 4)} by {self.sampler}; of the least certain of them they are "
-            f"worth {self.n_effective:.0f} independent ones (R-hat at most {worst:.3f})."
+            f"{self.z[..., 0].size} draws of {few(self.values, 4)} by {self.sampler}; smallest effective sample size "
+            f"{self.n_effective:.0f}, largest R-hat {worst:.3f}."
         ]
 
     def _table(self) -> Rows:
@@ -217,7 +217,7 @@ class Record(Display):
         except (TypeError, ValueError):
             at = np.array([np.nan])
         if not np.isfinite(at).all():
-            raise UsageError(f"lengths = {shown(stated)} are no numbers; name them in the unit of the route, as [455, 470].")
+            raise UsageError(f"lengths = {shown(stated)} must be numbers in the unit of the route, such as [455, 470].")
         return at
 
     def optimal_length(self) -> OptimalLength:

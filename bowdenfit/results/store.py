@@ -84,7 +84,8 @@ def load(folder: Path) -> Record:
         squares = deserialize(LeastSquares, page["least_squares"])
         as_written = page["posterior_crc32"] == file_checksum(folder / POSTERIOR)
         if page["posterior"] and (folder / POSTERIOR).exists() and not as_written:
-            raise StoreError(f"{folder / POSTERIOR} is not as it was written; fit again, or restore the folder from a copy.")
+            remedy = "fit again, or restore the folder from a copy."
+            raise StoreError(f"{folder / POSTERIOR} has changed since it was written; {remedy}")
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
         verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
         provenance = deserialize(Provenance, page["provenance"])
@@ -102,7 +103,7 @@ def _read_page(folder: Path) -> dict[str, Any]:
             raise StoreError(
                 f"{folder} holds an interrupted fit; finish it with `bowdenfit fit ... --resume`."
             ) from None
-        problem = "is no results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
+        problem = "is not a results folder (it has no fit.json)" if folder.is_dir() else "does not exist"
         raise StoreError(f"{folder} {problem}; name a folder that `bowdenfit fit` wrote, such as fits/NAME.") from None
     schema = page.get("schema", SCHEMA) if isinstance(page, dict) else None
     if not isinstance(schema, int):
@@ -115,7 +116,7 @@ def _read_page(folder: Path) -> dict[str, Any]:
         )
     if page.pop(CHECKSUM, None) != page_checksum(page):
         raise StoreError(
-            f"{folder / FIT} is not as it was written: it was edited, or is damaged; fit again, or restore the folder "
+            f"{folder / FIT} has changed since it was written (edited or damaged); fit again, or restore the folder "
             "from a copy."
         )
     return page

@@ -15,7 +15,6 @@ from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN, reserve_folder
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
-from bowdenfit.words import percent
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -33,7 +32,7 @@ def fit(
     mcmc: Annotated[bool, Parameter(negative="--no-mcmc")] = True,
     sampler: Annotated[Sampler | None, Parameter(show_default="as in cable.toml, else emcee")] = None,
     figures: Annotated[bool, Parameter(negative="--no-figures")] = True,
-    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
     progress: Annotated["Callable[[Progress], None] | None", HIDDEN] = None,
@@ -86,8 +85,7 @@ def _show(bar: Any, progress: "Progress") -> None:
     bar.n = progress.steps
     bar.set_description_str(f"sampling with {progress.sampler}", refresh=False)
     if progress.r_hat is not None and progress.ess is not None:
-        differ = percent(max(progress.r_hat - 1, 0.0))
-        bar.set_postfix_str(f"starts differ by {differ}, worth {progress.ess:.0f} samples", refresh=False)
+        bar.set_postfix_str(f"R-hat {progress.r_hat:.3f}, {progress.ess:.0f} effective draws", refresh=False)
     bar.refresh()
 
 

@@ -60,10 +60,10 @@ def test_the_program_alone_shows_its_help_and_that_something_is_missing(run):
     [
         (("fit", "x", "--seet", "1"), "Unknown option: --seet. Did you mean --set? See bowdenfit fit --help."),
         (("fti",), 'Unknown command "fti". Did you mean "fit"?'),
-        (("fit", "x", "y"), "There is no place for y. See bowdenfit fit --help."),
+        (("fit", "x", "y"), "Unexpected argument y. See bowdenfit fit --help."),
         (("fit", "x", "--noise", "none"), '"none" for --noise. Choose from: "normal", "student".'),
-        (("fit", "x", "--seed", "1.5"), "--seed = '1.5' is no whole number from 0 to 2147483647; write one."),
-        (("next", "x", "--top", "0"), "--top = '0' is no whole number from 1; write one."),
+        (("fit", "x", "--seed", "1.5"), "--seed = '1.5' must be a whole number from 0 to 2147483647."),
+        (("next", "x", "--top", "0"), "--top = '0' must be a whole number from 1."),
         (("next", "x", "--cost", "angle"), "--cost 'angle' is not a kind and a number; write it as angle=0.5."),
         (("export", "x"), "--to requires an argument"),
     ],
@@ -76,8 +76,8 @@ def test_what_cannot_be_meant_is_refused_with_the_nearest_or_what_to_write(run, 
 
 @pytest.mark.extended
 def test_options_stand_anywhere_and_the_last_of_one_counts(run, results):
-    asked = ("--json", "455", "--stroke", "return", "18", "in", "--stroke=pull", "--", "470")
-    assert run("predict", results, *asked) == run("predict", results, "455", "18in", "470", "--json")
+    call = ("--json", "455", "--stroke", "return", "18", "in", "--stroke=pull", "--", "470")
+    assert run("predict", results, *call) == run("predict", results, "455", "18in", "470", "--json")
 
 
 @pytest.mark.parametrize("verb", ASKING)
@@ -173,7 +173,7 @@ def test_predictions_are_a_page_with_units_for_people(run, results):
 def test_lengths_are_read_with_their_units(run, results):
     by_unit = json.loads(run("predict", results, "455mm", "18", "in", "0.47", "m", "470", "1.8e1in", "--json")[1])
     assert [row["cable_length_mm"] for row in by_unit] == pytest.approx([455, 457.2, 470, 470, 457.2])
-    for wrong, words in ((["lots"], "is no number"), (["470", "foo"], "is not known"), (["470N"], "cannot be converted")):
+    for wrong, words in ((["lots"], "is not a number"), (["470", "foo"], "is not known"), (["470N"], "cannot be converted")):
         code, _, err = run("predict", results, *wrong)
         assert code == 2 and words in err
     code, _, err = run("predict", results, "470", "--csv", "--json")
@@ -278,12 +278,12 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
     assert "should be worth at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
-    drawn = ("plot", "--figure", "efficiency", "--format", "svg")
+    plot = ("plot", "--figure", "efficiency", "--format", "svg")
     reads = (("summary",), ("length",), ("predict",), ("predict", "455"), ("next", "--top", "1"), ("identify",))
-    for asked in (*reads, ("report",), (*drawn, "--output", tmp_path / "drawn")):
-        code, _, err = run(asked[0], tmp_path / "fit", *asked[1:])
-        assert code == 3, asked
-        assert err.startswith("Warning: this fit is not converged") or asked == ("summary",)  # whose first line it is
+    for call in (*reads, ("report",), (*plot, "--output", tmp_path / "drawn")):
+        code, _, err = run(call[0], tmp_path / "fit", *call[1:])
+        assert code == 3, call
+        assert err.startswith("Warning: this fit is not converged") or call == ("summary",)  # whose first line it is
 
 
 def test_a_missing_results_folder_is_a_sentence(run, tmp_path):
@@ -343,8 +343,8 @@ def test_an_internal_error_is_a_sentence_with_a_request(run, monkeypatch, on_bod
 def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting, value):
     command = [sys.executable, "-m", "bowdenfit", "identify", str(bench)]
     usual = {name: text for name, text in os.environ.items() if not name.startswith(OF_LIBRARIES)}
-    asked = usual | {"OMP_NUM_THREADS": "1", setting: value}
-    done = subprocess.run(command, cwd=ROOT, env=asked, capture_output=True, text=True, check=False, timeout=60)
+    call = usual | {"OMP_NUM_THREADS": "1", setting: value}
+    done = subprocess.run(command, cwd=ROOT, env=call, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout) == (1, "")
     assert f" {setting} in the environment may be the cause: unset it, and run the command again." in done.stderr
     assert "Traceback" not in done.stderr
@@ -394,8 +394,8 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     assert "Traceback" not in err
     assert {p.name for p in (tmp_path / "fit").iterdir()} - {".lock"} == {"chain.checkpoint"}
     resumed = [*command, "--resume", *(f"--set={key}" for key in QUICK)]
-    found = subprocess.run(resumed, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
-    assert found.returncode == 0, found.stderr
+    finished = subprocess.run(resumed, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
+    assert finished.returncode == 0, finished.stderr
     names = {p.name for p in (tmp_path / "fit").iterdir()}
     known = {"fit.json", "summary.json", "summary.txt", "details.txt", "report.html", "answers.json", "figures.npz"}
     assert names == known | {"posterior.nc", "chain.checkpoint", "figures"}
@@ -424,7 +424,7 @@ def test_notes_in_a_results_folder_are_left_alone_and_other_files_stop_a_fit(on_
     (tmp_path / "other" / "thesis.tex").write_text("")
     code, _, err = run("fit", on_body, "--no-mcmc", "--output", tmp_path / "other")
     assert code == 2
-    assert "is no results folder" in err
+    assert "is not a results folder" in err
 
 
 @pytest.mark.parametrize(("verb", "wrong", "right"), [(bf.fit, "sede", "seed"), (bf.read, "fricton", "friction")])

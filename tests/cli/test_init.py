@@ -50,8 +50,8 @@ class Person:
 
     def ask(self, question):
         self.asked.append(question)
-        said = next((said for words, said in self.answers.items() if words.replace("_", " ") in question.words), None)
-        return question.read(said or question.default or question.example)
+        replies = next((replies for words, replies in self.answers.items() if words.replace("_", " ") in question.words), None)
+        return question.read(replies or question.default or question.example)
 
     def say(self, sentence):
         pass
@@ -79,8 +79,8 @@ def described(folder, person, *names):
 
 
 def test_three_foreign_files_become_a_data_set_by_a_persons_answers(foreign):
-    said = {"eta_mean": "%", "force_at_the_motor": "1", "which_mounting": "1", "Blank_cells": "10 deg"}
-    person = Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said)
+    replies = {"eta_mean": "%", "force_at_the_motor": "1", "which_mounting": "1", "Blank_cells": "10 deg"}
+    person = Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **replies)
     data = described(foreign, person, *FOREIGN)
     page = tomllib.loads((foreign / "cable.toml").read_text())
     assert page["route"] == {"variable": "cable_length", "unit": "mm", "range": [430, 530]}
@@ -97,9 +97,9 @@ def test_what_the_files_say_is_not_asked(on_body):
     names = ("angles.csv", "efficiencies.csv", "forces.csv")
     paths = [on_body / name for name in names if (on_body / name).exists()]
     write_description(paths, "glove", person)
-    said = " ".join(question.words for question in person.asked)
+    replies = " ".join(question.words for question in person.asked)
     for settled in ("In which unit", "Which column", "What does it hold", "Blank cells"):
-        assert settled not in said
+        assert settled not in replies
 
 
 def test_a_unit_is_asked_for_without_any_default(foreign):
@@ -131,18 +131,18 @@ def test_whatever_laboratories_write_becomes_a_data_set_that_check_accepts(path,
 
 
 def test_where_nobody_can_be_asked_all_that_is_not_said_is_refused_and_nothing_written(foreign, refuse, tmp_path):
-    said = refuse("init", "cable", "--from", *FOREIGN, faults=2)
-    assert "eta.csv does not say what it holds" in said and "kraefte.csv does not say what it holds" in said
+    replies = refuse("init", "cable", "--from", *FOREIGN, faults=2)
+    assert "eta.csv does not say what it holds" in replies and "kraefte.csv does not say what it holds" in replies
     (foreign / "one.csv").write_text("F_in,F_out\n50,40\n60,48\n")
-    said = refuse("init", "cable", "--from", "one.csv", faults=2)
-    assert "unit of its column 'F_in'; write it into the heading, such as 'F_in (N)'" in said
-    assert "'F_out'" in said
+    replies = refuse("init", "cable", "--from", "one.csv", faults=2)
+    assert "unit of its column 'F_in'; write it into the heading, such as 'F_in (N)'" in replies
+    assert "'F_out'" in replies
     (foreign / "two.csv").write_text("F_in (N),F_out (N)\n50,40\n60,48\n")
     assert "no column of two.csv is a wrap angle; add one" in refuse("init", "cable", "--from", "two.csv")
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "replies"),
     [
         (
             "Winkel (deg),F_in (N),F_out (N)\n90,50,40\n180,60,38\n",
@@ -153,9 +153,9 @@ def test_where_nobody_can_be_asked_all_that_is_not_said_is_refused_and_nothing_w
         ("F_in (N),F_out (N)\n50,40\n60,48\n", "is a wrap angle; add one"),
     ],
 )
-def test_what_would_only_be_proposed_to_a_person_is_taken_from_nobody(foreign, refuse, text, said):
+def test_what_would_only_be_proposed_to_a_person_is_taken_from_nobody(foreign, refuse, text, replies):
     (foreign / "bench_90deg.csv").write_text(text)
-    assert said in refuse("init", "cable", "--from", "bench_90deg.csv")
+    assert replies in refuse("init", "cable", "--from", "bench_90deg.csv")
 
 
 def test_files_that_say_everything_need_nobody(run, foreign):
@@ -224,7 +224,7 @@ def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"),
+    ("typed", "replies"),
     [
         ("", "the name is empty"),
         ("mu\u200b1", "cannot be printed"),
@@ -236,8 +236,8 @@ def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
         ("NAME OF THE CABLE", "left from the template"),
     ],
 )
-def test_a_coefficient_is_not_called_what_check_would_refuse(typed, said):
-    with pytest.raises(UsageError, match=said):
+def test_a_coefficient_is_not_called_what_check_would_refuse(typed, replies):
+    with pytest.raises(UsageError, match=replies):
         ask_coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
 
 
@@ -250,7 +250,7 @@ def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_cal
         if name in {"synthetic-fleet", "on-body-metabolic"}:
             continue
         space = build_model(bf.read(examples()[name])).space
-        others = [each.name for each in space.parameters if each.role not in {"friction", "curve"}]
+        others = [parameter.name for parameter in space.parameters if parameter.role not in {"friction", "curve"}]
         assert others, name
         for other in others:
             with pytest.raises(UsageError, match="another number"):
@@ -258,9 +258,9 @@ def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_cal
 
 
 def test_a_name_that_is_refused_is_asked_for_again_before_anything_is_written(foreign):
-    said = {"eta_mean": "%", "force_at_the_motor": "1", "'knie' called": "tau"}
+    replies = {"eta_mean": "%", "force_at_the_motor": "1", "'knie' called": "tau"}
     with pytest.raises(UsageError, match="'tau' is what results call another number; write another name, such as mu2"):
-        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said), *FOREIGN)
+        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **replies), *FOREIGN)
     with pytest.raises(UsageError, match="write what the cable is called"):
         described(foreign, Person(cable_called="NAME OF THE CABLE", What_does_it_hold="2"), "eta.csv")
 
@@ -282,10 +282,10 @@ class Console:
             preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # tests in the background are deaf to it
         )
 
-    def answer(self, question, said):
+    def answer(self, question, replies):
         self.child.expect(question)
         self.child.expect("> ")
-        self.child.sendline(said)
+        self.child.sendline(replies)
 
     def end(self):
         self.child.expect(pexpect.EOF)
@@ -297,7 +297,7 @@ class Console:
 @in_a_terminal
 def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreign):
     console = Console("init")
-    console.answer("Which folder shall be written", "")
+    console.answer("Which folder should be written", "")
     console.answer("Which files did you measure", "")
     console.answer("What does it hold", "2")
     console.answer("What does it hold", "")
@@ -307,7 +307,7 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
     console.answer("In which unit is the column 'eta mean'", "furlong")
     console.answer("does not measure a ratio", "%")
     console.answer("is the force at the motor", "")
-    console.answer("Something must be written here", "1")
+    console.answer("An answer is needed here", "1")
     console.answer("is the force at the load", "")
     console.answer("says which mounting", "1")
     console.answer("Between which lengths", "")
@@ -380,6 +380,6 @@ def test_what_is_written_is_what_is_read(page):
 
 
 def test_a_range_beyond_the_measured_lengths_is_refused(foreign):
-    said = {"eta_mean": "%", "force_at_the_motor": "1", "Between_which": "400 530"}
+    replies = {"eta_mean": "%", "force_at_the_motor": "1", "Between_which": "400 530"}
     with pytest.raises(UsageError, match="angles were measured from 430 to 530 mm only"):
-        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **said), *FOREIGN)
+        described(foreign, Person(**{"kraefte.csv has the columns": "3", "What_does_it_hold": "2"}, **replies), *FOREIGN)

@@ -96,10 +96,10 @@ def loads(*_, **__):
 )
 def test_an_interrupt_that_a_library_swallows_is_heard_all_the_same(library, on_body):
     code = INTERRUPT_IN_A_LIBRARY.format(library=library, folder=str(on_body))
-    begun = time.monotonic()
+    started = time.monotonic()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "Interrupted.\n")
-    assert time.monotonic() - begun < 25
+    assert time.monotonic() - started < 25
 
 
 def test_a_command_runs_in_the_surroundings_of_whoever_calls_it_and_gives_back_what_it_returns_or_raises():
@@ -146,7 +146,7 @@ def test_an_interrupt_at_a_prompt_needs_no_further_key():
     ) as process:  # fmt: skip
         time.sleep(1.0)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=20)
+        _, output = process.communicate(timeout=20)
     os.close(keyboard)
     os.close(screen)
-    assert (process.returncode, said) == (130, "Interrupted.\n")
+    assert (process.returncode, output) == (130, "Interrupted.\n")

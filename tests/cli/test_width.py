@@ -53,17 +53,17 @@ def test_every_verb_keeps_to_the_terminal(run, results, tmp_path):
 def test_every_verb_answers_in_plain_words_whatever_the_data_set(run, tmp_path, path):
     """Each keeps to the terminal; what does not apply is refused in a sentence."""
     results, calibration = tmp_path / "fit", tmp_path / "calibration"
-    said = {"check": run("check", path), "fit": run("fit", path, "-o", results, "--seed", 1, "--no-figures")}
+    texts = {"check": run("check", path), "fit": run("fit", path, "-o", results, "--seed", 1, "--no-figures")}
     shutil.copytree(results, tmp_path / "other")
     for verb in ("summary", "length", "identify", "next", "predict"):
-        said[verb] = run(verb, results)
-    said["plan"], said["compare"] = run("identify", path), run("compare", results, tmp_path / "other")
-    said["calibrate"] = run("calibrate", path, "-n", 20, "--seed", 1, "-o", calibration)
-    for verb, (code, out, err) in said.items():
+        texts[verb] = run(verb, results)
+    texts["plan"], texts["compare"] = run("identify", path), run("compare", results, tmp_path / "other")
+    texts["calibrate"] = run("calibrate", path, "-n", 20, "--seed", 1, "-o", calibration)
+    for verb, (code, out, err) in texts.items():
         assert code in (0, 3) or (verb in ("length", "next") and code == 2 and err.startswith("Error: ")), (verb, err)
         assert not too_wide(out), verb
         assert jargon(out) == [], verb
-    assert not faults(said["summary"][1])
+    assert not faults(texts["summary"][1])
 
 
 @pytest.mark.parametrize(

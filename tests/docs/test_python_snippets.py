@@ -59,7 +59,7 @@ def test_cells_of_the_pages_run_in_a_kernel_and_print_little(monkeypatch, tmp_pa
             assert len(text) <= MOST_TEXT, (source, text)
             assert output.get("name") != "stderr", text
     bar = next(outputs[0]["data"]["text/plain"] for source, outputs in by_cell.items() if "bf.fit(" in source)
-    assert re.fullmatch(r"sampling with emcee \d+ steps, \d\d:\d\d, starts differ by \d+\.\d %, worth \d+ samples", bar)
+    assert re.fullmatch(r"sampling with emcee \d+ steps, \d\d:\d\d, R-hat \d+\.\d{3}, \d+ effective draws", bar)
     assert by_cell[CALIBRATING][0]["data"]["text/plain"].startswith("calibrating: 100%") and len(by_cell[CALIBRATING]) == 1
     figures = [output for source, outputs in by_cell.items() if "fit.plot.efficiency()" in source for output in outputs]
     assert len(figures) == len(IN_A_KERNEL) and all("image/png" in figure["data"] for figure in figures)

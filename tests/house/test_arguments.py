@@ -32,12 +32,12 @@ def test_one_wrap_angle_need_not_be_a_list(loop_results, angles):
 
 @pytest.mark.parametrize("make", [str, lambda text: [text], lambda text: iter([text])])
 def test_one_setting_need_not_be_a_list(on_body, make):
-    found = bf.check(on_body, settings=make("friction.mu1.fixed=0.1"))
-    assert found.description.friction["mu1"].fixed == 0.1
+    result = bf.check(on_body, settings=make("friction.mu1.fixed=0.1"))
+    assert result.description.friction["mu1"].fixed == 0.1
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
+    ("keywords", "words"),
     [
         ({"input_force": 50}, "input_force = 50 is not a number with its unit; write it as '100N', or as (100, 'N')"),
         ({"input_force": (50, 3)}, "is not a number with its unit"),
@@ -46,36 +46,36 @@ def test_one_setting_need_not_be_a_list(on_body, make):
         ({"stroke": "push"}, "stroke = 'push' is unknown; choose one of pull, return"),
         ({"quantity": "torque"}, "quantity = 'torque' is unknown; choose one of efficiency, "),
         ({"wrap_angles": 90}, "wrap_angles = 90 is not a number with its unit; write it as '90deg', or as (90, 'deg')"),
-        ({"lengths": [None]}, "lengths = [None] are no lengths; write them as [455, 470]"),
-        ({"lengths": "long"}, "lengths 'long' is no number"),
+        ({"lengths": [None]}, "lengths = [None] must be lengths, such as [455, 470]"),
+        ({"lengths": "long"}, "lengths 'long' is not a number"),
         ({"lengths": []}, "lengths = [] names no length; name some, or leave it out"),
-        ({"gait": 3}, "gait = 3 is neither a path nor what bowdenfit has read"),
+        ({"gait": 3}, "gait = 3 must be a path"),
     ],
 )
-def test_what_is_not_clear_is_refused_with_what_to_write(fit, asked, words):
+def test_what_is_not_clear_is_refused_with_what_to_write(fit, keywords, words):
     with pytest.raises(bf.UsageError) as refused:
-        bf.predict(fit, **asked)
+        bf.predict(fit, **keywords)
     assert words in str(refused.value)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda _: bf.fit(123), "dataset = 123 is neither a path"),
-        (lambda _: bf.fit(None), "dataset = None is neither a path"),
-        (lambda _: bf.read(123), "dataset = 123 is neither a path"),
-        (lambda _: bf.check([]), "dataset = [] is neither a path"),
-        (lambda on_body: bf.fit(on_body, seed="a"), "seed = 'a' is no whole number from 0 to 2147483647"),
-        (lambda on_body: bf.fit(on_body, seed=True), "seed = True is no whole number"),
-        (lambda on_body: bf.fit(on_body, seed=-1), "seed = -1 is no whole number"),
+        (lambda _: bf.fit(123), "dataset = 123 must be a path"),
+        (lambda _: bf.fit(None), "dataset = None must be a path"),
+        (lambda _: bf.read(123), "dataset = 123 must be a path"),
+        (lambda _: bf.check([]), "dataset = [] must be a path"),
+        (lambda on_body: bf.fit(on_body, seed="a"), "seed = 'a' must be a whole number from 0 to 2147483647"),
+        (lambda on_body: bf.fit(on_body, seed=True), "seed = True must be a whole number"),
+        (lambda on_body: bf.fit(on_body, seed=-1), "seed = -1 must be a whole number"),
         (lambda on_body: bf.fit(on_body, sampler="hmc"), "sampler = 'hmc' is unknown"),
-        (lambda on_body: bf.fit(on_body, settings={"a": 1}), "is no list of texts; write it as ['name=value']"),
-        (lambda on_body: bf.fit(on_body, settings=3), "settings = 3 is no list of texts"),
+        (lambda on_body: bf.fit(on_body, settings={"a": 1}), "must be a list of texts, such as ['name=value']"),
+        (lambda on_body: bf.fit(on_body, settings=3), "settings = 3 must be a list of texts"),
         (lambda on_body: bf.read(on_body, wrap_angle=180), "wrap_angle = 180 is not a number with its unit"),
-        (lambda on_body: bf.calibrate(on_body, replications=1), "replications = 1 is no whole number from 2"),
-        (lambda on_body: bf.predict(on_body), "found is the fit itself; write bowdenfit.load("),
-        (lambda _: bf.compare(["a"]), "fits are the fits by names of yours"),
-        (lambda _: bf.compare({"one": "fits/a"}), "fits['one'] is the fit itself; write bowdenfit.load('fits/a')"),
+        (lambda on_body: bf.calibrate(on_body, replications=1), "replications = 1 must be a whole number from 2"),
+        (lambda on_body: bf.predict(on_body), "found must be a fit; write bowdenfit.load("),
+        (lambda _: bf.compare(["a"]), "fits must be a dictionary of fits by name"),
+        (lambda _: bf.compare({"one": "fits/a"}), "fits['one'] must be a fit; write bowdenfit.load('fits/a')"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_before_anything_is_done(on_body, call, words):
@@ -85,7 +85,7 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_done(on_body, call, 
 
 
 def test_where_a_folder_may_stand_for_its_fit_it_is_taken(quick_results, fit):
-    named = {str(bf.next_measurement(found)) for found in (fit, quick_results, str(quick_results))}
+    named = {str(bf.next_measurement(result)) for result in (fit, quick_results, str(quick_results))}
     assert len(named) == 1
 
 

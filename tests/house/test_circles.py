@@ -14,15 +14,15 @@ def modules() -> dict[str, Path]:
 
 def imported(path: Path, known: dict[str, Path]) -> set[str]:
     """Names of the package's files that a file imports, anywhere in it."""
-    found: set[str] = set()
+    result: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            result |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path} imports by a relative name"
             # A name may be a file of its own; otherwise it is something inside the file.
-            found |= {name if (name := f"{node.module}.{a.name}") in known else str(node.module) for a in node.names}
-    return found & set(known)
+            result |= {name if (name := f"{node.module}.{a.name}") in known else str(node.module) for a in node.names}
+    return result & set(known)
 
 
 def circles(arrows: dict[str, set[str]]) -> list[set[str]]:
@@ -34,19 +34,19 @@ def circles(arrows: dict[str, set[str]]) -> list[set[str]]:
 
 def _reached(start: str, arrows: dict[str, set[str]]) -> set[str]:
     """Nodes at the end of any path of one step or more."""
-    found: set[str] = set()
+    result: set[str] = set()
     todo = list(arrows[start])
     while todo:
         node = todo.pop()
-        if node not in found:
-            found.add(node)
+        if node not in result:
+            result.add(node)
             todo += arrows[node]
-    return found
+    return result
 
 
 def test_circles_are_found():
-    found = circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"d"}, "e": set()})
-    assert sorted(map(sorted, found)) == [["b", "c"], ["d"]]
+    result = circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"d"}, "e": set()})
+    assert sorted(map(sorted, result)) == [["b", "c"], ["d"]]
 
 
 def test_no_files_import_each_other():

@@ -24,14 +24,14 @@ HELP = "import contextlib, sys\nfrom bowdenfit.cli import bowdenfit\nwith contex
 
 
 def test_layers_import_only_downward():
-    found = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()", "--no-cache"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert "0 broken" in found.stdout, found.stdout + found.stderr
+    assert "0 broken" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
@@ -51,8 +51,8 @@ def test_layers_import_only_downward():
 )
 def test_imports_load_nothing_heavy(code, heavy):
     listing = f"{code}\nimport sys; print(*sys.modules)"
-    found = subprocess.run([sys.executable, "-c", listing], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert not heavy & set(found.stdout.split())
+    done = subprocess.run([sys.executable, "-c", listing], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not heavy & set(done.stdout.split())
 
 
 @pytest.mark.extended
@@ -71,8 +71,8 @@ def test_what_is_asked_of_a_plan_once_is_compiled_as_a_few_programs(code):
         "jax.monitoring.register_event_duration_secs_listener(lambda name, *_, **__: names.append(name))\n"
         f"{code}\nprint(sum('backend_compile' in name for name in names))"
     )
-    found = subprocess.run([sys.executable, "-c", counting], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert 3 <= int(found.stdout) <= 30
+    done = subprocess.run([sys.executable, "-c", counting], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert 3 <= int(done.stdout) <= 30
 
 
 def test_every_figure_file_of_a_fit_is_listed():
@@ -87,8 +87,8 @@ def test_importing_changes_no_global_setting():
         "import jax; before = dict(jax.config.values); import bowdenfit; bowdenfit.fit; "
         "print(before == dict(jax.config.values))"
     )
-    found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "True"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "True"
 
 
 def _law(name: str) -> tuple[ContactLaw, dict[str, jax.Array]]:

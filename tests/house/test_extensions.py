@@ -79,15 +79,15 @@ def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tm
     loss = force * -np.expm1(-MU * ANGLE) + 0.2 * np.random.default_rng(2).standard_normal(15)
     folder = data_set("losses", "input_force_N,loss_N", (force, loss))
     assert "15 lost forces" in describe_data_set(bf.read(folder))
-    found = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
-    interval = found.parameter("mu")
+    fit = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
+    interval = fit.parameter("mu")
     assert abs(interval.mean - MU) < 4 * interval.sd
     assert "15 lost forces" in (tmp_path / "fit" / "details.txt").read_text()
     assert {"checks.png", "coefficients.png", "pairs.png"} <= {
         path.name for path in (tmp_path / "fit" / "figures").iterdir()
     }
     again = bf.load(tmp_path / "fit")
-    assert json.dumps(again.summary()) == json.dumps(found.summary())
+    assert json.dumps(again.summary()) == json.dumps(fit.summary())
 
 
 def test_a_kind_that_is_not_registered_is_refused_by_name(data_set):
@@ -97,8 +97,8 @@ def test_a_kind_that_is_not_registered_is_refused_by_name(data_set):
 
 def test_a_new_contact_law_is_a_class_and_a_line(data_set, monkeypatch):
     monkeypatch.setitem(CONTACT_LAWS, "threshold", f"{law.__name__}:{law.Threshold.__name__}")
-    found = bf.fit(forces(data_set, MU * (ANGLE - 0.1), 'law = "threshold"'), mcmc=False)
-    estimate = found.least_squares.estimates["mu"]
+    fit = bf.fit(forces(data_set, MU * (ANGLE - 0.1), 'law = "threshold"'), mcmc=False)
+    estimate = fit.least_squares.estimates["mu"]
     assert abs(estimate.value - MU) < 4 * estimate.standard_error
 
 
@@ -109,17 +109,17 @@ def test_a_new_curve_family_is_a_class_and_a_line(monkeypatch, tmp_path):
     (tmp_path / "cable.toml").write_text(ROUTED)
     rows = [f"{at:g},{reading:.3f}" for at, reading in zip(length, np.abs(angle), strict=True)]
     (tmp_path / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *rows]))
-    found = bf.fit(tmp_path, mcmc=False)
-    estimate = found.least_squares.estimates["sheath_angle_end"]
+    fit = bf.fit(tmp_path, mcmc=False)
+    estimate = fit.least_squares.estimates["sheath_angle_end"]
     assert abs(estimate.value - np.deg2rad(120.0)) < 4 * estimate.standard_error
 
 
 def test_a_new_option_of_the_friction_model_is_a_class_and_a_line(data_set, monkeypatch):
     monkeypatch.setitem(FRICTION_OPTIONS, "hidden", option.HiddenTension())
-    found = bf.fit(
+    fit = bf.fit(
         forces(data_set, MU * ANGLE, hidden=4.0), mcmc=False, friction="hidden", settings=["prior.tau.fixed=0.01"]
     )
-    estimates = found.least_squares.estimates
+    estimates = fit.least_squares.estimates
     assert abs(estimates["mu"].value - MU) < 4 * estimates["mu"].standard_error
     assert abs(estimates["hidden"].value - 4.0) < 4 * estimates["hidden"].standard_error
 
@@ -142,9 +142,9 @@ def test_a_new_file_format_is_a_module_and_a_line(monkeypatch, tmp_path):
 
 def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(FIGURES, "shares", sys.modules[shares.__name__])
-    found = bf.fit(forces(data_set, MU * ANGLE), output=tmp_path / "fit", seed=1, settings=QUICK)
+    fit = bf.fit(forces(data_set, MU * ANGLE), output=tmp_path / "fit", seed=1, settings=QUICK)
     assert (tmp_path / "fit" / "figures" / "shares.png").exists()
-    assert [each.contact for each in shares.shares(found)] == ["sheath"]
+    assert [share.contact for share in shares.shares(fit)] == ["sheath"]
     capsys.readouterr()
     assert command(shares.VERB)([str(tmp_path / "fit")]) == 0
     assert capsys.readouterr().out == "sheath: 100% of the loss\n"

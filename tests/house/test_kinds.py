@@ -31,13 +31,13 @@ def kinds_named(tree: ast.Module) -> set[str]:
 
 
 def test_nobody_outside_kinds_names_three_kinds_of_measurement():
-    found = {
+    files = {
         path.relative_to(PACKAGE).as_posix(): kinds
         for path in PACKAGE.rglob("*.py")
         if "kinds" not in path.relative_to(PACKAGE).parts
         and len(kinds := kinds_named(ast.parse(path.read_text(encoding="utf-8")))) >= 3
     }
-    assert not found, {name: sorted(kinds) for name, kinds in found.items()}
+    assert not files, {name: sorted(kinds) for name, kinds in files.items()}
 
 
 def test_the_search_finds_names_of_kinds_wherever_code_may_have_them():

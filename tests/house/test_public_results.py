@@ -102,8 +102,8 @@ def test_a_verb_loads_the_words_of_what_it_answers():
 def imported(node) -> list[str]:
     """Modules that a line imports."""
     if isinstance(node, ast.ImportFrom):
-        return [node.module or "", *(f"{node.module}.{each.name}" for each in node.names)]
-    return [each.name for each in node.names] if isinstance(node, ast.Import) else []
+        return [node.module or "", *(f"{node.module}.{item.name}" for item in node.names)]
+    return [item.name for item in node.names] if isinstance(node, ast.Import) else []
 
 
 class Tags(HTMLParser):
@@ -150,30 +150,30 @@ def reachable(value: Any, name: str, seen: dict[int, Any]) -> Iterator[tuple[str
     seen[id(value)] = value
     yield name, value
     if isinstance(value, dict | list | tuple):
-        for key, each in list(value.items() if isinstance(value, dict) else enumerate(value))[:3]:
-            yield from reachable(each, f"{name}[{key!r}]", seen)
+        for key, item in list(value.items() if isinstance(value, dict) else enumerate(value))[:3]:
+            yield from reachable(item, f"{name}[{key!r}]", seen)
     if not type(value).__module__.startswith("bowdenfit"):
         return
     for key in dir(value):
         if key.startswith(("_", "model_")):  # those are pydantic's
             continue
         try:
-            each = getattr(value, key)
+            item = getattr(value, key)
         except (AttributeError, bf.BowdenfitError):  # which says what there is not
             continue
-        if not inspect.isroutine(each) and not inspect.isclass(each):
-            yield from reachable(each, f"{name}.{key}", seen)
+        if not inspect.isroutine(item) and not inspect.isclass(item):
+            yield from reachable(item, f"{name}.{key}", seen)
 
 
 def look_inside(value: Any, name: str) -> int:
     """Asserts that all that can be reached from there is short in a notebook; how much that is."""
     seen: dict[int, Any] = {}
-    for where, each in reachable(value, name, seen):
-        ours = type(each).__module__.startswith("bowdenfit")
-        assert len(pretty(each)) <= MOST_IN_A_NOTEBOOK, f"{where}: {pretty(each)[:300]}"
-        assert not ours or len(repr(each).splitlines()) <= MOST_LINES, f"{where}: {each!r}"
-        if isinstance(each, Display):
-            assert each._repr_html_() and (where.endswith("elastic") or "units" in each.to_frame().attrs), where
+    for where, item in reachable(value, name, seen):
+        ours = type(item).__module__.startswith("bowdenfit")
+        assert len(pretty(item)) <= MOST_IN_A_NOTEBOOK, f"{where}: {pretty(item)[:300]}"
+        assert not ours or len(repr(item).splitlines()) <= MOST_LINES, f"{where}: {item!r}"
+        if isinstance(item, Display):
+            assert item._repr_html_() and (where.endswith("elastic") or "units" in item.to_frame().attrs), where
     return len(seen)
 
 
@@ -247,19 +247,19 @@ def test_all_that_can_be_reached_from_a_result_is_short(fit, answers):
 
 
 def test_efficiencies_say_where_the_curves_do_not_hold(fit):
-    found = fit.efficiency([470, 600])
-    assert [row["in_range"] for row in found.rows] == [True, False]
-    assert "inside the curves" in str(found) and "600 mm: outside the curves, 430 to 530 mm." in str(found)
+    outcome = fit.efficiency([470, 600])
+    assert [row["in_range"] for row in outcome.rows] == [True, False]
+    assert "inside the curves" in str(outcome) and "600 mm: outside the curves, 430 to 530 mm." in str(outcome)
     for nothing in ([np.nan], "455mm", [None], ["a"]):
-        with pytest.raises(bf.UsageError, match=r"are no numbers; name them in the unit of the route, as \[455, 470\]"):
+        with pytest.raises(bf.UsageError, match=r"must be numbers in the unit of the route, such as \[455, 470\]"):
             fit.efficiency(nothing)
 
 
 def test_tables_have_the_units_of_what_stands_in_them(fit, answers):
     assert fit.optimal_length().to_frame().attrs["units"]["cable_length"] == "mm"
-    drawn = fit.posterior.to_frame()
-    np.testing.assert_array_equal(drawn["mu1"], fit.posterior.values["mu1"].ravel())
-    assert drawn.attrs["units"].items() >= {"mu1": "1", "optimal_length": "mm", "sigma_theta": "deg"}.items()
+    frame = fit.posterior.to_frame()
+    np.testing.assert_array_equal(frame["mu1"], fit.posterior.values["mu1"].ravel())
+    assert frame.attrs["units"].items() >= {"mu1": "1", "optimal_length": "mm", "sigma_theta": "deg"}.items()
     rows = fit.to_frame().set_index("parameter")
     assert rows.loc["mu1", "median"] == fit.parameter("mu1").median
     assert fit.least_squares.to_frame().attrs["units"]["sigma_theta"] == "deg"
@@ -292,9 +292,9 @@ def test_stretch_and_preload_have_a_table(least_squares_of):
 def test_a_calibration_begins_with_its_verdict():
     held = (Coverage(0.5, 0.51, 0.4, 0.6), Coverage(0.9, 0.88, 0.8, 0.97))
     checked = CheckedQuantity("mu", r"$\mu$", (0.5,) * 30, 0.4, 0.8, held, 0.02, 0.1, 0.9)
-    found = Calibration("Bench", (), 1, 30, (checked,), {}, {}, 0.1)
-    look_at(found)
-    assert repr(found).startswith("CALIBRATED: ") and found.to_frame()["held_90"][0] == 0.88
+    outcome = Calibration("Bench", (), 1, 30, (checked,), {}, {}, 0.1)
+    look_at(outcome)
+    assert repr(outcome).startswith("CALIBRATED: ") and outcome.to_frame()["held_90"][0] == 0.88
 
 
 def test_what_is_not_to_be_trusted_says_so_first():

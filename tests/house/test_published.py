@@ -63,6 +63,6 @@ def test_every_guide_can_be_reached_from_the_readme_and_from_the_first_page():
 
 def test_the_citation_is_of_this_version_and_license():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    said = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
-    assert f"version: {project['version']}" in said
-    assert f"license: {project['license']}" in said
+    lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert f"version: {project['version']}" in lines
+    assert f"license: {project['license']}" in lines

@@ -51,5 +51,5 @@ def test_type_checkers_accept_calls_as_users_write_them_and_refuse_what_does_not
     refused = [i for i, line in enumerate(CALLS.read_text(encoding="utf-8").splitlines(), 1) if line.endswith("# refused")]
     command = [sys.executable, "-m", *checker, str(CALLS)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
-    found = re.findall(r"typed_calls\.py:(\d+)(?::\d+)?(?::| -) error", done.stdout)
-    assert sorted(set(map(int, found))) == refused and len(refused) == 7, done.stdout + done.stderr
+    lines = re.findall(r"typed_calls\.py:(\d+)(?::\d+)?(?::| -) error", done.stdout)
+    assert sorted(set(map(int, lines))) == refused and len(refused) == 7, done.stdout + done.stderr

@@ -52,9 +52,9 @@ def installed(wheel, tmp_path_factory):
 
     beside, silent = [], dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     yield call
-    for each in reversed(beside):
-        each.terminate()
-        each.wait(60)
+    for process in reversed(beside):
+        process.terminate()
+        process.wait(60)
 
 
 def test_the_wheel_holds_every_data_set_and_is_small(wheel):

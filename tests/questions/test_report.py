@@ -202,7 +202,7 @@ def test_a_report_is_written_again_over_the_one_there(run, routed):
 def test_a_folder_that_is_no_fit_or_was_edited_is_refused(refuse, tmp_path):
     assert "does not exist" in refuse("report", tmp_path / "nowhere")
     (tmp_path / "fit").mkdir()
-    assert "is no results folder" in refuse("report", tmp_path / "fit")
+    assert "is not a results folder" in refuse("report", tmp_path / "fit")
     (tmp_path / "fit" / "fit.json").write_text('{"schema": 6, "description": 3}')
     assert "is damaged" in refuse("report", tmp_path / "fit")
 

@@ -67,7 +67,7 @@ def test_a_fit_that_was_only_spaced_otherwise_is_read(whole, tmp_path):
 def test_draws_of_another_fit_are_refused(whole, loop_results, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "fit")
     shutil.copy(loop_results / "posterior.nc", folder)
-    with pytest.raises(bf.StoreError, match=r"posterior\.nc is not as it was written"):
+    with pytest.raises(bf.StoreError, match=r"posterior\.nc has changed since it was written"):
         bf.load(folder)
 
 

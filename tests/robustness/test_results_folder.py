@@ -104,7 +104,7 @@ def test_two_fits_into_one_folder_are_told_apart_at_the_start(on_body, tmp_path)
 def test_what_is_left_of_an_ended_fit_is_replaced_with_force(on_body, tmp_path):
     (tmp_path / "fit" / "figures").mkdir(parents=True)
     (tmp_path / "fit" / ".posterior.nc.partial").write_text("half")
-    with pytest.raises(bf.StoreError, match="what is left of a fit"):
+    with pytest.raises(bf.StoreError, match="the remains of an unfinished fit"):
         bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False)
     bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, force=True)
     assert not (tmp_path / "fit" / ".posterior.nc.partial").exists()
@@ -190,7 +190,7 @@ def test_nothing_but_files_is_replaced_by_a_file(tmp_path):
     (tmp_path / "null").symlink_to("/dev/null")
     (tmp_path / "folder").mkdir()
     for name in ("pipe", "null", "folder"):
-        with pytest.raises(bf.StoreError, match="is no file and stays as it is"):
+        with pytest.raises(bf.StoreError, match="is not a file and stays as it is"):
             write_text(tmp_path / name, "x")
     with pytest.raises(bf.StoreError, match="a device or a pipe"):
         refuse_unwritable(tmp_path / "pipe")

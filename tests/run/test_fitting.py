@@ -31,12 +31,12 @@ def test_a_program_that_guards_nothing_gets_the_same_fit_as_the_command_line(on_
 
 
 def test_a_question_is_worked_out_once_for_each_record(quick_fit, on_body_squares):
-    asked = []
+    calls = []
 
     @cached_per_fit
     def question(fit):
-        asked.append(fit)
-        return len(asked)
+        calls.append(fit)
+        return len(calls)
 
     assert [question(quick_fit), question(quick_fit), question(on_body_squares), question(quick_fit)] == [1, 1, 2, 1]
 

@@ -39,7 +39,7 @@ def calibrate(
     output: Annotated[Output, Parameter(show_default="fits/calibration/NAME OF DATASET")] = None,
     assume: Annotated[Sequence[str], Parameter(metavar="KEY=VALUE"), TEXTS] = (),
     truth: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
-    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
     progress: Annotated[Report | None, HIDDEN] = None,

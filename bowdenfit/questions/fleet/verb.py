@@ -32,7 +32,7 @@ def fleet(
     workers: Annotated[
         int | None, Parameter(alias="-j", metavar="NUMBER", show_default=_WORKERS), whole_number(1)
     ] = None,
-    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
     progress: Annotated[Report | None, HIDDEN] = None,

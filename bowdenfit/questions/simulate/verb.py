@@ -20,7 +20,7 @@ def simulate(
     bench: Annotated[str | Path, BENCH, PATH],
     *,
     output: Annotated[Output, Parameter(required=True)] = None,
-    seed: Annotated[Seed, Parameter(show_default="drawn, and recorded")] = None,
+    seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     noise: Annotated[bool, Parameter(negative="--no-noise")] = True,
     recordings: bool = False,
     fleet: bool = False,

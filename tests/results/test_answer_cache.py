@@ -131,8 +131,8 @@ def test_the_program_draws_the_figures_that_the_library_does(results, undrawn, t
 def test_figures_that_the_fit_drew_are_copied(results, undrawn, run, tmp_path, chosen):
     done = without(HEAVY | {"numpy"}, "plot", results, "-o", tmp_path / "copied", *chosen)
     assert (done.returncode, done.stderr) == (0, "")
-    code, said, _ = run("plot", undrawn, "-o", tmp_path / "drawn", *chosen)
-    assert (code, said) == (0, done.stdout.replace("copied", "drawn"))
+    code, printed, _ = run("plot", undrawn, "-o", tmp_path / "drawn", *chosen)
+    assert (code, printed) == (0, done.stdout.replace("copied", "drawn"))
     names = sorted(path.name for path in (tmp_path / "drawn").iterdir())
     assert sorted(path.name for path in (tmp_path / "copied").iterdir()) == names
     for name in names:
@@ -248,10 +248,10 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
     ids=str,
 )
 def test_another_question_is_not_answered_by_what_was_kept(results, other):
-    asked = {name: one.default for name, one in inspect.signature(PREDICT.function).parameters.items()}
+    request = {name: one.default for name, one in inspect.signature(PREDICT.function).parameters.items()}
     answers = read_answers(results)
-    assert PREDICT.kept(answers, asked) is not None
-    assert PREDICT.kept(answers, asked | other) is None
+    assert PREDICT.kept(answers, request) is not None
+    assert PREDICT.kept(answers, request | other) is None
 
 
 def _edit(path, old, new):
@@ -355,5 +355,5 @@ def test_a_figure_that_does_not_exist_is_refused_in_a_sentence(results, refuse, 
 def test_figures_have_names_that_plot_takes(results, run, tmp_path):
     assert run("plot", results, "-o", tmp_path, "--figure", "pairs", "--figure", "wrap_angles")[0] == 0
     assert {path.stem for path in tmp_path.iterdir()} == {"pairs", "wrap_angles", "captions"} <= {*FIGURES, "captions"}
-    said = (tmp_path / "captions.txt").read_text(encoding="utf-8").split("\n\n")
-    assert [paragraph.partition(":")[0] for paragraph in said] == ["wrap_angles", "pairs"]
+    printed = (tmp_path / "captions.txt").read_text(encoding="utf-8").split("\n\n")
+    assert [paragraph.partition(":")[0] for paragraph in printed] == ["wrap_angles", "pairs"]

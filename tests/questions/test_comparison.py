@@ -273,7 +273,7 @@ def test_a_fit_that_is_not_to_be_trusted_is_named_and_decides_the_exit_code():
 
     code, text = replied(good=(NOT_DESCRIBED,))
     assert code == 3
-    assert "good is not to be trusted: it is not a description of its readings. To predict best of these" in text
+    assert "good is not to be trusted: it is not a description of its readings. Predicting best among these" in text
     code, text = replied(poor=(NOT_DESCRIBED,))  # which is why it predicts worse
     assert code == 0
     assert "poor is not to be trusted" in text
@@ -287,7 +287,7 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
     odd = {"good": "</title><script>alert(1)</script>"}
     renamed = {
         part: {odd.get(name, name): value for name, value in getattr(found, part).items()}
-        for part in ("differences", "weights", "predictions", "described")
+        for part in ("differences", "weights", "predictions", "descriptions")
     }
     found = replace(found, **renamed)
     write_answer(tmp_path, "comparison", found, "", {"comparison": comparison_figure}, page=comparison_page(found))
@@ -372,7 +372,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert "Of wrap angle only 17 of 22 readings are compared" in words
     assert "continuous: below the limit, published: zeros, in the published regions" in words
     assert "4 of efficiency" in words
-    assert "Readings on which a fit leans were left out by moving the fit" in words
+    assert "Influential readings (the fit would change without them) were left out by moving" in words
     assert progress == f"Wrote {where}.\n"  # what is being left out is said in a terminal alone, where it goes again
     page = json.loads((where / "comparison.json").read_text())
     assert sum(row["stacking_weight"] for row in page["fits"]) == pytest.approx(1.0)

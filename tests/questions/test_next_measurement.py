@@ -424,7 +424,7 @@ def test_the_ranking_is_in_order_and_says_what_is_as_good(for_length):
     assert for_length.ranked[0].as_good
     assert not for_length.ranked[-1].as_good
     alike = [r for r in for_length.ranked[1:] if r.as_good]
-    assert ("would do as well" in next_measurement_text(for_length, 3)) == bool(alike)
+    assert ("would do equally well" in next_measurement_text(for_length, 3)) == bool(alike)
 
 
 def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):

@@ -155,7 +155,7 @@ def test_each_figure_is_written_in_three_formats_beside_its_caption(tmp_path):
     }
     first, second = (folder / CAPTIONS).read_text().split("\n\n")
     assert first.startswith("coverage: How often intervals hold the truth")
-    assert second.startswith("ranks: Where truths lie within what the fits say")
+    assert second.startswith("ranks: Where the true values fall within their estimated distributions")
 
 
 @pytest.mark.slow

@@ -19,7 +19,8 @@ HEADING = "How often intervals hold the truth"
 def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
-        "Dots: share of the 50 % and 90 % intervals of each quantity that held the true value; gray: what chance allows all of "
+        "Dots: share of the 50 % and 90 % intervals of each quantity that held the true value; gray: the range that "
+        "chance allows for all of "
         f"them together in 99 % of calibrations; n = {counted(calibration.ranked, 'replication')}."
     )
 
@@ -34,7 +35,7 @@ def draw(calibration: Calibration) -> Figure:
             axes.plot(
                 [100 * coverage.low, 100 * coverage.high], [i, i], color=LIGHT, lw=7, solid_capstyle="butt", label="By chance"
             )
-            label, color = ("Intervals that hold the truth", BLUE) if coverage.within else ("Wrong", VERMILLION)
+            label, color = ("As often as claimed", BLUE) if coverage.within else ("Not as often as claimed", VERMILLION)
             axes.plot(100 * coverage.rate, i, "o" if coverage.within else "X", color=color, label=label)
         claimed = 100 * calibration.quantities[0].coverage[k].probability
         axes.axvline(claimed, color=GRAY, lw=0.8)

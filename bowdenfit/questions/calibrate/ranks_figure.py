@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.calibrate.answer import Calibration
 
-HEADING = "Where truths lie within what the fits say"
+HEADING = "Where the true values fall within their estimated distributions"
 _COLUMNS, _APART = 4, 0.5  # panels in a row, and inches between them
 _MARGIN = 0.3  # in, between titles
 _BAND = 0.99
@@ -25,10 +25,11 @@ _BAND = 0.99
 def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
-        "Line: share of the truths below each level of what the fits say, less what even ones would be; gray: what chance "
-        "leaves in 99 % of calibrations. A hump, then a dip is of intervals too wide, the reverse of intervals too narrow; all "
-        "above zero is of estimates too high, all below of estimates too low. p: how probable a line so far from zero is by "
-        f"chance, all quantities considered; n = {counted(calibration.ranked, 'replication')}."
+        "Line: share of the true values at or below each rank, minus that of uniform ranks; gray: what chance "
+        "leaves in 99 % of calibrations. A hump followed by a dip means that intervals are too narrow, a dip then a hump that "
+        "they are too wide; a line all above zero means that estimates are too high, all below that they are too low. p: "
+        "probability that uniform ranks would lie so far from zero, corrected for the number of quantities; "
+        f"n = {counted(calibration.ranked, 'replication')}."
     )
 
 
@@ -46,8 +47,8 @@ def draw(calibration: Calibration) -> Figure:
     for axes, q in zip(flat, calibration.quantities, strict=True):
         difference = uniform.count_below(np.array(q.ranks)) / calibration.ranked - positions
         color = BLUE if q.is_calibrated else VERMILLION
-        label = "Truths" if q.is_calibrated else "Truths of a quantity that is wrong"
-        axes.fill_between(positions, low - positions, high - positions, color=LIGHT, lw=0, label="Even, in 99 %")
+        label = "True values" if q.is_calibrated else "True values of a quantity that is not calibrated"
+        axes.fill_between(positions, low - positions, high - positions, color=LIGHT, lw=0, label="Uniform ranks (99 %)")
         axes.plot([0, *positions, 1], [0, *difference, 0], color=color, label=label)
         axes.axhline(0.0, color=GRAY, lw=0.6)
         p_value = f"   p = {q.corrected:.2g}"
@@ -55,6 +56,6 @@ def draw(calibration: Calibration) -> Figure:
         axes.set_title(f"{name}{p_value}", fontsize=TITLE_SIZE)
         axes.set_xlim(0, 1)
         axes.set_ylim(-1.15 * max(reach, np.max(np.abs(difference))), 1.15 * max(reach, np.max(np.abs(difference))))
-    label_outer(flat, columns, "Level", "Share less even")
+    label_outer(flat, columns, "Rank of the true value", "Deviation from uniform")
     legend_above(figure, flat, 3)
     return figure

@@ -13,14 +13,15 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.calibrate.answer import Calibration
 
-HEADING = "Bias, and what the measurements settle"
+HEADING = "Bias, and how much the measurements narrow the prior"
 
 
 def caption(calibration: Calibration) -> str:
     """What is drawn, in plain words."""
     return (
-        "Left: estimate less truth, in standard deviations of the estimate, with three standard errors. Right: how much of the "
-        "variance that was open beforehand the measurements settle; "
+        "Left: estimate minus true value, in standard deviations of the estimate, with three standard errors. Right: "
+        "how much of the "
+        "prior variance the measurements remove; "
         f"n = {counted(calibration.ranked, 'replication')}."
     )
 
@@ -33,8 +34,8 @@ def draw(calibration: Calibration) -> Figure:
         left.errorbar(q.bias, i, xerr=3 * q.bias_error, fmt="o", color=BLUE, lw=1.2, label="Mean, 3 standard errors")
         right.plot([0, 100 * q.shrinkage], [i, i], color=BLUE, lw=5, solid_capstyle="butt")
     left.axvline(0.0, color=GRAY, lw=0.8)
-    left.set_xlabel("Estimate less truth (standard deviations)")
-    right.set_xlabel("Settled by the measurements (%)")
+    left.set_xlabel("Estimate minus truth (standard deviations)")
+    right.set_xlabel("Prior variance removed (%)")
     right.set_xlim(min(0.0, *(100 * q.shrinkage for q in calibration.quantities)), 100)
     legend_above(figure, [left], 1)
     return figure

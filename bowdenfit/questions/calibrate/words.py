@@ -61,7 +61,7 @@ def verdict_sentences(calibration: Calibration) -> list[str]:
             f"{calibration.ranked} replications can tell.",
             _power_sentence(calibration),
         ]
-    lines = ["NOT CALIBRATED: some intervals must not be taken at their word."]
+    lines = ["NOT CALIBRATED: some intervals do not hold the truth as often as they claim."]
     return [
         *lines,
         *(f"- {name}: {fault}." for name, fault in calibration.faults.items()),
@@ -74,7 +74,7 @@ def _power_sentence(calibration: Calibration) -> str:
     seen = listed(
         [f"too small by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in calibration.power]
     )
-    return f"Of one quantity, intervals {seen} are caught by {calibration.ranked} replications."
+    return f"For a single quantity, intervals {seen} would be detected by {calibration.ranked} replications."
 
 
 def quantity_rows(calibration: Calibration) -> list[tuple[str, ...]]:
@@ -96,8 +96,8 @@ def quantity_note(calibration: Calibration) -> str:
     if calibration.truths:
         note += "Noise scales and the like, in brackets, are not judged: their intervals may depend on their priors. "
     else:
-        note += "Whether truths lie evenly within what the fits say is judged too. "
-    return note + "Bias: estimate less truth, in standard deviations of the estimate."
+        note += "Whether true values fall evenly within their estimated distributions is judged too. "
+    return note + "Bias: estimate minus truth, in standard deviations of the estimate."
 
 
 def evidence_rows(calibration: Calibration) -> list[tuple[str, ...]]:
@@ -117,8 +117,9 @@ def evidence_note(calibration: Calibration) -> str:
         "not judged, because truths are not of the prior" if calibration.truths else f"below {LEVEL} counts as wrong"
     )
     return (
-        "p of ranks: chance of ranks of the truth this far from uniform; corrected (Holm) for the number of quantities, "
-        f"{criterion}. Shrinkage: 0 where the data say nothing beyond the prior, 1 where they say all."
+        "p of ranks: probability that uniform ranks would be this far from uniform; corrected (Holm) for the number of "
+        f"quantities, {criterion}. "
+        "Shrinkage: 0 where the data add nothing to the prior, 1 where they determine the value completely."
     )
 
 

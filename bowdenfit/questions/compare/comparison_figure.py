@@ -117,7 +117,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, names: list[str]) -> N
         axes.plot([-difference.elpd], [i], marker, color=color, markeredgecolor="white", markersize=6)
     axes.axvline(0.0, color=BLACK, linewidth=0.7)
     axes.set_yticks(range(len(names)), names)
-    axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="Score less that of the best, with one and two standard errors")
+    axes.set(ylim=(len(names) - 0.5, -0.5), xlabel="Score minus that of the best, with one and two standard errors")
     axes.set_title(f"Prediction of {counted(len(comparison.readings), 'reading')} left out", loc="left")
     axes.grid(axis="y", visible=False)
     place_labels(axes.figure, axes)  # type: ignore[arg-type]

@@ -32,7 +32,7 @@ def comparison_page(comparison: Comparison) -> HtmlPage:
             "How well each predicts",
             basis_sentences(comparison),
             [PageTable(heads, tuple(rows), HOW_WELL, left=(0, 1))],
-            folded=[("Readings on which a fit leans", influential_text(comparison))],
+            folded=[("Influential readings", influential_text(comparison))],
             pictures=(Picture("comparison", HEADING, caption(comparison)),),
         ),
         prose_section(

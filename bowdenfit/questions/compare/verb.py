@@ -99,12 +99,12 @@ VERB = Verb(
     depends on speed. Likewise --geometry published against the continuous one,
     --noise student, --set prior.tau.fixed=0 for a cable whose mountings are all
     alike, or --set contact.0.wrap_angle.curve=logistic (the first contact) for a
-    route whose wrap angle is no bell.
+    route whose wrap angle is not bell-shaped.
 
     A run is one mounting, and what predicts a new mounting is the other runs. With
     fewer than five runs a run is left out in parts instead, its readings at one
     load at a time: then the comparison says which model describes the cable as it
-    was mounted, not how well it foretells the next mounting.
+    was mounted, not how well it predicts the next mounting.
 
     Readings that would move the posterior take longer: it is fitted again without
     them. The score is the expected log predictive density of leave-one-out (elpd

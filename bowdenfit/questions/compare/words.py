@@ -76,7 +76,7 @@ def _trust_sentence(comparison: Comparison, name: str) -> str:
     sentence = f"{name} is not to be trusted: it is {listed(comparison.troubles[name])}."
     if NOT_CONVERGED in comparison.troubles[name]:
         return f"{sentence} Scores rest on its draws; fit it again with --resume before you compare."
-    return f"{sentence} To predict best of these is not to be right." if name == comparison.best else sentence
+    return f"{sentence} Predicting best among these fits does not make it right." if name == comparison.best else sentence
 
 
 def _preference_sentence(comparison: Comparison, name: str) -> str:
@@ -141,7 +141,7 @@ def basis_sentences(comparison: Comparison) -> list[str]:
         why = f", because there {runs}" if comparison.few_runs else ""
         lines.append(
             f"Left out at a time: {what} of a run{why}; what its mounting did is known from the rest of the run. This compares "
-            "how the models describe these mountings, not how they foretell another one (--leave-out run does)."
+            "how the models describe these mountings, not how they predict another mounting (--leave-out run does)."
         )
     if comparison.counts_runs:
         lines.append(
@@ -164,8 +164,8 @@ def influential_text(comparison: Comparison) -> str:
         return ""
     rough = sum(how.count("rough") for how in ways.values())
     lines = [
-        "Readings on which a fit leans were left out by moving the fit to where it would be without them or, where that was "
-        "not enough, by fitting again."
+        "Influential readings (the fit would change without them) were left out by moving the fit to where it would be "
+        "without them or, where that was not enough, by fitting again."
     ]
     if rough:
         lines.append(

@@ -31,10 +31,10 @@ def _difference_sentence(comparison: ConditionDifference) -> str:
     size = f"{abs(comparison.difference):.2f} W/kg ({percent(abs(comparison.share))})"
     if comparison.is_significant:
         return (
-            f"{comparison.condition} is {way} than {comparison.less} by {size}; that is no chance (p = {comparison.p_holm:.2g} "
-            "for all pairs)."
+            f"{comparison.condition} is {way} than {comparison.less} by {size}; the difference is significant "
+            f"(p = {comparison.p_holm:.2g}, adjusted for all pairs)."
         )
-    needed = f"{comparison.needed} persons would" if comparison.needed else "no number of persons that can be had would"
+    needed = f"{comparison.needed} persons would" if comparison.needed else "no realistic number of persons would"
     return (
         f"{comparison.condition} is not shown to be {way} than {comparison.less}: {size} with {comparison.persons} "
         f"persons, p = {comparison.p:.2g}; "
@@ -48,7 +48,7 @@ def _remarks(result: Metabolic) -> list[str]:
     if result.order:
         lines.append(
             f"All walked in the same order ({', '.join(result.order)}), so what changes with time, such as getting used to the "
-            "device or tiring, cannot be told from what the conditions do."
+            "device or tiring, cannot be separated from the effect of the conditions."
         )
     persons = counted(max(comparison.persons for comparison in result.comparisons), "person")
     least = max(result.comparisons, key=lambda comparison: comparison.least)
@@ -57,8 +57,8 @@ def _remarks(result: Metabolic) -> list[str]:
         f"({least.condition} less {least.less})."
     )
     lines.append(
-        "Lower with probability: the first number is of one who expected differences of a few percent either way, the second "
-        "of one who knew nothing."
+        "Lower with probability: the first number assumes beforehand that differences are a few percent either way, the "
+        "second assumes nothing."
     )
     if not result.from_persons:
         lines.append("Each person's numbers were not printed; all follows from printed means and probabilities.")

@@ -32,7 +32,7 @@ def caption(ranking: NextMeasurement) -> str:
     return (
         f"How well {ranking.answer.words} would be known after one more measurement, as one standard deviation, on "
         "average over "
-        "what it may read; bars: two standard errors of that estimate. Dashed: as well as it is known now."
+        "what it may read; bars: two standard errors of that estimate. Dashed: the present uncertainty."
         f"{best}{gray} n = {counted(len(ranking.ranked), 'measurement')} considered."
     )
 
@@ -51,7 +51,7 @@ def _is_along_route(ranking: NextMeasurement) -> bool:
 
 def _axis_label(ranking: NextMeasurement) -> str:
     """What the axis shows."""
-    return axis_label("Known to ±, one standard deviation", ranking.answer.unit)
+    return axis_label("Standard deviation afterwards", ranking.answer.unit)
 
 
 def _set_title(axes: Axes, ranking: NextMeasurement, start: float = 0.0) -> None:
@@ -96,7 +96,7 @@ def _draw_along_route(ranking: NextMeasurement) -> Figure:
 def _draw_reference(axes: Axes, ranking: NextMeasurement, horizontal: bool) -> None:
     """The standard deviation as things are, and the best candidate."""
     line = axes.axhline if horizontal else axes.axvline
-    line(ranking.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="As things are")
+    line(ranking.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="Present uncertainty")
     best = ranking.best
     if best is not None:
         point = (best.candidate.route, best.sd) if horizontal else (best.sd, 0)

@@ -9,8 +9,8 @@ from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate
 from bowdenfit.words import decimals, few, filled, percent, significant, table
 
 HOW_TO_READ = (
-    "± is one standard deviation, on average over what the reading may turn out to be; two that differ in the last digit "
-    "are as good as each other."
+    "± is one standard deviation, averaged over what the reading may turn out to be; candidates that differ only in the "
+    "last digit are equally good."
 )
 _MAX_NAMED = 3  # candidates as good as the best that are named in the sentence
 
@@ -58,7 +58,7 @@ def _digits(ranking: NextMeasurement) -> int:
 
 
 def _advice_sentences(ranking: NextMeasurement) -> list[str]:
-    """What to measure, at which load, and what would do as well."""
+    """What to measure, at which load, and what would do equally well."""
     best, answer = ranking.best, ranking.answer
     if best is None:
         first = ranking.ranked[0]
@@ -66,7 +66,7 @@ def _advice_sentences(ranking: NextMeasurement) -> list[str]:
             f"None of these measurements would narrow {answer.words} noticeably: it is known to "
             f"{_format_sd(ranking, answer.sd)}, and "
             f"to {_format_sd(ranking, first.sd)} after the best of them, {first.words}.",
-            "One more reading of a kind that there are many of already adds little; name another kind with --candidate, or "
+            "One more reading of a kind that has been measured many times adds little; name another kind with --candidate, or "
             "ask for another answer with --for.",
         ]
     per_cost = " for its cost" if best.cost is not None else ""
@@ -77,7 +77,7 @@ def _advice_sentences(ranking: NextMeasurement) -> list[str]:
     equally_good = [r for r in ranking.ranked if r.as_good and r is not best]
     if equally_good:
         named = [r.words[0].upper() + r.words[1:] if i == 0 else r.words for i, r in enumerate(equally_good)]
-        lines.append(f"{few(named, _MAX_NAMED)} would do as well.")
+        lines.append(f"{few(named, _MAX_NAMED)} would do equally well.")
     return lines
 
 
@@ -98,7 +98,7 @@ def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:
         return []
     usual = next(r for r in within.ranked if r.name == ranking.ranked[0].name)
     best, worst = within.ranked[0], within.ranked[-1]
-    remark = f"That is a run as those made so far: {within.usual}."
+    remark = f"That is a run like those made so far: {within.usual}."
     if worst.as_good or (usual.as_good and len({r.as_good for r in within.ranked}) == 1):
         return [
             f"{remark} Which load and stroke they are taken at makes no difference beyond the error of this estimate."
@@ -142,9 +142,9 @@ def _repeat_sentences(ranking: NextMeasurement) -> list[str]:
     if half == 1:
         return []
     if half is not None:
-        return [f"By itself it would halve the uncertainty after about {half} times."]
+        return [f"Measuring only {best.words}, about {half} times, would halve the uncertainty."]
     still = _format_sd(ranking, repeats.sd[-1])
-    return [f"By itself it would not halve the uncertainty: after {largest} times that would still be {still}."]
+    return [f"Measuring only {best.words} would not halve the uncertainty: after {largest} times it would still be {still}."]
 
 
 def ranking_table(ranking: NextMeasurement, top: int) -> tuple[list[str], list[list[str]]]:
@@ -152,9 +152,9 @@ def ranking_table(ranking: NextMeasurement, top: int) -> tuple[list[str], list[l
     best = ranking.ranked[:top]
     unit = f" ({ranking.answer.unit})" if ranking.answer.unit else ""
     digits = _digits(ranking)
-    heads = ["measurement", f"then known to{unit}", "uncertainty less by"]
+    heads = ["measurement", f"then known to{unit}", "uncertainty lower by"]
     rows = [[r.name, f"± {r.sd:z.{digits}f}", percent(1 - r.sd / ranking.answer.sd)] for r in best]
     if any(r.cost is not None for r in best):
-        heads += ["cost", "variance less by, per cost"]
+        heads += ["cost", "variance lower by, per cost"]
         rows = [[*row, f"{r.cost:g}", percent(r.worth, 2)] for row, r in zip(rows, best, strict=True)]
     return heads, rows

@@ -134,7 +134,7 @@ def test_force_replaces_a_fit_and_nothing_else(saved, on_body, tmp_path):
 
 def test_a_folder_of_something_else_is_left_alone(on_body, tmp_path):
     (tmp_path / "thesis.tex").write_text("...")
-    with pytest.raises(bf.StoreError, match="no results folder"):
+    with pytest.raises(bf.StoreError, match="not a results folder"):
         bf.fit(on_body, output=tmp_path, mcmc=False)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 

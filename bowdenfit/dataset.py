@@ -44,11 +44,11 @@ class Dataset(Display):
 
     def sentences(self) -> list[str]:
         """What the cable is, and what was measured on it."""
-        said = [line for kind, table in each_table(self.measurements) for line in kind.describe(table, self.description)]
-        return [*self.description.sentences(), *(f"- {line}" for line in said), *self.measurements.remarks]
+        lines = [line for kind, table in each_table(self.measurements) for line in kind.describe(table, self.description)]
+        return [*self.description.sentences(), *(f"- {line}" for line in lines), *self.measurements.remarks]
 
     def _table(self) -> Rows:
-        rows = [{"file": each.file, "rows": each.rows, "read": each.read} for each in self.accounts]
+        rows = [{"file": account.file, "rows": account.rows, "read": account.read} for account in self.accounts]
         return rows, {"rows": "1", "read": "1"}
 
 

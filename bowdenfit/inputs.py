@@ -22,7 +22,7 @@ _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
 _MOST_DOTS = 300  # of a key, or a sentence
 _DEEPEST = 12  # keys below keys; a description has four
 _NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
-_OF_THE_SYSTEM = ("/proc/", "/sys/")  # some of these wait for ever, some never end
+_SYSTEM_FOLDERS = ("/proc/", "/sys/")  # some of these wait for ever, some never end
 _SPECIAL = {
     stat.S_ISFIFO: "a named pipe",
     stat.S_ISCHR: "a device",
@@ -50,7 +50,7 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
                 "seen from the folder of cable.toml."
             ) from None
         return  # whoever opens it says that it is missing
-    if stat.S_ISREG(mode) and os.path.realpath(path).startswith(_OF_THE_SYSTEM):
+    if stat.S_ISREG(mode) and os.path.realpath(path).startswith(_SYSTEM_FOLDERS):
         raise error(f"{path.name} is no file on a disk but made by the system while it is read; copy it, and name that.")
     for is_so, what in _SPECIAL.items():
         if is_so(mode):
@@ -58,7 +58,7 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
 
 
 @contextmanager
-def or_damaged(error: BowdenfitError) -> Iterator[None]:
+def damage_as(error: BowdenfitError) -> Iterator[None]:
     """Whatever a library stumbles over in a damaged file is that error: it may be of any kind, and say anything.
 
     Args:
@@ -68,10 +68,10 @@ def or_damaged(error: BowdenfitError) -> Iterator[None]:
         yield
     except (BowdenfitError, MemoryError):
         raise
-    except Exception as stumbled:
-        if isinstance(stumbled, OSError) and stumbled.errno is not None and stumbled.filename is not None:
+    except Exception as failure:
+        if isinstance(failure, OSError) and failure.errno is not None and failure.filename is not None:
             raise
-        raise error from stumbled
+        raise error from failure
 
 
 def refuse_packed(archive: "NpzFile") -> None:
@@ -139,7 +139,7 @@ def _is_deeper(page: dict[str, Any], levels: int) -> bool:
     return True
 
 
-def matching(folder: Path, pattern: str) -> list[Path]:
+def match_files(folder: Path, pattern: str) -> list[Path]:
     """Files that a pattern names, in sorted order.
 
     Args:

@@ -45,7 +45,7 @@ _EXAMPLES = {
     "rate": "1/s, 1/min",
 }
 # What most tables are written in, with the factor to the internal unit: pint's registry takes a fifth of a second to make.
-_USUAL = {
+_COMMON_UNITS = {
     "N": ("force", 1.0),
     "kN": ("force", 1000.0),
     "mm": ("length", 1.0),
@@ -70,9 +70,9 @@ _USUAL = {
     "N*m/rad": ("angular_stiffness", 1.0),
     "N/mm": ("stiffness", 1.0),
 }
-_AS_PINT_SAYS = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
+_PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
-_WRITTEN = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
+_UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _DEGREE, _DEGREE_OR_GON = re.compile(r"\bGrad\b"), re.compile(r"\bgrad\b")  # the first is German, and giga-radians to pint
 _NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
 
@@ -117,7 +117,7 @@ def _registry() -> "pint.UnitRegistry":
 
 def is_unit(text: str) -> bool:
     """Whether `text` is a unit that pint reads."""
-    if text in _USUAL:
+    if text in _COMMON_UNITS:
         return True
     try:
         _parsed(text)
@@ -128,8 +128,8 @@ def is_unit(text: str) -> bool:
 
 def dimension_of(unit: str) -> str:
     """Which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
-    if unit in _USUAL:
-        return _USUAL[unit][0]
+    if unit in _COMMON_UNITS:
+        return _COMMON_UNITS[unit][0]
     parsed = _parsed(unit)
     for dimension, internal in INTERNAL_UNITS.items():
         if _same_kind(parsed, _parsed(internal)):
@@ -156,7 +156,7 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     Raises:
         DatasetError: The unit is unknown, or measures something else.
     """
-    of_usual, factor = _USUAL.get(unit, ("", 0.0))
+    of_usual, factor = _COMMON_UNITS.get(unit, ("", 0.0))
     if of_usual == dimension and to in (None, INTERNAL_UNITS[dimension]):
         return factor
     if (of_usual and of_usual != dimension) or not _same_kind(_parsed(unit), _parsed(to or INTERNAL_UNITS[dimension])):
@@ -190,7 +190,7 @@ def route_conversion_factor(unit: str, to: str) -> float:
     Raises:
         DatasetError: A unit is unknown, or the two measure different things.
     """
-    if unit == to and unit in _USUAL:
+    if unit == to and unit in _COMMON_UNITS:
         return 1.0
     parsed, target = _parsed(unit), _parsed(to)
     if not _same_kind(parsed, target):
@@ -204,12 +204,12 @@ def _parsed(unit: str) -> "pint.Unit":
     unknown = f"the unit {shown(unit)} is not known; use one such as N, lbf, mm, inch, deg, rad, %"
     if text in {"1", "-", ""}:
         text = "dimensionless"
-    text = _DEGREE.sub("deg", _AS_PINT_SAYS.get(text.lower(), text))
+    text = _DEGREE.sub("deg", _PINT_NAMES.get(text.lower(), text))
     if _DEGREE_OR_GON.search(text):
         raise DatasetError(
             f"the unit {shown(unit)} is a degree in German and a hundredth of a right angle elsewhere; write deg, or gradian"
         )
-    if not _WRITTEN.fullmatch(text) or _NO_UNIT.search(text):
+    if not _UNIT_TEXT.fullmatch(text) or _NO_UNIT.search(text):
         raise DatasetError(unknown)
     try:
         parsed = _registry().parse_units(text)

@@ -22,6 +22,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 15]}...{text[-12:]}"
 
 
+def capitalized(text: str) -> str:
+    """Text whose first letter is upper case; all others keep their case, so that "freie Hülle" becomes "Freie Hülle"."""
+    return text[:1].upper() + text[1:]
+
+
 def printable(text: str) -> str:
     """Return text with control characters written out, so that nothing in it steers a terminal."""
     return "".join(x if x in "\n\t" or x == " " or x.isprintable() or x == "\u00a0" else ascii(x)[1:-1] for x in text)

@@ -14,7 +14,7 @@ from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
 from bowdenfit.cable.friction import FrictionModel, friction_options
 from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
-from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, class_at
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, load_class
 from bowdenfit.description import Contact, Description, PriorDefaults
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
@@ -42,7 +42,7 @@ class Cable:
         """The curve of each curved contact, by its column."""
         route = self.description.route
         return {
-            source.column: class_at(CURVES[source.curve].place)(source.column, route)
+            source.column: load_class(CURVES[source.curve].place)(source.column, route)
             for source in (c.wrap_angle for c in self.description.contact)
             if route is not None and source.column is not None and source.curve is not None
         }
@@ -59,7 +59,9 @@ class Cable:
         """The law of each contact in each group of readings; where all groups share their coefficients, one for all."""
         return tuple(
             tuple(
-                class_at(CONTACT_LAWS[c.law])(c.name, coefficient_of(c.friction, group) if group and c.by_group else c.friction)
+                load_class(CONTACT_LAWS[c.law])(
+                    c.name, coefficient_of(c.friction, group) if group and c.by_group else c.friction
+                )
                 for c in self.description.contact
             )
             for group in self.friction.groups or ("",)
@@ -111,14 +113,14 @@ class Cable:
         def total(laws: tuple[ContactLaw, ...]) -> Array:
             return jnp.sum(jnp.stack([law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(laws)]), axis=0)
 
-        return self._of_groups(total, group)
+        return self._in_own_group(total, group)
 
-    def _of_groups(self, of_laws: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
+    def _in_own_group(self, total: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
         """What the laws of each row's group give."""
         if group is None or not self.friction.groups:
-            return of_laws(self.laws)
-        each = jnp.stack([of_laws(laws) for laws in self.laws_by_group], axis=-1)
-        return jnp.take_along_axis(each, group[..., None], axis=-1)[..., 0]
+            return total(self.laws)
+        by_group = jnp.stack([total(laws) for laws in self.laws_by_group], axis=-1)
+        return jnp.take_along_axis(by_group, group[..., None], axis=-1)[..., 0]
 
     def exponent_variance(
         self,
@@ -133,7 +135,7 @@ class Cable:
             slopes = [law.slope(values, wrap_angles[..., k]) for k, law in enumerate(laws)]
             return jnp.sum(jnp.stack([slope**2 * angle_variance[..., k] for k, slope in enumerate(slopes)]), axis=0)
 
-        return self._of_groups(total, group)
+        return self._in_own_group(total, group)
 
     def efficiency_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Efficiency while pulling with the reference force at the reference speed [1] at values of the route variable."""
@@ -164,13 +166,13 @@ class Cable:
             stroke: +1 pulling, -1 return.
             mounting: Effect of the mounting on the friction exponent [1].
         """
-        return self.output_force_bent(values, self.wrap_angles(values, route), input_force, stroke, mounting)
+        return self.output_force_at_angles(values, self.wrap_angles(values, route), input_force, stroke, mounting)
 
-    def output_force_bent(
+    def output_force_at_angles(
         self, values: Mapping[str, Array], angles: Array, input_force: Array, stroke: Array, mounting: Array | float = 0.0
     ) -> Float[Array, "..."]:
         """Output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
-        exponent, preload = self._friction_bent(values, angles, mounting)
+        exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
             return loop_output_force(input_force, preload, exponent, stroke)
         return self.friction.output_force(values, input_force, exponent, stroke)
@@ -184,18 +186,18 @@ class Cable:
         mounting: Float[Array, ""] | float = 0.0,
     ) -> Float[Array, " rows"]:
         """Input force [N] that gives an output force [N]: the inverse of `output_force_at`, with the same arguments."""
-        return self.input_force_bent(values, self.wrap_angles(values, route), output_force, stroke, mounting)
+        return self.input_force_at_angles(values, self.wrap_angles(values, route), output_force, stroke, mounting)
 
-    def input_force_bent(
+    def input_force_at_angles(
         self, values: Mapping[str, Array], angles: Array, output_force: Array, stroke: Array, mounting: Array | float = 0.0
     ) -> Float[Array, "..."]:
         """Input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
-        exponent, preload = self._friction_bent(values, angles, mounting)
+        exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
             return loop_input_force(output_force, preload, exponent, stroke)
         return self.friction.input_force(values, output_force, exponent, stroke)
 
-    def _friction_bent(
+    def _friction_at_angles(
         self, values: Mapping[str, Array], angles: Array, mounting: Array | float
     ) -> tuple[Array, Array | None]:
         """Friction exponent [1] in a mounting, and the preload of a loop [N]; None of a single rope."""

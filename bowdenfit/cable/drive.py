@@ -24,13 +24,13 @@ from bowdenfit.physics.loop import loop_band
 
 LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
 
-Recorded = Float[Array, "time recordings"]
-Each = Float[Array, " recordings"]
+PerTime = Float[Array, "time recordings"]
+PerRecording = Float[Array, " recordings"]
 Shown = Float[np.ndarray, "*batch"]
 
 
 @dataclass(frozen=True)
-class Rope:
+class RopeDrive:
     """A single rope at given parameters, in several recordings.
 
     Args:
@@ -42,8 +42,8 @@ class Rope:
 
     friction: FrictionModel
     values: Mapping[str, Array]
-    exponent: Each
-    rate: Recorded
+    exponent: PerRecording
+    rate: PerTime
     least_share = LEAST_SHARE
 
     @property
@@ -51,7 +51,7 @@ class Rope:
         """What an offset or a drag leaves of a force at least [N]."""
         return self.friction.conditions.least_force
 
-    def band(self, mounting: Each) -> Recorded:
+    def band(self, mounting: PerRecording) -> PerTime:
         """Half the width of the friction band on the scale g [1], with an effect of the mounting on the exponent."""
         return jnp.maximum(self.exponent * self.rate + mounting, LEAST_EXPONENT)
 
@@ -61,12 +61,12 @@ class Rope:
 
     def follow(
         self,
-        input_force: Recorded,
-        mounting: Each,
-        start: Each,
-        restart: Recorded | None = None,
-        noise: Recorded | None = None,
-    ) -> tuple[Recorded, Recorded]:
+        input_force: PerTime,
+        mounting: PerRecording,
+        start: PerRecording,
+        restart: PerTime | None = None,
+        noise: PerTime | None = None,
+    ) -> tuple[PerTime, PerTime]:
         """Output force [N], and the derivative of its `scaled` by the friction exponent [1].
 
         Args:
@@ -84,7 +84,7 @@ class Rope:
             y = y + self.scaled(jnp.maximum(input_force + noise, self.least_force)) - x
         return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
 
-    def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
+    def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
         """Logarithm of what the output's cell shows, and its derivative by the friction exponent, of what `follow` gave."""
         shown = cells.shown_output(output_force, self.least_force)
         return jnp.log(shown), cells.shown_change(slope) / (self.friction.slope(self.values, output_force) * shown)
@@ -101,7 +101,7 @@ class Rope:
 
 
 @dataclass(frozen=True)
-class Loop:
+class LoopDrive:
     """A pull-pull loop at given parameters, in several recordings: a play operator whose width is the loss.
 
     Exact while the loop moves on. At a reversal the slip fronts of the two sides cross the cable at different times: against
@@ -112,11 +112,11 @@ class Loop:
         exponent: Friction exponent of one side, of each [1].
     """
 
-    preload: Each
-    exponent: Each
+    preload: PerRecording
+    exponent: PerRecording
     least_share = least_force = -jnp.inf
 
-    def band(self, mounting: Each) -> Each:
+    def band(self, mounting: PerRecording) -> PerRecording:
         """Friction exponent of one side with an effect of the mounting [1]."""
         return jnp.maximum(self.exponent + mounting, LEAST_EXPONENT)
 
@@ -126,16 +126,16 @@ class Loop:
 
     def follow(
         self,
-        input_force: Recorded,
-        mounting: Each,
-        start: Each,
-        restart: Recorded | None = None,
-        noise: Recorded | None = None,
-    ) -> tuple[Recorded, Recorded]:
+        input_force: PerTime,
+        mounting: PerRecording,
+        start: PerRecording,
+        restart: PerTime | None = None,
+        noise: PerTime | None = None,
+    ) -> tuple[PerTime, PerTime]:
         """Output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
         exponent = self.band(mounting)
 
-        def limits(exponent: Each) -> tuple[Recorded, Recorded]:
+        def limits(exponent: PerRecording) -> tuple[PerTime, PerTime]:
             return loop_band(input_force, self.preload, exponent)
 
         (low, high), slopes = jax.jvp(limits, (exponent,), (jnp.ones_like(exponent),))
@@ -145,7 +145,7 @@ class Loop:
         lower, upper = loop_band(input_force + noise, self.preload, exponent)
         return y + jnp.where(y - low < high - y, lower - low, upper - high), slope
 
-    def shown(self, cells: LoadCells, output_force: Recorded, slope: Recorded) -> tuple[Recorded, Recorded]:
+    def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
         """What the output's cell shows, and its derivative by the friction exponent, of what `follow` gave [N]."""
         return cells.shown_output(output_force), cells.shown_change(slope)
 
@@ -160,13 +160,13 @@ class Loop:
         return shown - late
 
 
-def drive_of(
+def make_drive(
     cable: Cable,
     values: Mapping[str, Array],
     wrap_angles: Float[Array, "recordings contacts"],
-    velocity: Recorded,
-    exponent: Each | None = None,
-) -> Rope | Loop:
+    velocity: PerTime,
+    exponent: PerRecording | None = None,
+) -> RopeDrive | LoopDrive:
     """The cable as it lies in each recording.
 
     Args:
@@ -178,5 +178,5 @@ def drive_of(
     """
     exponent = cable.friction_exponent(values, wrap_angles) if exponent is None else exponent
     if cable.is_loop:
-        return Loop(cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0], exponent)
-    return Rope(cable.friction, values, exponent, cable.friction.rate(values, velocity))
+        return LoopDrive(cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0], exponent)
+    return RopeDrive(cable.friction, values, exponent, cable.friction.rate(values, velocity))

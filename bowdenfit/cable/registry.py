@@ -13,7 +13,7 @@ from bowdenfit.errors import DescriptionError, suggest_name
 
 
 @dataclass(frozen=True)
-class Family:
+class CurveFamily:
     """A family of curves.
 
     Args:
@@ -27,9 +27,9 @@ class Family:
 
 CONTACT_LAWS = {"capstan": "bowdenfit.cable.laws:Capstan", "wobble": "bowdenfit.cable.laws:Wobble"}
 CURVES = {
-    "gaussian": Family("bowdenfit.cable.curves:GaussianCurve", 3),
-    "line": Family("bowdenfit.cable.curves:LineCurve", 2),
-    "logistic": Family("bowdenfit.cable.curves:LogisticCurve", 3),
+    "gaussian": CurveFamily("bowdenfit.cable.curves:GaussianCurve", 3),
+    "line": CurveFamily("bowdenfit.cable.curves:LineCurve", 2),
+    "logistic": CurveFamily("bowdenfit.cable.curves:LogisticCurve", 3),
 }
 
 
@@ -48,7 +48,7 @@ def check_names(description: Description) -> None:
                 )
 
 
-def class_at(place: str) -> Any:
+def load_class(place: str) -> Any:
     """The class at a place such as "bowdenfit.cable.laws:Capstan"."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)

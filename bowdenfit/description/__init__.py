@@ -34,8 +34,8 @@ from bowdenfit.words import counted, listed
 
 __all__ = [
     "BY_GROUP",
+    "RESERVED_NAMES",
     "SCHEMA",
-    "TAKEN",
     "CableSettings",
     "Contact",
     "Description",
@@ -75,7 +75,9 @@ SCHEMA = 1
 BY_GROUP = "by-group"
 Geometry = Literal["continuous", "published"]
 Noise = Literal["normal", "student"]
-TAKEN = ("chain", "draw", "optimal_length", "optimal_efficiency")  # of what stands beside the coefficients in a file of draws
+RESERVED_NAMES = ("chain", "draw", "optimal_length", "optimal_efficiency")
+"""Columns that a file of draws has beside the coefficients, so that no coefficient can be called that."""
+
 AnySettings = TypeVar("AnySettings")
 
 
@@ -132,15 +134,15 @@ class Description(Display, Frozen):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Description":
-        if said := [*self._of_names(), *self._of_the_whole()]:
-            raise ValueError("\n".join(said))  # a line each
+        if faults := [*self._name_conflicts(), *self._setting_conflicts()]:
+            raise ValueError("\n".join(faults))  # a line each
         return self
 
-    def _of_names(self) -> Iterator[str]:
+    def _name_conflicts(self) -> Iterator[str]:
         """What names contradict."""
         used = [c.friction for c in self.contact]
         for name in self.coefficients:
-            if name in TAKEN:
+            if name in RESERVED_NAMES:
                 yield f"a friction coefficient cannot be called {name!r}, which results hold already; rename it"
             if len({c.by_group for c in self.contact if c.friction == name}) > 1:
                 yield f"by_group is not the same in all contacts of {name!r}; write it in each, or use two names"
@@ -153,7 +155,7 @@ class Description(Display, Frozen):
         if self.group is not None and not self.by_group:
             yield 'group names the one that predictions are for, which belongs to friction_model = "by-group"'
 
-    def _of_the_whole(self) -> Iterator[str]:
+    def _setting_conflicts(self) -> Iterator[str]:
         """What settings contradict."""
         curved = [c for c in self.contact if c.wrap_angle.curve]
         if curved and self.route is None:
@@ -181,7 +183,7 @@ class Description(Display, Frozen):
     @property
     def fits_offsets(self) -> bool:
         """Whether the load cells' offsets are parameters."""
-        return self.sensors.offset_sd is not None or any(said.fits_offsets for said in self.tables.stated.values())
+        return self.sensors.offset_sd is not None or any(settings.fits_offsets for settings in self.tables.stated.values())
 
     @property
     def by_group(self) -> bool:
@@ -202,8 +204,8 @@ class Description(Display, Frozen):
     @property
     def preload_follows_stretch(self) -> bool:
         """Whether preload depends on the wrap angle; so it does by default where a table says how."""
-        told = any(said.tells_preload for said in self.tables.stated.values())
-        return (self.preload.model or ("stretch" if told else "constant")) == "stretch"
+        measured = any(settings.measures_preload for settings in self.tables.stated.values())
+        return (self.preload.model or ("stretch" if measured else "constant")) == "stretch"
 
     @property
     def coefficients(self) -> tuple[str, ...]:
@@ -237,7 +239,7 @@ class Description(Display, Frozen):
 
     def table(self, of: type[AnySettings]) -> AnySettings | None:
         """What is said of the table whose kind has settings of a class; None if there is no such table."""
-        return next((said for said in self.tables.stated.values() if type(said) is of), None)
+        return next((settings for settings in self.tables.stated.values() if type(settings) is of), None)
 
     def to_json(self) -> dict[str, Any]:
         """The resolved description as plain data."""

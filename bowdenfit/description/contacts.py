@@ -3,6 +3,7 @@
 from pydantic import field_validator, model_validator
 
 from bowdenfit.description.values import Finite, Frozen, Name, NonNegative, Positive, QuantityValue
+from bowdenfit.words import capitalized
 
 
 class Route(Frozen):
@@ -35,7 +36,7 @@ class Route(Frozen):
     @property
     def label(self) -> str:
         """Name and unit for an axis or a heading."""
-        return f"{self.variable.replace('_', ' ').capitalize()} ({self.unit})"
+        return f"{capitalized(self.variable.replace('_', ' '))} ({self.unit})"
 
     def outside(self, value: float) -> str:
         """That the angle curves do not hold at a value, in words; empty where they do."""

@@ -29,16 +29,16 @@ class Sensors(Frozen):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_each_cell(cls, said: Any) -> Any:
+    def _of_each_cell(cls, settings: Any) -> Any:
         """A figure for both cells together is refused; folders of results stored with an empty one are read."""
-        if not isinstance(said, dict) or "gain_error_sd" not in said:
-            return said
-        if (both := said["gain_error_sd"]) is not None:
+        if not isinstance(settings, dict) or "gain_error_sd" not in settings:
+            return settings
+        if (both := settings["gain_error_sd"]) is not None:
             raise ValueError(
                 f"gain_error_sd = {both} does not say whose error it is; write that of each load cell, as its data sheet gives "
                 f"it: input_gain_error_sd = {both} and output_gain_error_sd = {both} (0 for a hung weight)"
             )
-        return {name: value for name, value in said.items() if name != "gain_error_sd"}
+        return {name: value for name, value in settings.items() if name != "gain_error_sd"}
 
     @model_validator(mode="after")
     def _of_both_cells(self) -> "Sensors":
@@ -77,8 +77,8 @@ class Sensors(Frozen):
     @property
     def largest_force_noise(self) -> float | None:
         """The stated noise of a force reading, with what its own error may add [N]; None where it is not stated."""
-        said = self.force_noise
-        return None if said is None else said.to("force") + 3 * (said.sd_to("force") or 0.0)
+        noise = self.force_noise
+        return None if noise is None else noise.to("force") + 3 * (noise.sd_to("force") or 0.0)
 
 
 class SamplerSettings(Frozen):

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 from bowdenfit.description import SCHEMA
 from bowdenfit.description.device_keys import KEYS, Key
 from bowdenfit.description.values import Frozen, Name, QuantityValue
-from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError, Faults, combine_errors
 from bowdenfit.inputs import read_toml_file
 
@@ -37,7 +37,7 @@ class Joint(Frozen):
     pulley_radius: Quantity = None
 
 
-class Rope(Frozen):
+class RopeSettings(Frozen):
     """What the fit of the cable does not tell of it; `ringdown` is the results folder of a fit that tells its damping."""
 
     damping: Quantity = None
@@ -124,7 +124,7 @@ class Device(Frozen):
     source: str = ""
     motor: Motor = Motor()
     joint: Joint = Joint()
-    rope: Rope = Rope()
+    rope: RopeSettings = RopeSettings()
     controller: ControllerSettings = ControllerSettings()
     hand: Hand = Hand()
     slave: Slave = Slave()
@@ -132,12 +132,12 @@ class Device(Frozen):
     coupling: Coupling = Coupling()
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-    _told: dict[str, Known] = PrivateAttr(default_factory=dict)
+    _fitted: dict[str, Known] = PrivateAttr(default_factory=dict)
 
-    def told(self, more: Mapping[str, Known]) -> "Device":
+    def with_fitted(self, more: Mapping[str, Known]) -> "Device":
         """The same with quantities that a fit tells [SI]."""
         device = self.model_copy()
-        device._told = {**self._told, **more}
+        device._fitted = {**self._fitted, **more}
         return device
 
     def states(self, *keys: str) -> bool:
@@ -146,7 +146,7 @@ class Device(Frozen):
 
     def lacking(self, *keys: str) -> list[str]:
         """Those that it does not say."""
-        return [key for key in keys if key not in self._told and self._stated(key) is None]
+        return [key for key in keys if key not in self._fitted and self._stated(key) is None]
 
     def known(self, *keys: str) -> dict[str, Known]:
         """Quantities by key, of those that are stated [SI].
@@ -154,15 +154,15 @@ class Device(Frozen):
         Raises:
             DescriptionError: One that is measured has no sd.
         """
-        faults, found = Faults(), {}
+        faults, known = Faults(), {}
         for key in keys:
             with faults.collect():
-                if key in self._told:
-                    found[key] = self._told[key]
+                if key in self._fitted:
+                    known[key] = self._fitted[key]
                 elif (stated := self._stated(key)) is not None:
-                    found[key] = _known(key, stated)
+                    known[key] = _known(key, stated)
         faults.refuse()
-        return found
+        return known
 
     def needed(self, what: str, *keys: str) -> dict[str, Known]:
         """Quantities by key, of which none may be missing [SI].
@@ -175,7 +175,7 @@ class Device(Frozen):
             DescriptionError: Some are not stated, or have no sd; says all of them.
         """
         if missing := self.lacking(*keys):
-            raise asked_for(what, missing)
+            raise missing_settings(what, missing)
         return self.known(*keys)
 
     def _stated(self, key: str) -> QuantityValue | None:
@@ -191,21 +191,21 @@ class Device(Frozen):
             DescriptionError: It is not stated.
         """
         if self.controller.encoder_counts is None:
-            raise asked_for("a simulation", [ENCODER])
+            raise missing_settings("a simulation", [ENCODER])
         return 2 * pi / self.controller.encoder_counts
 
 
-def asked_for(what: str, missing: Sequence[str]) -> BowdenfitError:
+def missing_settings(what: str, missing: Sequence[str]) -> BowdenfitError:
     """What to write into `device.toml`, by name, for an answer that needs it.
 
     Args:
         what: That needs it, in words.
         missing: Keys.
     """
-    return combine_errors([DescriptionError(_asked(what, key)) for key in missing])
+    return combine_errors([DescriptionError(_missing_setting(what, key)) for key in missing])
 
 
-def _asked(what: str, key: str) -> str:
+def _missing_setting(what: str, key: str) -> str:
     part, name = key.split(".")
     if key not in KEYS:
         return f"{what} needs the counts of the encoder in a turn; write encoder_counts = 2000 under [{part}] of device.toml."
@@ -239,7 +239,7 @@ def read_device(path: Path) -> Device:
     try:
         device = Device.model_validate(raw)
     except ValidationError as error:
-        raise wrong_keys(error, raw, Device, path.name, 'write it, such as name = "knee"') from None
+        raise explain_validation_error(error, raw, Device, path.name, 'write it, such as name = "knee"') from None
     faults = Faults()
     for key, stated in _quantities(device):
         with faults.collect():

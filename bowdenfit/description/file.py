@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from bowdenfit.description import Description, ParameterSetting, QuantityValue, Route
 from bowdenfit.description.elastic import check_elastic
 from bowdenfit.description.shares import check_shares
-from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
@@ -67,7 +67,7 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
     try:
         description = model.model_validate(dict(raw))
     except ValidationError as error:
-        raise wrong_keys(error, raw, model, file) from None
+        raise explain_validation_error(error, raw, model, file) from None
     faults = Faults()
     with faults.collect():
         check_quantities(_quantities(description), file)

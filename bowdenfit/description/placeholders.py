@@ -19,7 +19,7 @@ Place = tuple[str | int, ...]
 """The keys that lead to a value."""
 
 
-def placeholders_in(raw: Mapping[str, Any], text: str, file: str) -> dict[Place, DescriptionError]:
+def find_placeholders(raw: Mapping[str, Any], text: str, file: str) -> dict[Place, DescriptionError]:
     """The placeholders of the template that were left in a description, by where they stand.
 
     Args:
@@ -27,15 +27,15 @@ def placeholders_in(raw: Mapping[str, Any], text: str, file: str) -> dict[Place,
         text: Its text, in which the lines are looked up.
         file: Its file.
     """
-    found = {}
+    faults = {}
     for place, value in _strings(raw):
         if value in PLACEHOLDERS:
             lines = [i for i, line in enumerate(text.splitlines(), start=1) if value in line.partition("#")[0]]
             where = f"{file}, line {lines[0]}" if lines else f"{file}, {'.'.join(map(str, place))}"
             what = f"{where}: {shown(value)} is left from the template; write {PLACEHOLDERS[value]}."
-            found[place] = DescriptionError(what)
-            found[place].key_path = place
-    return found
+            faults[place] = DescriptionError(what)
+            faults[place].key_path = place
+    return faults
 
 
 def _strings(raw: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:

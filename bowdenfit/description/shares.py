@@ -41,4 +41,4 @@ def _size(setting: ParameterSetting) -> tuple[str, float]:
         for key, value in numbers.items()
         if key in ("median", "mean", "sd", "scale")
     }
-    return max(sizes.items(), key=lambda each: each[1], default=("prior", 0.0))
+    return max(sizes.items(), key=lambda item: item[1], default=("prior", 0.0))

@@ -17,7 +17,7 @@ class TableSettings(Frozen):
         return False
 
     @property
-    def tells_preload(self) -> bool:
+    def measures_preload(self) -> bool:
         """Whether its readings tell how preload depends on the wrap angle."""
         return False
 
@@ -50,4 +50,4 @@ class Tables(Frozen):
     @property
     def stated(self) -> dict[str, Any]:
         """What is said of each table that there is, by the name of its kind."""
-        return {name: said for name in type(self).model_fields if (said := getattr(self, name)) is not None}
+        return {name: settings for name in type(self).model_fields if (settings := getattr(self, name)) is not None}

@@ -18,7 +18,7 @@ _LONGEST_KEY = 80  # letters that are said of one
 _LARGE = 1e15  # a number that nobody measures
 
 
-def wrong_keys(
+def explain_validation_error(
     error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str = _INIT
 ) -> BowdenfitError:
     """All that is wrong with the keys of a file.
@@ -30,33 +30,33 @@ def wrong_keys(
         file: Its name.
         remedy: What to do about a key that is missing.
     """
-    found: list[BowdenfitError] = []
+    faults: list[BowdenfitError] = []
     for number, cause in enumerate(_causes(error, raw, model)):
         of = model if number < _MOST_UNKNOWN else BaseModel
         for message in cause["msg"].removeprefix("Value error, ").splitlines():
             fault = DescriptionError(_sentence({**cause, "msg": message}, of, file, remedy))
             fault.key_path = tuple(cause["loc"])
-            found.append(fault)
-    return combine_errors(found)
+            faults.append(fault)
+    return combine_errors(faults)
 
 
 def _causes(error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel]) -> list[dict[str, Any]]:
     """The errors without what others bring about: what is misspelled is not missing too, and a value has one fault."""
-    errors: list[dict[str, Any]] = [dict(each) for each in error.errors()]
+    errors: list[dict[str, Any]] = [dict(fault) for fault in error.errors()]
     meant = set()
-    unknown = [each for each in errors if each["type"] == "extra_forbidden"]
-    for each in unknown[:_MOST_UNKNOWN]:
-        *parents, name = each["loc"]
+    unknown = [fault for fault in errors if fault["type"] == "extra_forbidden"]
+    for fault in unknown[:_MOST_UNKNOWN]:
+        *parents, name = fault["loc"]
         near = get_close_matches(str(name), _siblings(model, [*map(str, parents)]), n=1, cutoff=_ALIKE)
         meant |= {(*parents, key) for key in near}
     kept: dict[Any, dict[str, Any]] = {}
-    for each in errors:
-        written = _written(each["loc"], raw)
-        lacking = each["type"] == "missing" and len(each["loc"]) == len(written) + 1
-        if not (lacking and tuple(each["loc"]) in meant):
-            kept.setdefault(tuple(each["loc"]) if lacking else written, each)
+    for fault in errors:
+        written = _written(fault["loc"], raw)
+        lacking = fault["type"] == "missing" and len(fault["loc"]) == len(written) + 1
+        if not (lacking and tuple(fault["loc"]) in meant):
+            kept.setdefault(tuple(fault["loc"]) if lacking else written, fault)
     parents_of_others = {place[:length] for place in kept for length in range(len(place))}
-    return [each for place, each in kept.items() if place not in parents_of_others]
+    return [fault for place, fault in kept.items() if place not in parents_of_others]
 
 
 def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
@@ -74,8 +74,8 @@ def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
 def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str) -> str:
     """What is wrong with one key."""
     where = [str(part) for part in error["loc"]]
-    said = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
-    place = f"{file}, {'.'.join(said)}" if where else file
+    parts = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
+    place = f"{file}, {'.'.join(parts)}" if where else file
     if error["type"] == "extra_forbidden":
         return f"{file}: unknown key {shown('.'.join(where))}{suggest_name(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
@@ -87,18 +87,18 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     message = error["msg"]
     if where == ["schema"] and isinstance(error["input"], int) and error["input"] > SCHEMA:
         message = f"schema {shown(error['input'])} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"
-    found = f" (found {shown(error['input'])})" if not isinstance(error["input"], dict | list) and where else ""
-    sentence = f"{place}: {message[:1].lower() + message[1:]}{found}"
+    value = f" (found {shown(error['input'])})" if not isinstance(error["input"], dict | list) and where else ""
+    sentence = f"{place}: {message[:1].lower() + message[1:]}{value}"
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
 
 def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
     """How to write what must be a table of keys."""
-    found = error["input"]
+    value = error["input"]
     if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
-        return f"a number needs its unit (found {shown(found)}); write it as {_with_unit(found, where)}."
+        return f"a number needs its unit (found {shown(value)}); write it as {_with_unit(value, where)}."
     how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
-    return f"this holds keys of its own (found {shown(found)}); write them {how}."
+    return f"this holds keys of its own (found {shown(value)}); write them {how}."
 
 
 def _with_unit(value: Any, where: Sequence[str]) -> str:
@@ -125,7 +125,7 @@ def _models_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _models_in(argument)
-        if found is not None:
-            return found
+        model = _models_in(argument)
+        if model is not None:
+            return model
     return None

@@ -41,17 +41,17 @@ def read_channels(path: Path) -> ChannelFile:
         DatasetError: The file is missing, empty, unreadable, damaged, too large, not what its ending says, or of no
             kind that can be read; or its library is not installed.
     """
-    found = path.stat() if path.is_file() else None
-    which = (path.resolve(), found.st_mtime_ns, found.st_size, found.st_ino) if found else None
-    known = _KEPT.get(which) if which else None
-    if known is None:
-        known = _read_anew(path)
-        if which:
-            _KEPT[which] = known
-    return replace(known, path=path) if known.path != path else known
+    status = path.stat() if path.is_file() else None
+    key = (path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino) if status else None
+    result = _KEPT.get(key) if key else None
+    if result is None:
+        result = _read_uncached(path)
+        if key:
+            _KEPT[key] = result
+    return replace(result, path=path) if result.path != path else result
 
 
-def _read_anew(path: Path) -> ChannelFile:
+def _read_uncached(path: Path) -> ChannelFile:
     """The channels of a file that is not in memory."""
     ending = ".bag" if is_ros2_folder(path) else checked_ending(path)
     if str(FORMATS[ending]).startswith(f"{__name__}.") and ending not in TEXT:

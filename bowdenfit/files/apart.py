@@ -71,8 +71,8 @@ def read_apart(path: Path) -> ChannelFile:
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
-    found: ChannelFile = call_apart(path, "bowdenfit.files:read_here")
-    return replace(found, path=path)
+    result: ChannelFile = call_apart(path, "bowdenfit.files:read_here")
+    return replace(result, path=path)
 
 
 def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
@@ -88,19 +88,19 @@ def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
     """
     refuse_special(path)
     limits = Limits.of(path)
-    with _asking:
-        ended, content = _ask(path, limits, reader, arguments)
+    with _request_lock:
+        ended, content = _send_request(path, limits, reader, arguments)
     if content is None:
         raise DatasetError(_broken(path, limits, ended))
-    refused, found = pickle.loads(content)  # noqa: S301  (of our own process)
+    refused, result = pickle.loads(content)  # noqa: S301  (of our own process)
     if refused == _NO_MEMORY:
         raise DatasetError(_too_much(path, limits, "memory"))
     if refused:
         raise DatasetError(refused)
-    return found
+    return result
 
 
-def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
+def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
     """How the reader ended, None if it did not, and its answer, None if there is none."""
     request = json.dumps([str(path.resolve()), limits.memory, limits.seconds, name, arguments]).encode() + b"\n"
     for _ in range(2):  # one that had nothing to do may just have ended
@@ -120,7 +120,7 @@ def _ask(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> t
 
 
 _readers: dict[int, "subprocess.Popen[bytes]"] = {}  # by process: a copy of this one starts its own, or answers would mix
-_asking = threading.Lock()
+_request_lock = threading.Lock()
 
 
 def _reader() -> "subprocess.Popen[bytes]":

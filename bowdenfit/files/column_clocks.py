@@ -17,17 +17,17 @@ def with_column_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     return with_clocks(channels, groups_around)
 
 
-def with_lone_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+def with_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     """Give the channels that have no time yet that of the only time channel of the file, wherever it stands."""
-    clocks = [each for each in channels if is_clock(replace(each, name=each.name.removeprefix(_group(each.name))))]
+    clocks = [c for c in channels if is_clock(replace(c, name=c.name.removeprefix(_group(c.name))))]
     if len(clocks) != 1:
         return tuple(channels)
     (clock,), seconds = clocks, seconds_of(clocks[0])
     return tuple(
-        each
-        if each is clock or each.time is not None or len(each.values) != len(seconds)
-        else replace(each, time=seconds, clock=clock.name)
-        for each in channels
+        channel
+        if channel is clock or channel.time is not None or len(channel.values) != len(seconds)
+        else replace(channel, time=seconds, clock=clock.name)
+        for channel in channels
     )
 
 

@@ -10,10 +10,10 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import split_brackets
-from bowdenfit.files.matching import Candidate, candidates, meanings, plain_name
+from bowdenfit.files.matching import Candidate, find_candidates, meanings, plain_name
 from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
-from bowdenfit.files.naming import naming
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.naming import option_naming
+from bowdenfit.files.spellings import parse_heading
 from bowdenfit.units import (
     LARGEST,
     ColumnSource,
@@ -48,7 +48,7 @@ class Column:
     faults: Faults
     known: bool = True
 
-    def each(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
+    def read_cells(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
         """Every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
         return self.faults.read_all(read, self.cells, otherwise) if self.known else [otherwise] * len(self.cells)
 
@@ -67,7 +67,7 @@ class Column:
 
     def numbers(self) -> list[float]:
         """All values in the internal unit; every cell must hold one, and those that hold none are noted."""
-        return self.each(self.value, nan)
+        return self.read_cells(self.value, nan)
 
 
 def find_columns(
@@ -89,24 +89,24 @@ def find_columns(
     """
     sources = {name: _as_in_header(table, source) for name, source in (sources or {}).items()}
     wrong = _wrong_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
-    found: dict[str, Column] = {name: _unknown(table, name) for name in wrong}
+    by_quantity: dict[str, Column] = {name: _unknown(table, name) for name in wrong}
     taken = {source.name for source in sources.values()}
     headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
     _check_single_meaning(table, headings, wanted, sources)
     _check_known_units(table, headings, wanted, sources)
-    can_be = candidates(headings, wanted, tuple(sources))
+    can_be = find_candidates(headings, wanted, tuple(sources))
     for quantity in wanted:
         columns = can_be[quantity.name]
         if quantity.name in sources or columns:
-            found[quantity.name] = _unknown(table, quantity.name)
+            by_quantity[quantity.name] = _unknown(table, quantity.name)
         with table.faults.collect():
             if len(columns) > 1:
-                raise _several(table, quantity.name, columns)
+                raise _ambiguous(table, quantity.name, columns)
             if quantity.name in sources and quantity.name not in wrong:
-                found[quantity.name] = _named_column(table, quantity, sources[quantity.name])
+                by_quantity[quantity.name] = _named_column(table, quantity, sources[quantity.name])
             elif columns:
-                found[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
-    return found
+                by_quantity[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
+    return by_quantity
 
 
 def _unknown(table: RawTable, name: str) -> Column:
@@ -130,7 +130,7 @@ def _check_single_meaning(
             if len(names) > 1:
                 raise DatasetError(
                     f"{table.file}: the column {shown(heading)} can be read as {' and '.join(names)}; rename it, or say "
-                    f"which: {naming(names[0], heading)}, or in cable.toml "
+                    f"which: {option_naming(names[0], heading)}, or in cable.toml "
                     f'columns = {{ {names[0]} = {{ name = "{heading}", unit = ... }} }}.'
                 )
 
@@ -149,47 +149,47 @@ def _check_known_units(
             raise DatasetError(
                 f"{table.file}, row {table.header_row}, column {shown(heading)}: this is {quantity.name}, but what follows "
                 f"that, {shown(bracket + behind)}, is no unit alone; state the unit that its numbers are in, "
-                f"{naming(quantity.name, heading, 'UNIT')}, or rename the column if it is something else."
+                f"{option_naming(quantity.name, heading, 'UNIT')}, or rename the column if it is something else."
             )
 
 
-def _several(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
-    names = [table.header[each.position] for each in columns]
+def _ambiguous(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
+    names = [table.header[candidate.position] for candidate in columns]
     both = "both" if len(names) == 2 else "all"
     return DatasetError(
         f"{table.file}: the columns {listed([shown(name) for name in names])} {both} look like {quantity}; say which, "
-        f'{naming(quantity, names[0])}, or in cable.toml columns = {{ {quantity} = {{ name = "{names[0]}" }} }}; or rename '
-        "the others."
+        f'{option_naming(quantity, names[0])}, or in cable.toml columns = {{ {quantity} = {{ name = "{names[0]}" }} }}; or '
+        "rename the others."
     )
 
 
-def require(table: RawTable, found: Mapping[str, Column], name: str, example: str) -> Column:
+def require_column(table: RawTable, columns: Mapping[str, Column], name: str, example: str) -> Column:
     """The column called `name`; that there is none is noted among the table's faults."""
-    if name in found:
-        return found[name]
+    if name in columns:
+        return columns[name]
     table.faults.faults.append(_missing(table, name, example))
     return _unknown(table, name)
 
 
 def _missing(table: RawTable, name: str, example: str) -> DatasetError:
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
-    option = naming(name, "NAME", unit.replace("_", "*"))
+    option = option_naming(name, "NAME", unit.replace("_", "*"))
     return DatasetError(
         f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. Name the column "
         f"{example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
 
 
-def taken_in_pairs(table: RawTable, found: Mapping[str, Column], stated: Collection[str]) -> list[str]:
+def describe_paired_headings(table: RawTable, columns: Mapping[str, Column], stated: Collection[str]) -> list[str]:
     """What is said of headings that tell the ends of the cable only together, such as T1 and T2."""
-    ends = {name: found[name].heading for name in ("input_force", "output_force") if name in found}
-    says = [spelled(heading) for name, heading in ends.items() if name not in stated]
-    if len(ends) < 2 or not any(each and each.pair for each in says):
+    ends = {name: columns[name].heading for name in ("input_force", "output_force") if name in columns}
+    spellings = [parse_heading(heading) for name, heading in ends.items() if name not in stated]
+    if len(ends) < 2 or not any(spelling and spelling.pair for spelling in spellings):
         return []
     (one, at_input), (other, at_output) = ends.items()
     return [
         f"{table.file}: {shown(at_input)} is taken as {one} and {shown(at_output)} as {other}; if it is the other way round, "
-        f"say so: {naming(one, at_output)} {naming(other, at_input)}."
+        f"say so: {option_naming(one, at_output)} {option_naming(other, at_input)}."
     ]
 
 
@@ -207,7 +207,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
         usual = quantity.to or _usual(quantity.dimension)
         raise DatasetError(
             f"{table.file}: the column {shown(heading)} does not say its unit; rename it to {quantity.name}_{usual} (or the "
-            f"unit it is in), or give the unit, such as {naming(quantity.name, heading, usual.replace('_', '*'))}, in "
+            f"unit it is in), or give the unit, such as {option_naming(quantity.name, heading, usual.replace('_', '*'))}, in "
             f'cable.toml columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
         )
     try:

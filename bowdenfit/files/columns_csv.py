@@ -13,7 +13,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import MISSING
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.csv_account import account
+from bowdenfit.files.csv_account import account_of_csv
 from bowdenfit.files.csv_rows import cells_of
 from bowdenfit.files.csv_start import Sheet, start_of
 from bowdenfit.files.layout import is_summary
@@ -73,19 +73,19 @@ def read(path: Path) -> ChannelFile:
     if stop <= sheet.start:
         raise DatasetError(f"{path.name} breaks off before its first whole row of numbers; copy or export it again.")
     split = last[0].start if last else stop
-    read_plain = _few if split - sheet.start < _FEW_BYTES else _long
+    read_plain = _read_short if split - sheet.start < _FEW_BYTES else _read_long
     plain = read_plain(path, sheet, split) if split > sheet.start else {}
     quick = (sheet.start, 0) if not plain else (split, sum(map(len, next(iter(plain.values())))))
-    found = columns_of(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
-    channels, left_out = channels_of(sheet.layout, found.values)
+    columns = columns_of(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
+    channels, left_out = channels_of(sheet.layout, columns.values)
     timed, clock = with_rate(channels, sheet.metadata)
     row = rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    whole = channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *found.remarks, *clock))
-    return replace(whole, account=account(path, sheet, found, quick, stop))
+    whole = channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *columns.remarks, *clock))
+    return replace(whole, account=account_of_csv(path, sheet, columns, quick, stop))
 
 
-def _few(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
+def _read_short(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
     """The same as `_long` gives of many rows, cell by cell: there are not enough for pandas, which takes longer to load."""
     cells = cells_of_sheet(_rows(path, sheet, sheet.start, stop, None))
     letters = np.array(cells.letters)
@@ -96,7 +96,7 @@ def _few(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | N
     return {i: [values[letters != SPACE]] for i, values in columns.items()}
 
 
-def _long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
+def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
     """The pieces of each column up to a byte as pandas reads them, dates as text; None where it meets a cell that it cannot."""
     pandas = load("pandas", "CSV")
     kinds = sheet.layout.kinds

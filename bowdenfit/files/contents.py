@@ -28,7 +28,7 @@ class Content:
 
     def suits(self, ending: str) -> bool:
         """Whether files with an ending may start so; those of which nobody knows how they start may start in any way."""
-        return ending in self.endings or not any(ending in each.endings for each in _CONTENTS)
+        return ending in self.endings or not any(ending in content.endings for content in _CONTENTS)
 
 
 UNKNOWN = Content("a file of unknown kind", (*TEXT, ".mat"), "export the recording as CSV")  # MATLAB 4 has no mark
@@ -80,10 +80,10 @@ def recognize(path: Path, head: bytes) -> Content:
     """
     if head.startswith(b"PK\x03\x04"):
         return _archive(path)
-    found = next((content for start, content in _STARTS.items() if head.startswith(start)), None)
-    if found is None and any(head.startswith(_HDF, at) for at in _BEHIND):
+    content = next((content for start, content in _STARTS.items() if head.startswith(start)), None)
+    if content is None and any(head.startswith(_HDF, at) for at in _BEHIND):
         return _STARTS[_HDF]
-    return found or _markup(head)
+    return content or _markup(head)
 
 
 def _archive(path: Path) -> Content:

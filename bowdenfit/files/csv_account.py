@@ -10,7 +10,7 @@ from bowdenfit.files.text_file import lines_between, rows_before
 _CUT = "the file breaks off there"
 
 
-def account(path: Path, sheet: Sheet, found: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:
+def account_of_csv(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:
     """The account of a file.
 
     Args:
@@ -23,14 +23,14 @@ def account(path: Path, sheet: Sheet, found: SheetColumns, quick: tuple[int, int
     end, rows = quick
     size = path.stat().st_size
     first = rows_before(path, sheet.start) + 1
-    reasons = {**sheet.above, **found.left_out}
+    reasons = {**sheet.above, **columns.left_out}
     if end > sheet.start and rows_before(path, end) - first + 1 != rows:
         texts = enumerate(lines_between(path, sheet.encoding, sheet.start, end), start=first)
         reasons |= {row: (BLANK, "") for row, text in texts if not text.strip()}
     total = rows_before(path, size) + (0 if _ends(path, size) else 1)
     if stop < size:
         reasons |= dict.fromkeys(range(rows_before(path, stop) + 1, total + 1), (_CUT, ""))
-    return account_of(path.name, total, sheet.headings, reasons, found.beside)
+    return account_of(path.name, total, sheet.headings, reasons, columns.beside)
 
 
 def _ends(path: Path, size: int) -> bool:

@@ -56,12 +56,12 @@ def start_of(path: Path, data: bytes) -> Sheet:
     texts = [line for line in lines if not comment_mark(line.text)]
     rows = {s: list(records(texts, s, _HEADING_LINES)) for s in _separators(texts, declared)}
     readings = [(layout_of([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
-    found = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
-    if not found:
+    layouts = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
+    if not layouts:
         raise DatasetError(
             f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
         )
-    layout, separator, decimal = max(found, key=lambda reading: _worth(reading[0]))
+    layout, separator, decimal = max(layouts, key=lambda reading: _worth(reading[0]))
     below = rows[separator][layout.start :]
     above = [line for line in lines if line.start < below[0].start]
     layout = _fitting(path, layout, below, separator, above)
@@ -98,7 +98,7 @@ def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: 
     Raises:
         DatasetError: A row has more cells than there are headings.
     """
-    if separator == " " and layout.named and layout.given != len(layout.kinds):
+    if separator == " " and layout.named and layout.heading_cells != len(layout.kinds):
         return _from_comment(layout, separator, above)
     for row in () if layout.fits else below:
         too_many_cells(path.name, row.row, row.cells, layout.room)

@@ -81,12 +81,12 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     content = recognize(path, data[:4096])
     if content not in (UNKNOWN, PLAIN_TEXT):
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
-    _, every = first_lines(data, name, whole=most is None, most=most)
-    if most is not None and len(every) > 1 and not every[-1].ended:
-        every = every[:-1]
-    declared, lines = declared_separator(every, name)
+    _, all_lines = first_lines(data, name, whole=most is None, most=most)
+    if most is not None and len(all_lines) > 1 and not all_lines[-1].ended:
+        all_lines = all_lines[:-1]
+    declared, lines = declared_separator(all_lines, name)
     lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
-    separator = declared or max(SEPARATORS, key=lambda each: _fitness(lines, each))
+    separator = declared or max(SEPARATORS, key=lambda candidate: _fitness(lines, candidate))
     rows = list(records(lines, separator, len(lines)))
     for row in rows:
         if not row.closed:
@@ -96,7 +96,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    return raw_table(name, every, rows, separator)
+    return raw_table(name, all_lines, rows, separator)
 
 
 def _refuse_large(path: Path) -> None:

@@ -47,17 +47,17 @@ def read(path: Path) -> ChannelFile:
     accounts: list[RowAccount] = []
     for title, rows in sheets_of(openpyxl, path):
         try:
-            channels[title], said, account = _read_sheet(f"{path.name}, sheet {shown(title)}", path.name, rows)
+            channels[title], sheet_remarks, account = _read_sheet(f"{path.name}, sheet {shown(title)}", path.name, rows)
             accounts += [account] if account else []
-            remarks += [f"Sheet {shown(title)}: {remark[0].lower()}{remark[1:]}" for remark in said]
+            remarks += [f"Sheet {shown(title)}: {remark[0].lower()}{remark[1:]}" for remark in sheet_remarks]
         except DatasetError as error:
             errors.append(error)
-    found = {title: of_sheet for title, of_sheet in channels.items() if of_sheet}
-    if not found:
+    filled = {title: of_sheet for title, of_sheet in channels.items() if of_sheet}
+    if not filled:
         raise errors[0] if errors else _without_numbers(path)
     remarks += [f"A sheet was left out: {error}" for error in errors]
     account = accounts[0] if len(accounts) == 1 else None  # rows of several sheets have the same numbers
-    return ChannelFile(path, "Excel workbook", tuple(_named(found)), tuple(remarks), account)
+    return ChannelFile(path, "Excel workbook", tuple(_named(filled)), tuple(remarks), account)
 
 
 def _named(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
@@ -103,9 +103,9 @@ def _read_sheet(place: str, file: str, cells: Iterable[_Cells]) -> tuple[tuple[C
         return (), [], None
     start = layout.start
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
-    found = columns_of(rows)
-    channels, left_out = channels_of(layout, found.values)
+    columns = columns_of(rows)
+    channels, left_out = channels_of(layout, columns.values)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
     over = [i + 1 for i in layout.over]
-    account = account_of(file, start + found.rows, over, above | found.left_out, found.beside)
-    return channels, [*left_out, *found.remarks], account
+    account = account_of(file, start + columns.rows, over, above | columns.left_out, columns.beside)
+    return channels, [*left_out, *columns.remarks], account

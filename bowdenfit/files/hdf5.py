@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
 from bowdenfit.files.outcome import UnreadNames, channel_file, is_numeric, numbers, refuse_damage, refuse_too_large
 from bowdenfit.files.sampling import with_interval
 
@@ -29,12 +29,12 @@ def read(path: Path) -> ChannelFile:
 
     left_out = UnreadNames()
     with refuse_damage(path), h5py.File(path, "r") as file:
-        chosen = [each for each in _datasets(file, left_out, set()) if _is_recording(each, left_out)]
-        refuse_too_large(path, sum(2 * each.size * max(1, len(each.dtype.names or ())) for each in chosen))
-        channels = [channel for each in chosen for channel in _channels(each, left_out)]
-        settings = {path: values for each in chosen for path, values in _settings(each).items()}
+        chosen = [dataset for dataset in _datasets(file, left_out, set()) if _is_recording(dataset, left_out)]
+        refuse_too_large(path, sum(2 * dataset.size * max(1, len(dataset.dtype.names or ())) for dataset in chosen))
+        channels = [channel for dataset in chosen for channel in _channels(dataset, left_out)]
+        settings = {path: values for dataset in chosen for path, values in _settings(dataset).items()}
     clocked, remarks = with_interval(with_column_clocks(channels), settings)
-    return channel_file(path, "HDF5", with_lone_clock(clocked), left_out, remarks)
+    return channel_file(path, "HDF5", with_only_clock(clocked), left_out, remarks)
 
 
 def _datasets(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[Any]:
@@ -119,9 +119,9 @@ def _fields(name: str, unit: str, values: np.ndarray, left_out: UnreadNames) -> 
 
 def _unit(dataset: Any) -> str:
     """The unit that the attributes name, else nothing."""
-    found = next((dataset.attrs[name] for name in _UNITS if name in dataset.attrs), "")
-    found = found.flat[0] if isinstance(found, np.ndarray) and found.size == 1 else found
-    text = found.decode("utf-8", "replace") if isinstance(found, bytes) else found
+    value = next((dataset.attrs[name] for name in _UNITS if name in dataset.attrs), "")
+    value = value.flat[0] if isinstance(value, np.ndarray) and value.size == 1 else value
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
     return text.strip() if isinstance(text, str) else ""
 
 

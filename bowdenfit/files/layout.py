@@ -41,14 +41,14 @@ class Layout:
     kinds: tuple[Kind, ...]
     named: bool
     score: int
-    given: int = 0
+    heading_cells: int = 0
     over: tuple[int, ...] = ()
     by_numbers: bool = False
 
     @property
     def room(self) -> int:
         """Number of columns that the headings leave room for; a nameless one may be that of an index."""
-        return self.given + any(not heading.name for heading in self.headings[: self.given])
+        return self.heading_cells + any(not heading.name for heading in self.headings[: self.heading_cells])
 
     @property
     def fits(self) -> bool:
@@ -209,8 +209,8 @@ def _rises(rows: Rows, column: int, decimal: str) -> bool:
 
 
 def _kind_of_column(kinds: Sequence[Sequence[Kind]], column: int) -> Kind:
-    found = [row[column] for row in kinds if column < len(row) and row[column] != "blank"]
-    return max(set(found), key=found.count) if found else "blank"
+    filled = [row[column] for row in kinds if column < len(row) and row[column] != "blank"]
+    return max(set(filled), key=filled.count) if filled else "blank"
 
 
 def _names(header: Sequence[Sequence[str]], width: int) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from bowdenfit.files.headings import split_brackets
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.spellings import parse_heading
 from bowdenfit.units import is_unit
 
 _LONGEST_HEADING = 200
@@ -43,7 +43,7 @@ class Candidate:
     pair: str = ""
 
 
-def candidates(
+def find_candidates(
     headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], stated: Collection[str] = ()
 ) -> dict[str, list[Candidate]]:
     """The columns that can be each quantity; several where a file leaves it open.
@@ -56,20 +56,20 @@ def candidates(
         wanted: What to look for.
         stated: Quantities whose column the user has named; none is looked for.
     """
-    found: dict[str, list[Candidate]] = {quantity.name: [] for quantity in wanted}
+    by_quantity: dict[str, list[Candidate]] = {quantity.name: [] for quantity in wanted}
     loose: dict[str, list[Candidate]] = {quantity.name: [] for quantity in wanted}
     for i, (heading, unit) in enumerate(headings):
         named = meanings(heading, wanted)
         for quantity, written in named:
-            found[quantity.name].append(Candidate(i, written or unit or None))
-        other = spelled(heading, unit) if heading and not named and len(heading) <= _LONGEST_HEADING else None
-        if other and other.quantity in found:
-            (loose if other.pair else found)[other.quantity].append(Candidate(i, other.unit, other.pair))
+            by_quantity[quantity.name].append(Candidate(i, written or unit or None))
+        other = parse_heading(heading, unit) if heading and not named and len(heading) <= _LONGEST_HEADING else None
+        if other and other.quantity in by_quantity:
+            (loose if other.pair else by_quantity)[other.quantity].append(Candidate(i, other.unit, other.pair))
     for one, far in (("input_force", "output_force"), ("output_force", "input_force")):
-        if one in found and not found[one]:
-            beside = [each.pair for each in (*found[far], *loose[far])] + [""] * (far in stated)
-            found[one] = [each for each in loose[one] if _is_paired(each.pair, beside)]
-    return {name: [] if name in stated else columns for name, columns in found.items()}
+        if one in by_quantity and not by_quantity[one]:
+            beside = [candidate.pair for candidate in (*by_quantity[far], *loose[far])] + [""] * (far in stated)
+            by_quantity[one] = [candidate for candidate in loose[one] if _is_paired(candidate.pair, beside)]
+    return {name: [] if name in stated else columns for name, columns in by_quantity.items()}
 
 
 def _is_paired(pair: str, beside: Collection[str]) -> bool:

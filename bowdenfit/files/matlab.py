@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
 from bowdenfit.files.hdf5 import members
 from bowdenfit.files.outcome import (
     BYTES_PER_SAMPLE,
@@ -58,7 +58,7 @@ class _Variables:
         elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > MOST_COLUMNS):
             self.left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")
         else:
-            self.channels.extend(Channel(each, "", numbers(column)) for each, column in _columns(name, values))
+            self.channels.extend(Channel(label, "", numbers(column)) for label, column in _columns(name, values))
 
 
 def read(path: Path) -> ChannelFile:
@@ -75,7 +75,7 @@ def read(path: Path) -> ChannelFile:
     with refuse_damage(path):
         variables = _read_hdf5(path) if modern else _read_classic(path)
     clocked, remarks = with_interval(with_column_clocks(variables.channels), variables.settings)
-    return channel_file(path, "MATLAB", with_lone_clock(clocked), variables.left_out, remarks)
+    return channel_file(path, "MATLAB", with_only_clock(clocked), variables.left_out, remarks)
 
 
 def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -99,9 +99,9 @@ def _read_classic(path: Path) -> _Variables:
         listing = scipy.io.whosmat(path)
         wanted = [name for name, _, kind in listing if _is_wanted(name, kind, variables.left_out)]
         refuse_too_large(path, 2 * _n_numbers(path, listing))
-        found = scipy.io.loadmat(path, variable_names=wanted, struct_as_record=False) if wanted else {}
+        loaded = scipy.io.loadmat(path, variable_names=wanted, struct_as_record=False) if wanted else {}
     for name in wanted:
-        _sort_in(name, found.pop(name), variables)
+        _sort_in(name, loaded.pop(name), variables)
     return variables
 
 
@@ -125,7 +125,7 @@ def _sort_in(name: str, value: Any, variables: _Variables) -> None:
         variables.left_out.add(name, _TEXT)
     elif value.dtype.kind == "c":
         variables.left_out.add(name, "they are complex numbers")
-    elif value.dtype.kind == "O" and value.size and all(hasattr(each, "_fieldnames") for each in value.flat):
+    elif value.dtype.kind == "O" and value.size and all(hasattr(element, "_fieldnames") for element in value.flat):
         _sort_in_structures(name, value, variables)
     else:
         variables.left_out.add(name, _CELLS if value.dtype.kind == "O" else _OBJECTS)
@@ -135,8 +135,8 @@ def _sort_in_structures(name: str, value: np.ndarray, variables: _Variables) -> 
     """Fields of a structure, or of each in an array of them."""
     for number, structure in enumerate(value.flat, start=1):
         owner = name if value.size == 1 else f"{name}({number})"
-        for each in structure._fieldnames:
-            _sort_in(f"{owner}.{each}", getattr(structure, each), variables)
+        for key in structure._fieldnames:
+            _sort_in(f"{owner}.{key}", getattr(structure, key), variables)
 
 
 def _n_numbers(path: Path, listing: list[tuple[str, tuple[int, ...], str]]) -> int:
@@ -159,7 +159,7 @@ def _element_bytes(path: Path) -> list[int]:
         order = "<" if head[126:128] == b"IM" else ">"
         sizes = []
         while len(tag := file.read(8)) == 8:
-            kind, size = (int(each) for each in np.frombuffer(tag, dtype=f"{order}u4"))
+            kind, size = (int(number) for number in np.frombuffer(tag, dtype=f"{order}u4"))
             start = file.tell()
             sizes.append(_unpacked(file.read(64), order) if kind == _COMPRESSED else size)
             file.seek(start + size)

@@ -8,7 +8,7 @@ from bowdenfit.units import ColumnSource
 from bowdenfit.words import shown
 
 
-def naming(quantity: str, heading: str, unit: str = "", option: str = "--column") -> str:
+def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--column") -> str:
     """The option that names a column or channel, as it can be pasted into a shell."""
     return f"{option} {quantity}={shlex.quote(heading + (f':{unit}' if unit else ''))}"
 
@@ -27,8 +27,8 @@ def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()
     what = option.removeprefix("--").upper()
     sources: dict[str, ColumnSource] = {}
     for text in texts:
-        quantity, equals, rest = (part.strip() for part in text.partition("="))
-        name, _, unit = rest.rpartition(":") if ":" in rest else (rest, "", "")
+        quantity, equals, target = (part.strip() for part in text.partition("="))
+        name, _, unit = target.rpartition(":") if ":" in target else (target, "", "")
         if not equals or not quantity or not name.strip():
             raise DatasetError(
                 f"{option} {shown(text)} is not of the form QUANTITY={what}:UNIT, such as input_force=ai0:N."
@@ -39,7 +39,7 @@ def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()
             )
         if quantity in sources:
             raise DatasetError(
-                f"{option} names {quantity} twice, as {shown(sources[quantity].name)} and {shown(rest)}; keep one of them."
+                f"{option} names {quantity} twice, as {shown(sources[quantity].name)} and {shown(target)}; keep one of them."
             )
         sources[quantity] = ColumnSource(name=name.strip(), unit=unit.strip() or None)
     return sources

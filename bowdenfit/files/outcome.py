@@ -124,10 +124,10 @@ def channel_file(
     Raises:
         DatasetError: There is no numeric channel at all.
     """
-    said = (*remarks, *left_out.remarks())
+    sentences = (*remarks, *left_out.remarks())
     if not channels:
         raise DatasetError(
             f"{path.name} holds no recording that can be read: no channel with several numbers. "
-            f"{' '.join((*said, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
+            f"{' '.join((*sentences, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
         )
-    return ChannelFile(path, kind, with_unique_names(channels), said)
+    return ChannelFile(path, kind, with_unique_names(channels), sentences)

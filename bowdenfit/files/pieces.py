@@ -85,9 +85,9 @@ def last_set(flags: Flags, stop: int) -> int:
     width = 64
     while stop > 0:
         start = max(stop - width, 0)
-        found = np.flatnonzero(flags[start:stop])
-        if len(found):
-            return start + int(found[-1])
+        positions = np.flatnonzero(flags[start:stop])
+        if len(positions):
+            return start + int(positions[-1])
         stop, width = start, PIECE
     return -1
 
@@ -96,9 +96,9 @@ def first_set(flags: Flags, start: int) -> int:
     """Place of the first flag from `start` on that is set; their number if none is."""
     width = 64
     while start < len(flags):
-        found = np.flatnonzero(flags[start : start + width])
-        if len(found):
-            return start + int(found[0])
+        positions = np.flatnonzero(flags[start : start + width])
+        if len(positions):
+            return start + int(positions[0])
         start, width = start + width, PIECE
     return len(flags)
 
@@ -119,13 +119,13 @@ def interpolated(
         there: Which of them are there; at least one.
         outside: What stands before the first and behind the last of them; these themselves if omitted.
     """
-    found = np.empty(len(time), dtype=values.dtype)
+    result = np.empty(len(time), dtype=values.dtype)
     for part in parts(len(time)):
         wanted = time[part]
         first = max(last_set(there, int(np.searchsorted(at, wanted[0], side="right"))), 0)
         stop = min(first_set(there, int(np.searchsorted(at, wanted[-1], side="left"))) + 1, len(at))
         near = there[first:stop]
-        found[part] = np.interp(
+        result[part] = np.interp(
             wanted, at[first:stop][near], numbers(values, slice(first, stop))[near], outside, outside
         )
-    return found
+    return result

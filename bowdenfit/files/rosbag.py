@@ -72,10 +72,10 @@ def read(path: Path) -> ChannelFile:
     left_out = UnreadNames()
     fallback = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with refuse_damage(path), highlevel.AnyReader([path], default_typestore=fallback) as reader:
-        leaves = {name: found for name in reader.topics if (found := _leaves_of(reader, name, left_out))}
+        leaves = {name: numbers for name in reader.topics if (numbers := _leaves_of(reader, name, left_out))}
         refuse_too_large(path, sum(reader.topics[name].msgcount * (len(leaves[name]) + 1) for name in leaves))
         topics = [_topic(reader, name, leaves[name]) for name in leaves]
-        described = all(each.msgdef.data for each in reader.connections)
+        described = all(connection.msgdef.data for connection in reader.connections)
     remarks = () if described else ("The bag does not describe its messages; those of ROS 2 Humble were assumed.",)
     return channel_file(path, "ROS bag", list(_channels(topics)), left_out, remarks)
 
@@ -88,14 +88,14 @@ def _messages(reader: Any, topic: str) -> Iterator[tuple[int, Any]]:
 
 def _leaves_of(reader: Any, topic: str, left_out: UnreadNames) -> tuple[_Leaf, ...]:
     """Which numbers the messages of a topic have, by the first of them."""
-    if not any(each.msgtype in reader.typestore.fielddefs for each in reader.topics[topic].connections):
+    if not any(connection.msgtype in reader.typestore.fielddefs for connection in reader.topics[topic].connections):
         left_out.add(topic, "the bag does not describe their messages")
         return ()
     first = next(_messages(reader, topic), None)
-    found = () if first is None else tuple(_Leaf(steps) for steps in _numeric_steps(first[1]))
-    if not found:
+    leaves = () if first is None else tuple(_Leaf(steps) for steps in _numeric_steps(first[1]))
+    if not leaves:
         left_out.add(topic, "their messages hold no numbers, or only long arrays such as images")
-    return found
+    return leaves
 
 
 def _numeric_steps(value: Any) -> Iterator[tuple[_Step, ...]]:

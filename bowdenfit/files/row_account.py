@@ -35,8 +35,8 @@ class LeftOut:
         """Which rows, why, and what the first of them say."""
         many = self.count > 1
         where = few([f"{first} to {last}" if last > first else f"{first}" for first, last in self.ranges], _RANGES)
-        says = f" ({', '.join(shown(text) for text in self.texts)}{', ...' if self.count > len(self.texts) else ''})"
-        return f"row{'s' if many else ''} {where}: {self.why}{says if self.texts else ''}"
+        quotes = f" ({', '.join(shown(text) for text in self.texts)}{', ...' if self.count > len(self.texts) else ''})"
+        return f"row{'s' if many else ''} {where}: {self.why}{quotes if self.texts else ''}"
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class RowAccount:
     @property
     def accounted(self) -> int:
         """How many rows are accounted for."""
-        return self.read + len(self.headings) + sum(each.count for each in self.left_out)
+        return self.read + len(self.headings) + sum(group.count for group in self.left_out)
 
     @property
     def remarks(self) -> list[str]:
         """What is said of rows whose loss may matter, in sentences."""
-        said = [f"{self.file}, {each.words}; not used." for each in self.left_out if each.why not in _USUAL]
-        return said + [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
+        sentences = [f"{self.file}, {group.words}; not used." for group in self.left_out if group.why not in _USUAL]
+        return sentences + [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
 
     @property
     def beside_in_words(self) -> str:
@@ -93,13 +93,13 @@ def account_of(
     texts: dict[str, list[str]] = {}
     for row in sorted(reasons):
         why, text = reasons[row]
-        of_reason, said = ranges.setdefault(why, []), texts.setdefault(why, [])
+        of_reason, of_texts = ranges.setdefault(why, []), texts.setdefault(why, [])
         if of_reason and of_reason[-1][1] == row - 1:
             of_reason[-1] = (of_reason[-1][0], row)
         else:
             of_reason.append((row, row))
-        if text and len(said) < _TEXTS:
-            said.append(text)
+        if text and len(of_texts) < _TEXTS:
+            of_texts.append(text)
     left_out = tuple(LeftOut(why, tuple(ranges[why]), tuple(texts[why])) for why in ranges)
     over = tuple(headings)
     return RowAccount(file, rows, rows - len(over) - len(reasons), over, left_out, tuple(beside))

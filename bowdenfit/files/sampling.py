@@ -36,9 +36,9 @@ def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tupl
     """
     result, used = [], dict[str, float]()
     for channel in channels:
-        found = _nearest(channel.name, settings) if channel.time is None and not is_clock(channel) else None
-        if found:
-            interval, name = found
+        setting = _nearest(channel.name, settings) if channel.time is None and not is_clock(channel) else None
+        if setting:
+            interval, name = setting
             used[name] = interval
             channel = replace(channel, time=np.arange(len(channel.values)) * interval, clock=name)
         result.append(channel)
@@ -52,8 +52,8 @@ def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tupl
 def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
     """Seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
     owners = (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
-    found = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
-    return next((each for each in found if each), None)
+    intervals = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
+    return next((interval for interval in intervals if interval), None)
 
 
 def _interval(name: str, value: Any) -> tuple[float, str] | None:

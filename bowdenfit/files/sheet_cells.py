@@ -106,5 +106,5 @@ def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
     texts, kinds = [text_of(cell) for cell in row], sheet.layout.kinds
     if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
         return SUMMARY
-    found = {kind_of(text, sheet.decimal) for text in texts}
-    return MIXED if len(kinds) == 1 or found & {"number", "date"} else WORDS
+    kinds_of_cells = {kind_of(text, sheet.decimal) for text in texts}
+    return MIXED if len(kinds) == 1 or kinds_of_cells & {"number", "date"} else WORDS

@@ -77,8 +77,8 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
     for i, values in (cells.numbers | cells.dates).items():
         pieces = before.pop(i, [])
         kind = pieces[0].dtype if pieces else float
-        found = np.array(values[:stop], dtype=object if i in cells.dates else kind)[kept]
-        whole = np.concatenate([*pieces, found])
+        remaining = np.array(values[:stop], dtype=object if i in cells.dates else kind)[kept]
+        whole = np.concatenate([*pieces, remaining])
         pieces.clear()
         if i in cells.dates:
             columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
@@ -98,15 +98,15 @@ def _left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple
             of_row.setdefault(position, []).append((column, text_of(text)))
     left_out: dict[int, tuple[str, str]] = {}
     for position, letter in enumerate(cells.letters):
-        says = " ".join(text for _, text in of_row.get(position, ()))
+        text_of_row = " ".join(text for _, text in of_row.get(position, ()))
         if letter == REMARKED:
             left_out[sheet.number(position)] = COMMENT, ""
         elif letter == SPACE or (letter == EMPTY and position >= stop):
             left_out[sheet.number(position)] = BLANK, ""
         elif position >= stop:
-            left_out[sheet.number(position)] = BELOW, says
+            left_out[sheet.number(position)] = BELOW, text_of_row
         elif letter == WORDS and (why := _why_words(sheet, of_row.get(position, []))):
-            left_out[sheet.number(position)] = why, says
+            left_out[sheet.number(position)] = why, text_of_row
             cells.letters[position] = REMARK
     return left_out
 
@@ -153,15 +153,15 @@ def _remarks(
     stop: int,
 ) -> list[str]:
     comments = letters[:stop].count(REMARKED)
-    said = [f"{comments} comment lines between the rows of data were left out."] if comments else []
+    sentences = [f"{comments} comment lines between the rows of data were left out."] if comments else []
     below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
     if below:
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
         where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
-        said.append(f"{where} left out: they stand below the data, as statistics do.")
+        sentences.append(f"{where} left out: they stand below the data, as statistics do.")
     if sheet.of_text:
-        return said  # the account of the file names the rest
+        return sentences  # the account of the file names the rest
     between = [f"row {row} ({shown(text)})" for row, (why, text) in left_out.items() if why in (BETWEEN, AGAIN)]
-    said += [f"Left out because no numbers stand there: {few(between)}."] if between else []
+    sentences += [f"Left out because no numbers stand there: {few(between)}."] if between else []
     texts = [f"{shown(text)} in row {row}" for row, text in beside]
-    return said + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])
+    return sentences + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])

@@ -46,8 +46,8 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
             kept.append(Channel(layout.name(i), heading.unit, values))
     if not layout.named:
         remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
-    found = with_unique_names(kept)
-    return with_clocks(without_tails(found)) if found else (), remarks
+    named = with_unique_names(kept)
+    return with_clocks(without_tails(named)) if named else (), remarks
 
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:

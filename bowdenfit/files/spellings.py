@@ -34,7 +34,7 @@ _NAMES = {
     "transmission efficiency|force efficiency|efficiency of transmission",
 }
 _QUANTITIES = {name: quantity for quantity, names in _NAMES.items() for name in names.split("|")}
-_LIKELY = {  # what only the user can say
+_AMBIGUOUS_NAMES = {  # what only the user can say
     "wrap_angle": "wrap|bend|bend angle|bending angle|total bend angle|contact angle|angle|theta|phi|winkel|biegewinkel|"
     "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap|"
     "measured angle|measured wrap|nominal wrap angle|measured wrap angle|deg|degree|degrees|grad|turns|turn|wraps|windings|"
@@ -54,7 +54,7 @@ _ANGULAR, _OTHER_ANGLES = frozenset(_ANGLE_WORDS.split()), frozenset(_OTHER_ANGL
 _WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a label, or a direction of motion
 _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
             "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
-_GUESSES = {name: quantity for quantity, names in _LIKELY.items() for name in names.split("|")}
+_GUESSES = {name: quantity for quantity, names in _AMBIGUOUS_NAMES.items() for name in names.split("|")}
 _DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": ("ratio",)}
 _SYMBOL = re.compile(r"([ft])(in|out|ein|aus|input|output|motor|mot|act|load|prox|dist|ent|sal|i|o)")
 _ENDS = {"mot": "motor", "act": "actuator", "ent": "entrada", "sal": "salida", "i": "in", "o": "out"}
@@ -80,7 +80,7 @@ class Spelling:
     pair: str = ""
 
 
-def spelled(heading: str, unit: str = "") -> Spelling | None:
+def parse_heading(heading: str, unit: str = "") -> Spelling | None:
     """The quantity that a heading means, if its words are those of one; None where a word is not known.
 
     Args:
@@ -96,9 +96,9 @@ def spelled(heading: str, unit: str = "") -> Spelling | None:
         if numbered:
             end = "input" if "1" in (numbered["number"], numbered["of"]) else "output"
             return Spelling(f"{end}_force", written or None, "number") if _may_be_force(written) else None
-        found = _end_of(plain.split(), written)
-        if found and _may_be_force(written):
-            return Spelling(f"{found[0]}_force", written or None, found[1])
+        end_and_pair = _end_of(plain.split(), written)
+        if end_and_pair and _may_be_force(written):
+            return Spelling(f"{end_and_pair[0]}_force", written or None, end_and_pair[1])
     return None
 
 
@@ -121,14 +121,14 @@ def likely_wrap_angle(heading: str, unit: str = "") -> str | None:
 
 def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:
     """Name and unit of a heading, in every way that it may be divided, the likeliest first; the unit is one that is known."""
-    bracketed = next((each for each in _BRACKETED.finditer(heading) if is_unit(each["unit"].strip())), None)
+    bracketed = next((match for match in _BRACKETED.finditer(heading) if is_unit(match["unit"].strip())), None)
     if bracketed:
         yield heading.replace(bracketed[0], " "), bracketed["unit"].strip()
         return
     plain = heading.replace("(", " ").replace(")", " ").replace("[", " ").replace("]", " ")
-    said = _PREPOSITION.match(plain)
-    if said and is_unit(said["unit"]):  # "Kraft in N" is no force at an input
-        yield said["name"], said["unit"]
+    preposition = _PREPOSITION.match(plain)
+    if preposition and is_unit(preposition["unit"]):  # "Kraft in N" is no force at an input
+        yield preposition["name"], preposition["unit"]
         return
     yield plain, unit if unit and is_unit(unit) else ""
     parts = re.split(r"[\s_\-]+", plain.strip())
@@ -140,8 +140,8 @@ def _known(parts: list[str]) -> bool:
     """Whether the words before a unit say a quantity, so that not every last word is looked up among all units."""
     name = " ".join(parts)
     plain = _words(name)
-    said = " ".join(plain) in _QUANTITIES | _GUESSES
-    return said or bool(_NUMBERED.fullmatch(_folded(name))) or _end_of(plain, "N") is not None
+    is_named = " ".join(plain) in _QUANTITIES | _GUESSES
+    return is_named or bool(_NUMBERED.fullmatch(_folded(name))) or _end_of(plain, "N") is not None
 
 
 def _end_of(words: Iterable[str], unit: str) -> tuple[str, str] | None:

@@ -77,9 +77,9 @@ def _other_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int
     for i, row in enumerate(rows):
         if seen and rows[i - 1].blank and is_words(row) and row.cells != header.cells:
             numeric = _numeric_columns(rows[:i])
-            filled = sorted(_filled(each, numeric) for each in rows[:i] if _agrees(each, numeric))
+            filled = sorted(_filled(above, numeric) for above in rows[:i] if _agrees(above, numeric))
             usual = filled[len(filled) // 2] if filled else 1
-            below = sum(_agrees(each, numeric) and _filled(each, numeric) >= usual for each in rows[i + 1 :])
+            below = sum(_agrees(above, numeric) and _filled(above, numeric) >= usual for above in rows[i + 1 :])
             if below >= max(_FEWEST_ALIKE, _SHARE_ALIKE * len(filled)):
                 raise DatasetError(
                     f"{file}, row {row.row}: words stand there ({shown(' '.join(row.cells))}) behind a blank row, and {below} "
@@ -124,8 +124,8 @@ def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) ->
     start = next((i for i in range(end - 1, -1, -1) if rows[i].blank), -1) + 1
     last = rows[start:end]
     labels = [cell.strip().lower() for row in last for i, cell in enumerate(row.cells) if i not in numeric and cell.strip()]
-    alone = start > 0 and len(last) <= _MOST_STATISTICS and len(set(labels)) == len(labels)
-    return start if alone and all(is_summary(row.cells) for row in last) else end
+    is_block = start > 0 and len(last) <= _MOST_STATISTICS and len(set(labels)) == len(labels)
+    return start if is_block and all(is_summary(row.cells) for row in last) else end
 
 
 def _inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:

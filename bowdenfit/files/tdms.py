@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_lone_clock
+from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
 from bowdenfit.files.libraries import load
 from bowdenfit.files.outcome import (
     UnreadNames,
@@ -52,7 +52,7 @@ def read(path: Path) -> ChannelFile:
         raise cut_off(path, "it ends before the first whole sample")
     kept = max((len(channel.values) for channel in channels), default=0)
     remarks = [kept_of_cut(path, f"the {kept} whole samples before the end")] if incomplete else []
-    return channel_file(path, "TDMS", with_lone_clock(with_column_clocks(channels)), left_out, remarks)
+    return channel_file(path, "TDMS", with_only_clock(with_column_clocks(channels)), left_out, remarks)
 
 
 @contextmanager

@@ -8,13 +8,13 @@ from bowdenfit.files.csv_rows import CsvRecord
 from bowdenfit.files.csv_table import RawTable, raw_table
 from bowdenfit.files.excel import LARGEST_BYTES, sheets_of
 from bowdenfit.files.libraries import load
-from bowdenfit.files.matching import Quantity, candidates
+from bowdenfit.files.matching import Quantity, find_candidates
 from bowdenfit.files.outcome import refuse_larger
 from bowdenfit.files.sheet_cells import text_of
 from bowdenfit.files.text_file import Line
 from bowdenfit.words import quoted
 
-_TELLING = (Quantity("input_force", "force"), Quantity("output_force", "force"), Quantity("efficiency", "ratio"))
+_DEFINING = (Quantity("input_force", "force"), Quantity("output_force", "force"), Quantity("efficiency", "ratio"))
 
 
 def read_workbook(path: Path, most: int | None = None) -> RawTable:
@@ -42,16 +42,16 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
                 tables[title] = raw_table(path.name, lines, records, ";")
         except DatasetError as error:
             errors.append(error)
-    told = {title: table for title, table in tables.items() if _says_forces(table)} or tables
-    if len(told) == 1:
-        return next(iter(told.values()))
+    by_headings = {title: table for title, table in tables.items() if _has_forces(table)} or tables
+    if len(by_headings) == 1:
+        return next(iter(by_headings.values()))
     if not tables and errors:
         raise errors[0]
-    what = f"several sheets that could be meant, {quoted(tuple(told))}" if told else "no sheet with a table"
+    what = f"several sheets that could be meant, {quoted(tuple(by_headings))}" if by_headings else "no sheet with a table"
     raise DatasetError(f"{path.name} has {what}; save the one with the readings as CSV, or in a workbook of its own.")
 
 
-def _says_forces(table: RawTable) -> bool:
+def _has_forces(table: RawTable) -> bool:
     """Whether two headings say an end of the cable each, or one an efficiency."""
-    found = candidates(list(zip(table.header, table.units, strict=True)), _TELLING)
-    return bool(found["efficiency"] or (found["input_force"] and found["output_force"]))
+    columns = find_candidates(list(zip(table.header, table.units, strict=True)), _DEFINING)
+    return bool(columns["efficiency"] or (columns["input_force"] and columns["output_force"]))

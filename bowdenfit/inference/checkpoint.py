@@ -16,7 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
-from bowdenfit.inputs import or_damaged, refuse_packed, refuse_special
+from bowdenfit.inputs import damage_as, refuse_packed, refuse_special
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _RECORD_HEADER = struct.Struct("<QI")  # length and checksum of a record
@@ -58,7 +58,7 @@ def read_records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Reco
     refuse_special(path, StoreError)
     damaged = damaged_checkpoint_error(path)
     try:
-        with or_damaged(damaged), path.open("r+b") as file:
+        with damage_as(damaged), path.open("r+b") as file:
             _parse_fingerprint(file)
             complete, end = list[Record](), file.tell()
             for record in _complete_records(file):

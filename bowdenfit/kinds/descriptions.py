@@ -9,9 +9,9 @@ from pydantic import BaseModel, ValidationError, create_model
 
 from bowdenfit.description import BY_GROUP, Description, Table, Tables
 from bowdenfit.description.file import check_quantities, read_toml, validate
-from bowdenfit.description.placeholders import Place, placeholders_in
+from bowdenfit.description.placeholders import Place, find_placeholders
 from bowdenfit.description.values import Frozen
-from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError, Faults, suggest_name
 from bowdenfit.kinds import KINDS, each_table
 from bowdenfit.kinds.kind import Design, FrictionKind, Kind, PlannedKind
@@ -45,7 +45,7 @@ def load_description(
     """
     text, stated = read_toml(path, overrides)
     raw, wrong = with_columns(stated, columns or {}), Faults()
-    left = placeholders_in(raw, text, path.name)
+    left = find_placeholders(raw, text, path.name)
     wrong.faults += left.values()
     try:
         description = parse_description(raw, path.name)
@@ -168,7 +168,7 @@ def _parsed(page: Mapping[str, Any], file: str) -> Design:
     try:
         return model.model_validate(raw).design  # type: ignore[attr-defined]
     except ValidationError as error:
-        raise wrong_keys(error, raw, model, file, "write it, such as loads = [10, 20, 40]") from None
+        raise explain_validation_error(error, raw, model, file, "write it, such as loads = [10, 20, 40]") from None
 
 
 @lru_cache

@@ -14,9 +14,9 @@ from bowdenfit.files.clocks import is_date, names_time
 from bowdenfit.files.contents import TEXT
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, candidates
+from bowdenfit.files.matching import Quantity, find_candidates
 from bowdenfit.files.sheets import stated_rate
-from bowdenfit.files.spellings import spelled, without_accents
+from bowdenfit.files.spellings import parse_heading, without_accents
 from bowdenfit.files.tables import WORKBOOKS, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.kinds.forces.table import count_loads
@@ -150,7 +150,7 @@ def _without_headings(path: Path, error: DatasetError) -> FileKind:
 
 def _by_columns(path: Path, table: RawTable) -> FileKind:
     clock = next((i for i, _ in enumerate(table.header) if _is_time(table, i)), None)
-    found = {name for name, columns in candidates(_headings(table), COLUMNS).items() if columns}
+    found = {name for name, columns in find_candidates(_headings(table), COLUMNS).items() if columns}
     forces = {quantity.name for quantity in FORCES}
     kind = "efficiencies" if "efficiency" in found and not forces <= found else "forces"
     rows_alone = next((name for name in ("run", "stroke", "group") if name in found), "")
@@ -175,7 +175,7 @@ def _lines_above(path: Path, table: RawTable) -> list[str]:
 def _has_one_force_and_a_position(table: RawTable) -> bool:
     """Whether a table has a single column of forces, at the motor if it says where, and one of displacements."""
     headings = _headings(table)
-    found = {name: len(columns) for name, columns in candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
+    found = {name: len(columns) for name, columns in find_candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
     units = [heading_of(heading, unit).unit for heading, unit in headings]
     forces = sum(unit is not None and is_unit(unit) and dimension_of(unit) == "force" for unit in units)
     at_motor = found["force"] + found["input_force"] == 1 and not found["output_force"]
@@ -209,7 +209,7 @@ def _headings(table: RawTable) -> list[tuple[str, str]]:
 def _is_time(table: RawTable, column: int) -> bool:
     """Whether a column is one of time, by its heading or by a unit of time over numbers that rise; T1 is a tension."""
     heading, unit = table.header[column], table.units[column]
-    other = spelled(heading, unit)
+    other = parse_heading(heading, unit)
     steps = _steps(table, column)
     if names_time(heading):
         return not (other and (other.unit or other.pair)) and (len(steps) < 2 or float(np.median(steps)) > 0)
@@ -245,7 +245,7 @@ def _steps(table: RawTable, column: int) -> list[float]:
 def _is_smooth(table: RawTable) -> bool:
     """Whether the first force changes from row to row as one that is sampled does, through many values."""
     for i, (heading, unit) in enumerate(_headings(table)):
-        other = spelled(heading, unit)
+        other = parse_heading(heading, unit)
         if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):
             continue
         values = np.array(numbers_in(table, i))

@@ -12,9 +12,9 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, candidates
-from bowdenfit.files.naming import naming
-from bowdenfit.files.spellings import likely_wrap_angle, spelled
+from bowdenfit.files.matching import Quantity, find_candidates
+from bowdenfit.files.naming import option_naming
+from bowdenfit.files.spellings import likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, HEAD, FileKind, file_kind, numbers_in, stated_angle
 from bowdenfit.units import ColumnSource, dimension_of, is_unit
@@ -51,7 +51,11 @@ def columns_of(table: RawTable) -> list[HeadedColumn]:
     found = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
         known = [value for value in numbers_in(table, i) if np.isfinite(value)]
-        if heading and len(known) > len(table.rows) / 2 and not (names_time(heading) and not spelled(heading, unit)):
+        if (
+            heading
+            and len(known) > len(table.rows) / 2
+            and not (names_time(heading) and not parse_heading(heading, unit))
+        ):
             found.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
     return found
 
@@ -68,7 +72,7 @@ def name_ends(
         always: Whether forces are named that say themselves what they are.
     """
     columns = [each for each in columns if each.name not in [source.name for source in stated.values()]]
-    can_be = candidates([(each.name, each.unit) for each in columns], FORCES, tuple(stated))
+    can_be = find_candidates([(each.name, each.unit) for each in columns], FORCES, tuple(stated))
     ends = {name: columns[found[0].position] for name, found in can_be.items() if found}
     sure = {name for name, found in can_be.items() if len(found) == 1}
     provided = []
@@ -88,7 +92,7 @@ def name_ends(
     for name in asked:
         unit = "" if _unit(ends[name]) else "N"
         if always or unit or name not in sure:
-            options.append(naming(name, ends[name].name, unit, option))
+            options.append(option_naming(name, ends[name].name, unit, option))
     if any(not _unit(each) for each in ends.values()):
         provided.append("the forces are in newtons, as the file does not say")
     return options, provided
@@ -102,7 +106,7 @@ def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
 
 
 def _unit(column: HeadedColumn) -> str:
-    other = spelled(column.name, column.unit)
+    other = parse_heading(column.name, column.unit)
     return (other.unit if other else "") or heading_of(column.name, column.unit).unit
 
 
@@ -213,7 +217,7 @@ def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) ->
     if kind == "recordings":
         return False
     table = read_table(path, HEAD)
-    columns = candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))[WRAP_ANGLE.name]
+    columns = find_candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))[WRAP_ANGLE.name]
     if not columns and WRAP_ANGLE.name not in named:
         if stated:
             _refuse_passed_over(path, table)
@@ -237,8 +241,8 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
     for name, unit in likely_wrap_angles(table).items():
         raise DatasetError(
             f"{path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and --wrap-angle "
-            f"states one angle for all rows. Name it instead: {naming('wrap_angle', name, unit)}; if it is another angle, take "
-            "the column out of the file."
+            f"states one angle for all rows. Name it instead: {option_naming('wrap_angle', name, unit)}; if it is another "
+            "angle, take the column out of the file."
         )
 
 
@@ -246,7 +250,8 @@ def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColum
     """Forces whose columns say what they are and hold no numbers, so that no other column is to be taken for them."""
     known = {each.name for each in numbers}
     found = {
-        name: [headings[each.position][0] for each in columns] for name, columns in candidates(headings, FORCES).items()
+        name: [headings[each.position][0] for each in columns]
+        for name, columns in find_candidates(headings, FORCES).items()
     }
     return {
         name: ColumnSource(name=named[0]) for name, named in found.items() if named and not known.intersection(named)
@@ -255,7 +260,7 @@ def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColum
 
 def _of_others(headings: Sequence[tuple[str, str]]) -> set[str]:
     """Columns that say themselves that they are something other than a force, such as the label of a run."""
-    found = candidates(headings, BESIDE_FORCES)
+    found = find_candidates(headings, BESIDE_FORCES)
     return {headings[columns[0].position][0] for columns in found.values() if len(columns) == 1}
 
 
@@ -267,7 +272,7 @@ def _split(heading: str, unit: str) -> tuple[str, str]:
 
 def _wrap_angle(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
     """What gives the wrap angle of a table: a column of its own, one that may be, or the user."""
-    if candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))["wrap_angle"]:
+    if find_candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))["wrap_angle"]:
         return [], []
     likely = likely_wrap_angles(table)
     if not likely:
@@ -276,7 +281,7 @@ def _wrap_angle(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
     others = [shown(name) for name in likely if name != best]
     rather = f" rather than {listed(others)}" if others else ""
     unit, clause = likely[best], f"{shown(best)} is the wrap angle{rather}"
-    return [naming("wrap_angle", best, unit)], [clause + (f", in {unit}" if unit else "")]
+    return [option_naming("wrap_angle", best, unit)], [clause + (f", in {unit}" if unit else "")]
 
 
 def likely_wrap_angles(table: RawTable) -> dict[str, str]:
@@ -296,7 +301,7 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
 
 
 def _named(stated: Mapping[str, ColumnSource], option: str) -> list[str]:
-    return [naming(quantity, source.name, source.unit or "", option) for quantity, source in stated.items()]
+    return [option_naming(quantity, source.name, source.unit or "", option) for quantity, source in stated.items()]
 
 
 def _one_angle(path: Path) -> tuple[list[str], list[str]]:

@@ -14,7 +14,7 @@ from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, require
+from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.spellings import without_accents
 from bowdenfit.types import Labels, Matrix, Vector
@@ -154,7 +154,7 @@ def read_strokes(
     """
     if "stroke" not in found:
         return np.ones(n_rows, dtype=int)
-    return np.array(found["stroke"].each(lambda cell: _stroke(cell, held), 1))
+    return np.array(found["stroke"].read_cells(lambda cell: _stroke(cell, held), 1))
 
 
 def _stroke(cell: Cell, held: str) -> int:
@@ -176,7 +176,7 @@ def read_route(table: RawTable, found: Mapping[str, Column], route: Route | None
     """Route variable of every row; NaN without a route."""
     if route is None:
         return np.full(len(table.rows), np.nan)
-    return rounded(require(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
+    return rounded(require_column(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
 
 
 def rounded(values: Iterable[float]) -> Vector:
@@ -191,7 +191,7 @@ def read_own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequ
     for k, name in enumerate(contacts):
         for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
             if column is not None:
-                target[:, k] = column.each(partial(_own_angle, column), np.nan)
+                target[:, k] = column.read_cells(partial(_own_angle, column), np.nan)
     return OwnAngles(tuple(contacts), angle, sd)
 
 
@@ -254,7 +254,7 @@ def end_column(table: RawTable, found: Mapping[str, Column], end: str, *, is_loo
     if force in found and torque in found:
         raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
     named = f"{force}_N or {torque}_N_m" if is_loop else f"{force}_N"
-    return found[torque] if torque in found else require(table, found, force, named)
+    return found[torque] if torque in found else require_column(table, found, force, named)
 
 
 def forces_of(values: Vector, table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:

@@ -11,7 +11,7 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.matching import Quantity
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.inputs import matching
+from bowdenfit.inputs import match_files
 from bowdenfit.units import ColumnSource
 
 AnyTable = TypeVar("AnyTable")
@@ -47,7 +47,7 @@ class Source:
         paths: list[Path] = []
         for name in named:
             is_pattern = any(c in name for c in "*?[") and not os.path.isfile(self.folder / name)  # noqa: PTH113  (any name)
-            matches = matching(self.folder, name) if is_pattern else [self.folder / name]
+            matches = match_files(self.folder, name) if is_pattern else [self.folder / name]
             if not matches:
                 raise DatasetError(
                     f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."

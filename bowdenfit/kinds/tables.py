@@ -103,7 +103,7 @@ class PreloadTableSettings(Table):
     """The table of preload, by which it follows the stretch of the rope unless the description says otherwise."""
 
     @property
-    def tells_preload(self) -> bool:
+    def measures_preload(self) -> bool:
         """It does."""
         return True
 

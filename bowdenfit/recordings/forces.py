@@ -38,25 +38,25 @@ def to_recording(
         DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; or the radius
             of a torque's pulley is not stated.
     """
-    found = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
-    torques = _torques(file, found, sources, pulleys, is_loop)
-    found |= torques
+    by_quantity = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
+    torques = _torques(file, by_quantity, sources, pulleys, is_loop)
+    by_quantity |= torques
     for quantity in ("input_force", "output_force"):
-        if quantity not in found:
+        if quantity not in by_quantity:
             raise _missing(file, quantity)
-    _check_distinct(file, found["input_force"], found["output_force"])
+    _check_distinct(file, by_quantity["input_force"], by_quantity["output_force"])
     forces = {
-        q: _from_torque(file, found[q], q, sources, pulleys)
+        q: _from_torque(file, by_quantity[q], q, sources, pulleys)
         if q in torques
-        else converted(file, found[q], q, sources.get(q), "force")
+        else converted(file, by_quantity[q], q, sources.get(q), "force")
         for q in ("input_force", "output_force")
     }
-    clocks = {q: _clock(file, found[q], found.get("time"), sources.get("time")) for q in found if q != "time"}
+    clocks = {q: _clock(file, by_quantity[q], by_quantity.get("time"), sources.get("time")) for q in by_quantity if q != "time"}
     known = {len(clock): clock for clock in clocks.values()}
     clocks = {q: known[len(clock)] if same(known[len(clock)], clock) else clock for q, clock in clocks.items()}
     for quantity, values in forces.items():
-        _same_length(file, found[quantity], values, clocks[quantity])
-    velocity, unit = _velocity(file, found.get("velocity"), sources.get("velocity"))
+        _same_length(file, by_quantity[quantity], values, clocks[quantity])
+    velocity, unit = _velocity(file, by_quantity.get("velocity"), sources.get("velocity"))
     return (
         RawRecording(
             name,
@@ -75,7 +75,7 @@ def to_recording(
 
 def _torques(
     file: ChannelFile,
-    found: Mapping[str, Channel],
+    by_quantity: Mapping[str, Channel],
     sources: Mapping[str, ColumnSource],
     pulleys: Pulleys,
     is_loop: bool,
@@ -89,9 +89,9 @@ def _torques(
         if not expected or (force in sources and quantity.name not in sources):
             continue
         channel = find_channel(file, quantity, sources)
-        if channel is not None and force in found and (force in sources or quantity.name not in sources):
+        if channel is not None and force in by_quantity and (force in sources or quantity.name not in sources):
             raise DatasetError(
-                f"{file.path.name} has both {force} ({shown(found[force].name)}) and {quantity.name} "
+                f"{file.path.name} has both {force} ({shown(by_quantity[force].name)}) and {quantity.name} "
                 f"({shown(channel.name)}); say which is meant: --channel {force}=NAME:N or --channel {quantity.name}=NAME:N*m."
             )
         if channel is not None:

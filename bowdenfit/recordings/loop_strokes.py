@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play_between, white_noise
 from bowdenfit.recordings.preparation.robust import Deviations, robust_cost, robust_minimum
 from bowdenfit.recordings.recording import PULL, Blocks
@@ -19,9 +19,9 @@ _LOSSES = (0.03, 0.1, 0.25, 0.45, 0.7, 0.9, 1.0)  # of the largest difference of
 _EXPONENTS = (0.2, 0.5, 0.8, 1.0, 1.2)  # of the one that explains that difference without preload
 _LARGEST_SHARE = 0.95  # of the input force, that friction may take
 _CENTER_SD = 0.25  # of the largest difference: how far load cells may disagree before the loop is believed off center
-_WELL = 1.5  # cost a block up to which a loop follows its recording as well as noise lets it
+_COST_OF_NOISE = 1.5  # cost a block up to which a loop follows its recording as well as noise lets it
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
-_SURE = 4.5  # what a cost must grow by, in independent blocks, where something that is told is left out: 3 sd
+_SIGNIFICANT = 4.5  # what a cost must grow by, in independent blocks, where something that is told is left out: 3 sd
 _CLEAR_OF_NOISE = 5.0  # standard deviations by which an output that moves must change
 _OPPOSITE = -0.5  # correlation of the two forces below which one of them has its sign turned round
 _LEAST = 1e-9
@@ -49,18 +49,18 @@ def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack
         slack: Whether the return side may go slack; else all is lost as while both sides are taut.
     """
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
-    likely = likely_input(force_in)
+    likely = smooth_input(force_in)
     x, moved, y = force_in[thin], likely[thin], force_out[thin]
     apart, noise = float(np.quantile(np.abs(x - y), 0.98)), _noise(x, y)
-    scale, told = max(apart, noise), np.array([taut, slack, True], dtype=float)
+    scale, free = max(apart, noise), np.array([taut, slack, True], dtype=float)
 
     def model(p: np.ndarray) -> Deviations:
-        residuals, slopes = _residuals(x, moved, y, scale, noise, p * told)
-        return residuals, slopes * told
+        residuals, slopes = _residuals(x, moved, y, scale, noise, p * free)
+        return residuals, slopes * free
 
     starts = sorted(_starts(x, y, scale), key=lambda p: robust_cost(model(p)[0]))[:2]
     best, cost = min((robust_minimum(model, start, *_LIMITS) for start in starts), key=lambda fit: fit[1])
-    loss, exponent, center = (best * told * [scale, 1.0, scale]).tolist()
+    loss, exponent, center = (best * free * [scale, 1.0, scale]).tolist()
     deviation, followed, state = _deviation(force_in, likely, force_out, loss, exponent, center)
     state = clear_of_turns(state, likely)
     return Hysteresis(force_in, force_out, exponent, center, loss, deviation, followed, state, cost / len(x))
@@ -100,8 +100,8 @@ class LoopStrokes:
             _check_ends(loop, file, name)
         _check_moves(loop, file, name)
 
-    def told(
-        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    def estimate(
+        self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str
     ) -> tuple[float, float, float, tuple[str, ...]]:
         """Exponent, center, the force lost while both sides are taut, and remarks.
 
@@ -109,8 +109,8 @@ class LoopStrokes:
         the loss is told, and the exponent is that of the stated preload.
         """
         del state
-        loss, exponent = _told(loop, correlation)
-        remarks = _remarks(name, found, loop, loss, exponent, self.preload)
+        loss, exponent = _identified(loop, correlation)
+        remarks = _remarks(name, strokes, loop, loss, exponent, self.preload)
         if self.preload and np.isnan(exponent):
             exponent = loss / (2 * self.preload)
         return exponent, loop.center, loss, remarks
@@ -168,12 +168,12 @@ def _noise(force_in: Vector, force_out: Vector) -> float:
     return float(np.hypot(max(white_noise(force_in), 1e-6 * level), max(white_noise(force_out), 1e-6 * level))) or 1e-12
 
 
-def _told(fit: Hysteresis, correlation: float) -> tuple[float, float]:
+def _identified(fit: Hysteresis, correlation: float) -> tuple[float, float]:
     """Loss and exponent, each NaN where the recording is followed as well without it."""
-    enough = _SURE * correlation / len(fit.force_in)
-    loss_told = fit_force_loop(fit.force_in, fit.force_out, taut=False).cost - fit.cost > enough
-    exponent_told = fit_force_loop(fit.force_in, fit.force_out, slack=False).cost - fit.cost > enough
-    return (fit.lost if loss_told else float("nan")), (fit.exponent if exponent_told else float("nan"))
+    enough = _SIGNIFICANT * correlation / len(fit.force_in)
+    loss_identified = fit_force_loop(fit.force_in, fit.force_out, taut=False).cost - fit.cost > enough
+    exponent_identified = fit_force_loop(fit.force_in, fit.force_out, slack=False).cost - fit.cost > enough
+    return (fit.lost if loss_identified else float("nan")), (fit.exponent if exponent_identified else float("nan"))
 
 
 def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
@@ -189,7 +189,7 @@ def _check_none_ignored(by_hand: Sequence[Phase], file: str) -> None:
 def _check_ends(fit: Hysteresis, file: str, name: str) -> None:
     """Refuse channels that are the wrong way round, or of which one counts the other direction as positive."""
     force_in, force_out = fit.force_in, fit.force_out
-    if fit.cost < _WELL:  # it follows to within its noise, which neither could
+    if fit.cost < _COST_OF_NOISE:  # it follows to within its noise, which neither could
         return
     if np.ptp(force_in) > 0 and np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSITE:
         raise DatasetError(
@@ -211,7 +211,7 @@ def _check_moves(fit: Hysteresis, file: str, name: str) -> None:
     noise = max(white_noise(force_out), 1e-12)
     still = np.sum(np.sqrt(1 + ((force_out - np.median(force_out)) / _noise(force_in, force_out)) ** 2) - 1)
     moved = np.ptp(fit.followed) > _CLEAR_OF_NOISE * noise and fit.state.any()
-    if not moved or float(still) - fit.cost * len(force_in) < _SURE:
+    if not moved or float(still) - fit.cost * len(force_in) < _SIGNIFICANT:
         raise DatasetError(
             f"{file}: the output force of {name!r} stands still, at {np.median(force_out):.4g} N, while the input force goes "
             f"from {force_in.min():.4g} to {force_in.max():.4g} N: all inside the friction band, so that it tells no more of "
@@ -221,17 +221,17 @@ def _check_moves(fit: Hysteresis, file: str, name: str) -> None:
 
 
 def _remarks(
-    name: str, found: set[int], fit: Hysteresis, loss: float, exponent: float, preload: float | None
+    name: str, strokes: set[int], fit: Hysteresis, loss: float, exponent: float, preload: float | None
 ) -> tuple[str, ...]:
     remarks = []
-    if not found:
+    if not strokes:
         remarks.append(f"{name}: no block lies safely inside a phase of motion.")
-    elif len(found) == 1:
-        which = "forward" if PULL in found else "back"
+    elif len(strokes) == 1:
+        which = "forward" if PULL in strokes else "back"
         remarks.append(
             f"{name} moves {which} throughout: offsets of the load cells cannot be told from friction by it."
         )
-    if len(found) == 2 and abs(fit.center) > _CENTER_SD * max(fit.lost, _LEAST):
+    if len(strokes) == 2 and abs(fit.center) > _CENTER_SD * max(fit.lost, _LEAST):
         remarks.append(
             f"{name}: the input force is off the output force by {fit.center:+.3g} N in the middle of the loop; the usual "
             "cause is a load cell with a wrong tare: give [sensors] an offset_sd, or tare the recording."

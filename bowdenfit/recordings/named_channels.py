@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.matching import Quantity, candidates, meanings
+from bowdenfit.files.matching import Quantity, find_candidates, meanings
 from bowdenfit.files.naming import parse_sources
 from bowdenfit.files.pieces import sample
 from bowdenfit.units import ChannelSource, ColumnSource, contradiction, conversion_factor
@@ -62,8 +62,9 @@ def find_channel(file: ChannelFile, quantity: Quantity, sources: Mapping[str, Co
             return None
         return _named(file, quantity.name, source.name)
     headings = [(_PATH.split(c.name)[-1] or c.name, c.unit) for c in file.channels]
-    spelled = {each.position for each in candidates(headings, WANTED[:2], tuple(sources)).get(quantity.name, ())}
-    matches = [c for i, c in enumerate(file.channels) if i in spelled or _says(c, quantity)]
+    forces = find_candidates(headings, WANTED[:2], tuple(sources))
+    spelled_at = {candidate.position for candidate in forces.get(quantity.name, ())}
+    matches = [c for i, c in enumerate(file.channels) if i in spelled_at or _says(c, quantity)]
     if len(matches) > 1 and quantity.name == "time":
         return None  # each channel has the clock beside it
     if len(matches) > 1:

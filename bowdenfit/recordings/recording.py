@@ -44,7 +44,7 @@ class RawRecording:
 
 
 @dataclass(frozen=True)
-class Flagged:
+class FlaggedSamples:
     """Samples that were left out, for figures and for the account; at most a few hundred of each kind are kept.
 
     Args:
@@ -91,7 +91,7 @@ class Account(Part):
     delay_sd: float
     noise: tuple[float, float]
     limits: tuple[float, float]
-    flagged: Flagged
+    flagged: FlaggedSamples
     remarks: tuple[str, ...]
 
 
@@ -189,7 +189,7 @@ class Recordings(Part):
     """
 
     columns: tuple[str, ...]
-    each: tuple[Recording, ...]
+    items: tuple[Recording, ...]
     velocity_unit: str = ""
     delay_sd: float = 0.0
     loop: bool = False
@@ -197,4 +197,4 @@ class Recordings(Part):
     @property
     def runs(self) -> tuple[str, ...]:
         """Names of the runs, each once."""
-        return tuple(dict.fromkeys(r.run for r in self.each))
+        return tuple(dict.fromkeys(r.run for r in self.items))

@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play, white_noise
 from bowdenfit.recordings.preparation.robust import Deviations, robust_minimum
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
@@ -21,7 +21,7 @@ _LEAST_EXPONENT = 1e-3
 _LIMITS = np.array([[1e-9, -np.inf, 0.0], [np.inf] * 3])  # of exponent, center and drag
 _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
-_WELL = 1.5  # cost up to which a loop follows its recording as well as noise lets it
+_COST_OF_NOISE = 1.5  # cost up to which a loop follows its recording as well as noise lets it
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 
 
@@ -33,7 +33,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         force_out: Output force, all above 0 [N].
     """
     thin = slice(None, None, -(-len(force_in) // _FIT_BLOCKS))
-    likely = likely_input(force_in)
+    likely = smooth_input(force_in)
     few_in, few_likely, few_out = force_in[thin], likely[thin], force_out[thin]
     ratio = np.log(few_in / few_out)
     low, high = np.quantile(ratio, (0.05, 0.95))
@@ -50,7 +50,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     fits = []
     for start in ([width, center, 0.0025], [width * 0.8, 0.0, 0.09]):
         fits.append(robust_minimum(model, np.array(start), *_LIMITS))
-        if fits[-1][1] < _WELL * len(few_in):
+        if fits[-1][1] < _COST_OF_NOISE * len(few_in):
             break
     best, cost = min(fits, key=lambda fit: fit[1])
     exponent, middle, drag = float(best[0]), float(best[1]), level * float(best[2])
@@ -73,7 +73,7 @@ class RopeStrokes:
         """Where both forces stand clear of their noise, so that their logarithms say something; not chosen by that noise."""
         forces = (blocks.input_force, blocks.output_force)
         return ~blocks.saturated & np.all(
-            [likely_input(force) > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0
+            [smooth_input(force) > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0
         )
 
     def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
@@ -97,7 +97,7 @@ class RopeStrokes:
                 f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
                 '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
             )
-        if loop.cost < _WELL:  # it follows to within its noise, which a swapped one could not
+        if loop.cost < _COST_OF_NOISE:  # it follows to within its noise, which a swapped one could not
             return
         other = fit_loop(loop.force_out, loop.force_in)
         if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
@@ -106,13 +106,13 @@ class RopeStrokes:
                 f"wrong way round; {swap}."
             )
 
-    def told(
-        self, loop: Hysteresis, state: Labels, found: set[int], correlation: float, name: str
+    def estimate(
+        self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str
     ) -> tuple[float, float, float, tuple[str, ...]]:
         """Exponent and center by the medians of the two branches, drag, and remarks."""
         del correlation
         ratio = np.log(loop.force_in / loop.force_out)
-        return *_plain_loop(ratio, state), loop.lost, _remarks(name, found, loop)
+        return *_plain_loop(ratio, state), loop.lost, _remarks(name, strokes, loop)
 
 
 def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
@@ -163,19 +163,19 @@ def _residuals(
     return np.append(deviation / scale, prior @ p), np.vstack([slopes, prior])
 
 
-def _remarks(name: str, found: set[int], loop: Hysteresis) -> tuple[str, ...]:
+def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
     remarks = []
-    if not found:
+    if not strokes:
         remarks.append(
             f"{name}: no block lies safely inside a sliding phase, so the recording says nothing of friction."
         )
-    elif len(found) == 1:
-        which = "pulling" if PULL in found else "returning"
+    elif len(strokes) == 1:
+        which = "pulling" if PULL in strokes else "returning"
         remarks.append(
             f"{name} is {which} throughout and has no loop: a gain error, or a zero that is wrong, cannot be told from "
             "friction by it, and where it slides is known by the motor's motion or by both forces changing together."
         )
-    if abs(loop.center) > 2.5 * _GAIN_SD and len(found) == 2:
+    if abs(loop.center) > 2.5 * _GAIN_SD and len(strokes) == 2:
         remarks.append(
             f"{name}: the hysteresis loop is off center by {percent(loop.center, 1, '+')} of the force; the usual cause is "
             "a load cell with a wrong calibration or tare: give [sensors] input_gain_error_sd and output_gain_error_sd, or an "

@@ -62,8 +62,8 @@ def find_strokes(
         state[inside] = contact[inside] = _SIGNS[span.stroke]
         used[inside] = usable[inside] & (_SIGNS[span.stroke] != SWITCH)
     correlation = correlation_time(loop.deviation[used[usable]]) if used.any() else 1.0
-    told = cable.told(loop, state[usable], set(state[used].tolist()), correlation, name)
-    exponent, center, lost, remarks = told
+    estimates = cable.estimate(loop, state[usable], set(state[used].tolist()), correlation, name)
+    exponent, center, lost, remarks = estimates
     noise = float(1.4826 * np.median(np.abs(loop.deviation))) or 1e-12
     return Strokes(state, contact, used, exponent, center, lost, noise, correlation, bool(by_hand), remarks)
 

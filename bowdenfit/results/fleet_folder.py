@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import or_damaged, refuse_special
+from bowdenfit.inputs import damage_as, refuse_special
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.folder import read_page, replace_atomically
 from bowdenfit.results.netcdf import own_member
@@ -102,7 +102,7 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         raise StoreError(f"{path} cannot be read: {folder} {problem}, or name a folder that `bowdenfit fleet` wrote.")
     damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
     _refuse_changed(folder, damaged)
-    with or_damaged(damaged), h5py.File(path) as file:
+    with damage_as(damaged), h5py.File(path) as file:
         group, stats = (_members(file, name) for name in (_POSTERIOR, "sample_stats"))
         fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
         values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}

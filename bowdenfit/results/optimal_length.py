@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import decimals, filled, percent, significant, table
+from bowdenfit.words import capitalized, decimals, filled, percent, significant, table
 
 EDGE_FRACTION = 0.001  # an optimum this close to an end of the range, as a fraction of the range, counts as at the edge
 
@@ -215,7 +215,7 @@ class OptimalLength(Display):
     @property
     def heads(self) -> tuple[str, str, str]:
         """Headings of the table of choices."""
-        return f"{self.what.capitalize()} ({self.unit})", "probability of being best", "expected loss of efficiency"
+        return f"{capitalized(self.what)} ({self.unit})", "probability of being best", "expected loss of efficiency"
 
     @property
     def rows(self) -> list[tuple[str, str, str]]:

@@ -8,7 +8,7 @@ from cables import cable
 from elastic_cables import CONSTANT, HOUSING, elastic_cable
 
 from bowdenfit.cable.conditions import LEAST_SHARE, Conditions
-from bowdenfit.cable.drive import LEAST_EXPONENT, Loop, Rope, drive_of
+from bowdenfit.cable.drive import LEAST_EXPONENT, LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.kinds.tables import Measurements
@@ -25,10 +25,10 @@ def _forces(level: float) -> np.ndarray:
     return level + np.cumsum(np.random.default_rng(3).standard_normal((N, 2)), axis=0) * 3.0
 
 
-def _rope(options=(), **values) -> Rope:
+def _rope(options=(), **values) -> RopeDrive:
     friction = FrictionModel(options, Conditions(50.0, 20.0, (10.0, 40.0), "mm/s"))
     values = {name: jnp.asarray(value) for name, value in values.items()}
-    return Rope(friction, values, jnp.asarray(EXPONENT), jnp.ones((N, 2)))
+    return RopeDrive(friction, values, jnp.asarray(EXPONENT), jnp.ones((N, 2)))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_a_rope_is_the_play_of_the_preparation_on_the_scale_on_which_friction_is
 
 def test_a_loop_stands_still_between_its_two_ways():
     preload, force, start = np.array([5.0, 20.0]), _forces(0.0), np.array([0.0, 3.0])
-    found = Loop(jnp.asarray(preload), jnp.asarray(EXPONENT)).follow(
+    found = LoopDrive(jnp.asarray(preload), jnp.asarray(EXPONENT)).follow(
         jnp.asarray(force), jnp.asarray(MOUNTING), jnp.asarray(start)
     )[0]
     for i in range(2):
@@ -64,7 +64,7 @@ def test_a_loop_stands_still_between_its_two_ways():
             assert found[t, i] == pytest.approx(y, abs=1e-11)
 
 
-@pytest.mark.parametrize("drive", [_rope(), Loop(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])
+@pytest.mark.parametrize("drive", [_rope(), LoopDrive(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])
 def test_what_a_cell_shows_changes_with_the_exponent_as_the_slope_says(drive):
     force, cells, step = jnp.asarray(np.abs(_forces(60.0)) + 1.0), LoadCells.of(ERRORS), 1e-6
     start = drive.scaled(force[0])
@@ -85,7 +85,7 @@ def _reading(drive, cells, force):
     return drive.shown(cells, force, jnp.zeros_like(force))[0]
 
 
-@pytest.mark.parametrize("drive", [_rope(), Loop(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])
+@pytest.mark.parametrize("drive", [_rope(), LoopDrive(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])
 def test_a_delay_is_taken_out_of_the_reading_that_it_was_added_to(drive):
     force = np.abs(_forces(60.0)) + 1.0
     late = np.full_like(force, 0.01)
@@ -99,21 +99,21 @@ def test_a_delay_is_taken_out_of_the_reading_that_it_was_added_to(drive):
 def test_friction_never_pushes_whatever_the_mounting_did():
     none = -jnp.asarray(EXPONENT) - 1.0
     assert np.all(_rope().band(none) == LEAST_EXPONENT)
-    assert np.all(Loop(jnp.ones(2), jnp.asarray(EXPONENT)).band(none) == LEAST_EXPONENT)
+    assert np.all(LoopDrive(jnp.ones(2), jnp.asarray(EXPONENT)).band(none) == LEAST_EXPONENT)
     force = jnp.asarray(np.abs(_forces(60.0)) + 1.0)
     np.testing.assert_allclose(_rope().follow(force, none, jnp.log(force[0]))[0], force, rtol=1e-8)
-    assert _rope().least_force == LEAST_SHARE * 50.0 and Loop(jnp.ones(2), jnp.ones(2)).least_force == -np.inf
+    assert _rope().least_force == LEAST_SHARE * 50.0 and LoopDrive(jnp.ones(2), jnp.ones(2)).least_force == -np.inf
 
 
 def test_a_cable_says_what_it_is():
     angles, velocity, none = jnp.array([[1.0], [2.0]]), jnp.full((5, 2), jnp.nan), Measurements()
     alone = cable_of(cable(1, ("forces",), contact=[HOUSING | {"friction": "mu"}]), none)
-    rope = drive_of(alone, {"mu": jnp.asarray(0.1)}, angles, velocity)
-    assert isinstance(rope, Rope)
+    rope = make_drive(alone, {"mu": jnp.asarray(0.1)}, angles, velocity)
+    assert isinstance(rope, RopeDrive)
     np.testing.assert_allclose(rope.exponent, [0.1, 0.2])
     np.testing.assert_array_equal(rope.rate, np.ones((5, 2)))
     pair = cable_of(elastic_cable(("loop",), preload=CONSTANT), none)
-    loop = drive_of(pair, {"mu": jnp.asarray(0.1), "preload": jnp.asarray(12.0)}, angles, velocity, jnp.array([0.3, 0.4]))
-    assert isinstance(loop, Loop)
+    loop = make_drive(pair, {"mu": jnp.asarray(0.1), "preload": jnp.asarray(12.0)}, angles, velocity, jnp.array([0.3, 0.4]))
+    assert isinstance(loop, LoopDrive)
     np.testing.assert_allclose(loop.preload, [12.0, 12.0])
     np.testing.assert_allclose(loop.exponent, [0.3, 0.4])

@@ -8,7 +8,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.cable.conditions import Conditions
-from bowdenfit.cable.drive import Rope
+from bowdenfit.cable.drive import RopeDrive
 from bowdenfit.cable.friction import STROKE_DIFFERENCE, FrictionModel
 
 DIFFERENCE, EXPONENT = 0.2, 0.12 * np.pi
@@ -33,7 +33,7 @@ def test_a_followed_rope_slides_with_each_strokes_own_coefficient(friction):
     """Up, and down again far enough to slide back."""
     with jax.enable_x64(True):
         force = jnp.asarray(np.concatenate([np.linspace(20, 80, 30), np.linspace(80, 20, 30)]))[:, None]
-        rope = Rope(friction, VALUES, jnp.asarray([EXPONENT]), jnp.ones_like(force))
+        rope = RopeDrive(friction, VALUES, jnp.asarray([EXPONENT]), jnp.ones_like(force))
         start = rope.scaled(force[0]) - EXPONENT
         out, slope = rope.follow(force, jnp.zeros(1), start)
     assert float(out[29, 0]) == pytest.approx(80 * np.exp(-EXPONENT * (1 + DIFFERENCE / 2)), rel=1e-12)

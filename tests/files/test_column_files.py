@@ -77,7 +77,7 @@ SLOW_HABIT = "comment between the rows"
 @pytest.fixture
 def as_if_long(monkeypatch):
     """Read all but the last lines as those of long files are, and return how many columns each such reading gave."""
-    widths, read_long = [], columns_csv._long
+    widths, read_long = [], columns_csv._read_long
 
     def watched(*arguments):
         columns = read_long(*arguments)
@@ -86,7 +86,7 @@ def as_if_long(monkeypatch):
 
     monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
     monkeypatch.setattr(columns_csv, "_FEW_BYTES", 0)
-    monkeypatch.setattr(columns_csv, "_long", watched)
+    monkeypatch.setattr(columns_csv, "_read_long", watched)
     return widths
 
 
@@ -99,14 +99,14 @@ def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, as_if_long):
 @pytest.fixture
 def both_ways(monkeypatch):
     """Read all but the last lines both as those of short files and as those of long ones, and return what each gave."""
-    found, few = [], columns_csv._few
+    found, few = [], columns_csv._read_short
 
     def watched(*arguments):
-        found.append((few(*arguments), columns_csv._long(*arguments)))
+        found.append((few(*arguments), columns_csv._read_long(*arguments)))
         return found[-1][0]
 
     monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
-    monkeypatch.setattr(columns_csv, "_few", watched)
+    monkeypatch.setattr(columns_csv, "_read_short", watched)
     return found
 
 

@@ -6,7 +6,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.files import spellings
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.spellings import parse_heading
 from bowdenfit.kinds.forces.table import ForceTable
 
 pytestmark = pytest.mark.extended
@@ -116,7 +116,7 @@ def test_the_unit_of_another_spelling_counts(tmp_path, unit):
 
 @pytest.mark.parametrize("heading", NOT_FORCES)
 def test_what_does_not_say_an_end_of_the_cable_is_taken_for_no_force_of_one(heading):
-    said = spelled(heading)
+    said = parse_heading(heading)
     assert said is None or said.pair == "said" or "force" not in said.quantity
 
 

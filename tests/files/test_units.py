@@ -8,13 +8,13 @@ import pytest
 from bowdenfit import DatasetError, units
 
 
-@pytest.mark.parametrize("unit", units._USUAL)
+@pytest.mark.parametrize("unit", units._COMMON_UNITS)
 def test_usual_units_are_what_pint_says(unit, monkeypatch):
-    dimension, factor = units._USUAL[unit]
+    dimension, factor = units._COMMON_UNITS[unit]
     assert units.is_unit(unit)
     assert units.dimension_of(unit) == dimension
     assert units.conversion_factor(unit, dimension) == factor
-    monkeypatch.setattr(units, "_USUAL", {})
+    monkeypatch.setattr(units, "_COMMON_UNITS", {})
     assert units.dimension_of(unit) == dimension
     assert units.conversion_factor(unit, dimension) == factor  # to the last bit
     assert units.route_conversion_factor(unit, unit) == 1.0

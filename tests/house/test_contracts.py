@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bowdenfit.cable.laws import Capstan, ContactLaw
-from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, class_at
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, load_class
 from bowdenfit.description import PriorDefaults, Route
 from bowdenfit.questions.figures import FIGURES
 
@@ -93,7 +93,7 @@ def test_importing_changes_no_global_setting():
 
 def _law(name: str) -> tuple[ContactLaw, dict[str, jax.Array]]:
     """A law of a contact, with values of its coefficient and of its own parameters."""
-    law = class_at(CONTACT_LAWS[name])("free sheath", "mu")
+    law = load_class(CONTACT_LAWS[name])("free sheath", "mu")
     own = {p.name: p.prior.constrain(jnp.array(0.4)) for p in law.parameters(DEFAULTS)}
     return law, {"mu": jnp.array(0.12), **own}
 
@@ -130,7 +130,7 @@ def test_parameters_of_a_contact_law_are_fully_declared_and_named_after_the_cont
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_gives_finite_angles_that_are_not_negative_over_the_prior(name):
-    curve = class_at(CURVES[name].place)("sheath_angle", ROUTE)
+    curve = load_class(CURVES[name].place)("sheath_angle", ROUTE)
     parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     for z in np.random.default_rng(0).standard_normal((200, len(parameters))):
         values = {p.name: p.prior.constrain(jnp.array(x)) for p, x in zip(parameters, z, strict=True)}
@@ -141,7 +141,7 @@ def test_a_curve_gives_finite_angles_that_are_not_negative_over_the_prior(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_names_the_unit_of_every_derived_quantity(name):
-    curve = class_at(CURVES[name].place)("sheath_angle", ROUTE)
+    curve = load_class(CURVES[name].place)("sheath_angle", ROUTE)
     parameters = curve.parameters(np.array([0.3, 0.5, 0.9]), DEFAULTS)
     values = {p.name: p.prior.constrain(jnp.array(0.3)) for p in parameters}
     assert set(curve.derived(values)) == set(curve.derived_units())
@@ -149,7 +149,7 @@ def test_a_curve_names_the_unit_of_every_derived_quantity(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_parameters_of_a_curve_are_fully_declared(name):
-    parameters = class_at(CURVES[name].place)("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS)
+    parameters = load_class(CURVES[name].place)("sheath_angle", ROUTE).parameters(np.zeros(0), DEFAULTS)
     assert len(parameters) == CURVES[name].coefficients
     for p in parameters:
         assert p.symbol.startswith("$")

@@ -14,7 +14,7 @@ from scratch.losses.term import LossTerms
 
 import bowdenfit as bf
 from bowdenfit.cable.friction import FRICTION_OPTIONS
-from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, Family
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, CurveFamily
 from bowdenfit.cli.commands import command
 from bowdenfit.files import FORMATS
 from bowdenfit.kinds import KINDS
@@ -103,7 +103,7 @@ def test_a_new_contact_law_is_a_class_and_a_line(data_set, monkeypatch):
 
 
 def test_a_new_curve_family_is_a_class_and_a_line(monkeypatch, tmp_path):
-    monkeypatch.setitem(CURVES, "square", Family(f"{curve.__name__}:{curve.Square.__name__}", 1))
+    monkeypatch.setitem(CURVES, "square", CurveFamily(f"{curve.__name__}:{curve.Square.__name__}", 1))
     length = np.linspace(400.0, 500.0, 11)
     angle = 120.0 * ((length - 400.0) / 100.0) ** 2 + np.random.default_rng(3).standard_normal(11)
     (tmp_path / "cable.toml").write_text(ROUTED)

@@ -262,7 +262,7 @@ def test_the_estimated_delay_is_as_good_as_its_standard_error_says(several: list
     By chance it is rejected in fewer than one of a thousand seeds.
     """
     found = [(cable.delay, dataset.measurements.table(Recordings)) for cable, dataset in several]
-    z = [(r.each[0].account.delay - delay) / r.delay_sd for delay, r in found if r is not None]
+    z = [(r.items[0].account.delay - delay) / r.delay_sd for delay, r in found if r is not None]
     hits = int(np.sum(np.abs(z) < stats.norm.ppf((1 + PROBABILITY) / 2)))
     assert p_value(hits, len(several)) > 0.001, z
 
@@ -303,7 +303,7 @@ def test_recordings_read_from_files_are_those_that_were_recorded(tmp_path: Path)
     assert expected is not None
     assert read.runs == expected.runs
     assert read.delay_sd == expected.delay_sd == DELAY_SD
-    for one, other in zip(read.each, expected.each, strict=True):
+    for one, other in zip(read.items, expected.items, strict=True):
         assert one.own_angle == pytest.approx(other.own_angle)
         np.testing.assert_allclose(one.blocks.input_force, other.blocks.input_force, atol=1e-6)
         np.testing.assert_allclose(one.blocks.output_force, other.blocks.output_force, atol=1e-6)

@@ -16,7 +16,7 @@ from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import play
 from bowdenfit.recordings.recording import Recordings
 
@@ -111,14 +111,14 @@ def noisy_pull(dip: float) -> np.ndarray:
 def test_a_pull_with_noise_counts_as_sliding_throughout():
     x = noisy_pull(0.0)
     assert np.mean(play(x, 0.2, x[0] - 0.2)[1] == 1) < 0.7
-    likely = likely_input(x)
+    likely = smooth_input(x)
     output, state = play(likely, 0.2, likely[0] - 0.2)
     assert np.mean(state == 1) > 0.99
     np.testing.assert_allclose(output[state == 1], likely[state == 1] - 0.2)
 
 
 def test_a_reversal_far_beyond_noise_is_no_noise():
-    likely = likely_input(noisy_pull(20.0))
+    likely = smooth_input(noisy_pull(20.0))
     _, state = play(likely, 0.2, likely[0] - 0.2)
     assert not state[96:104].any()
     assert np.mean(state[:90] == 1) > 0.95

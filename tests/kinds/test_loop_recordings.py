@@ -10,7 +10,7 @@ import pytest
 from loop_benches import HALF_TURN, MU, PRELOAD, folder_of, motor, output_of, recorded
 from scipy import integrate, stats
 
-from bowdenfit.cable.drive import Loop
+from bowdenfit.cable.drive import LoopDrive
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.recordings.whole_recordings import LoopRecordingsTerm
 from bowdenfit.model import build_model
@@ -35,7 +35,7 @@ def test_the_slope_of_the_operator_is_its_derivative():
     force = jnp.asarray(np.cumsum(generator.standard_normal((400, 3)), axis=0) * 4)
     preload, exponent = jnp.array([5.0, 20.0, 0.0]), jnp.array([0.4, 0.2, 0.3])
     start, step = force[0], 1e-7
-    drive, never = Loop(preload, exponent), jnp.full(force.shape, jnp.nan)
+    drive, never = LoopDrive(preload, exponent), jnp.full(force.shape, jnp.nan)
     y, slope = drive.follow(force, jnp.zeros(3), start)
     more, less = (drive.follow(force, jnp.full(3, s), start)[0] for s in (step, -step))
     same = np.isclose((more + less) / 2, y, atol=1e-9)

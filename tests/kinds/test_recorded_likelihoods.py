@@ -296,7 +296,7 @@ def test_an_output_that_comes_later_than_it_was_shifted_back_by_has_a_positive_e
     recording = _recorded(1.5, faults=LoadCellFaults(delay=late), profile=SHORT, rate=200.0)
     recordings = Recordings(("angle",), (recording,), "mm/s", delay_sd=0.01)
     model = _model([recording], likelihood)
-    (term,) = model.terms if likelihood == "runs" else (_whole(model, recordings.each),)
+    (term,) = model.terms if likelihood == "runs" else (_whole(model, recordings.items),)
     grid = np.linspace(-0.008, 0.008, 33)
     found = jax.jit(jax.vmap(lambda d: term.log_likelihood(_named(BLOCK) | {"delay_error": d}, term.data)[0]))(grid)
     assert grid[int(np.argmax(found))] == pytest.approx(late, abs=0.0006)

@@ -14,7 +14,7 @@ from bowdenfit.kinds.recordings.term import recordings_term
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.recording import Recordings
 
 pytestmark = pytest.mark.extended
@@ -35,7 +35,7 @@ def test_an_input_that_may_have_been_rises_and_falls_by_turns_as_what_was_read()
     pull = np.linspace(20.0, 120.0, 100)
     true = np.concatenate([pull, pull[::-1]])
     true[40:60] -= 25 * np.sin(np.linspace(0, np.pi, 20))
-    likely = likely_input(true + np.random.default_rng(1).standard_normal(200))
+    likely = smooth_input(true + np.random.default_rng(1).standard_normal(200))
     steps = np.sign(np.diff(likely))
     assert np.sum(np.diff(steps[steps != 0]) != 0) == 3
     assert np.abs(likely - true)[np.r_[5:35, 65:95, 105:195]].max() < 2.5
@@ -43,7 +43,7 @@ def test_an_input_that_may_have_been_rises_and_falls_by_turns_as_what_was_read()
 
 
 def test_a_force_that_never_changes_is_its_own():
-    np.testing.assert_allclose(likely_input(np.full(20, 7.0)), 7.0)
+    np.testing.assert_allclose(smooth_input(np.full(20, 7.0)), 7.0)
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
             assert not np.array_equal(getattr(before, read), getattr(after, read), equal_nan=True)
     recordings = again.measurements.table(Recordings)
     if recordings is not None:
-        for one, other in zip(dataset.measurements.table(Recordings).each, recordings.each, strict=True):
+        for one, other in zip(dataset.measurements.table(Recordings).items, recordings.items, strict=True):
             np.testing.assert_array_equal(one.blocks.time, other.blocks.time)
             assert not np.array_equal(one.blocks.output_force, other.blocks.output_force)
     build_model(again)
@@ -141,7 +141,7 @@ def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_wer
     again = drawn_anew(dataset, values, scale=0.0)
     named = {name: jnp.asarray(value) for name, value in values.items()}
     cable = build_model(dataset).cable
-    for recording in again.measurements.table(Recordings).each:
+    for recording in again.measurements.table(Recordings).items:
         if recording.route <= 530:
             expected = float(cable.exponent_at(named, jnp.array([recording.route]))[0])
             assert recording.strokes.exponent == pytest.approx(expected, rel=0.01)
@@ -194,10 +194,10 @@ def test_recordings_with_clipped_readings_are_refused():
     dataset = data_set("synthetic-recordings")
     recordings = dataset.measurements.table(Recordings)
     refuse_saturated(recordings)
-    first = recordings.each[0]
+    first = recordings.items[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
     with pytest.raises(DatasetError, match="end of a load cell's range"):
-        refuse_saturated(replace(recordings, each=(clipped, *recordings.each[1:])))
+        refuse_saturated(replace(recordings, each=(clipped, *recordings.items[1:])))
 
 
 # What no bench would hand in ---------------------------------------------------------------------------------------

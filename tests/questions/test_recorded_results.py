@@ -103,7 +103,7 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     again = bf.load(folder)
     assert details_text(again) == details_text(fit)
     for before, after in zip(
-        fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).each, strict=True
+        fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).items, strict=True
     ):
         np.testing.assert_array_equal(before.blocks.input_force, after.blocks.input_force)
         np.testing.assert_array_equal(before.strokes.stroke, after.strokes.stroke)
@@ -277,7 +277,7 @@ def test_recordings_one_below_the_other_in_one_file_are_told_apart_by_a_column(r
     )
     contact = '[[contact]]\nname = "c"\nfriction = "mu"\nwrap_angle = { value = 90, unit = "deg" }\n'
     (tmp_path / "cable.toml").write_text(f'name = "two"\n{contact}[tables]\nrecordings = {{}}\n{entries}')
-    first, second = bf.read(tmp_path).measurements.table(Recordings).each
+    first, second = bf.read(tmp_path).measurements.table(Recordings).items
     assert (first.name, second.name) == ("a", "b")
     assert first.account.samples == second.account.samples == 1200
     assert first.strokes.exponent == pytest.approx(0.2746, abs=0.004)

@@ -55,7 +55,7 @@ def counts(tmp_path):
 
 def only(folder):
     """The one recording of a data set."""
-    (recording,) = bf.read(folder).measurements.table(Recordings).each
+    (recording,) = bf.read(folder).measurements.table(Recordings).items
     return recording
 
 

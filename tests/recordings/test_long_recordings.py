@@ -16,7 +16,7 @@ from bowdenfit.files import columns_csv, pieces, read_channels
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.bandwidth import main_frequency
-from bowdenfit.recordings.preparation.clock import spread
+from bowdenfit.recordings.preparation.clock import spread_repeated
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.recordings.strokes import find_strokes
 
@@ -137,7 +137,7 @@ def test_the_main_motion_is_found_at_any_rate(rate, period):
 
 def test_repeated_times_are_spread_in_pieces_as_in_one(monkeypatch):
     time = np.floor(np.arange(5000) / 7) / 10
-    whole = spread(time)
+    whole = spread_repeated(time)
     monkeypatch.setattr(pieces, "PIECE", 333)
-    np.testing.assert_array_equal(spread(time), whole)
+    np.testing.assert_array_equal(spread_repeated(time), whole)
     np.testing.assert_allclose(np.diff(whole), 0.1 / 7, rtol=1e-6)

@@ -121,13 +121,13 @@ def test_a_delay_is_not_estimated_but_a_stated_one_is_applied(tmp_path):
     }
     plain = load_dataset(folder_of(tmp_path, [late, recorded(seconds=6.0, seed=1)])).measurements
     assert plain.table(Recordings) is not None
-    assert [r.account.delay for r in plain.table(Recordings).each] == [0.0, 0.0]
+    assert [r.account.delay for r in plain.table(Recordings).items] == [0.0, 0.0]
     assert sum("not estimated for a loop" in remark for remark in plain.remarks) == 1
     assert any('delay = { value = 10, unit = "ms" }' in remark for remark in plain.remarks)
     stated = 'recordings = { prepare = { delay = { value = 50, unit = "ms", sd = 2 } } }'
     found = load_dataset(folder_of(tmp_path, [late], more=f"[tables]\n{stated}"))
     assert found.measurements.table(Recordings) is not None
-    strokes = found.measurements.table(Recordings).each[0].strokes
+    strokes = found.measurements.table(Recordings).items[0].strokes
     assert strokes.exponent == pytest.approx(HALF_TURN, rel=0.02)
     assert "delay_error" in {p.name for p in build_model(found).space.free}
     assert not any("not estimated" in remark for remark in found.measurements.remarks)

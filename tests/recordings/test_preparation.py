@@ -19,17 +19,16 @@ from bowdenfit.questions.simulate.bench import (
     MotorProfile,
     simulate_recording,
 )
-from bowdenfit.recordings.preparation import likely_input as likely_input_file
-from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
-from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread
+from bowdenfit.recordings.preparation import input_smoothing, prepare
+from bowdenfit.recordings.preparation.bandwidth import estimate_bandwidth, main_frequency
+from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread_repeated
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estimate_delay
-from bowdenfit.recordings.preparation.flags import flag, frozen, resolution, saturation, spikes
+from bowdenfit.recordings.preparation.flags import flag_samples, frozen, resolution, saturation, spikes
 from bowdenfit.recordings.preparation.noise import correlation_time, noise_about_trend, noise_of, quantum_of
 from bowdenfit.recordings.preparation.play import play
-from bowdenfit.recordings.preparation.rests import Rests, play_rows
+from bowdenfit.recordings.preparation.rests import Rests, play_along_rows
 from bowdenfit.recordings.preparation.segments import Segments
-from bowdenfit.recordings.preparation.tare import tare_of
+from bowdenfit.recordings.preparation.tare import estimate_tare
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.recordings.strokes import find_strokes
 
@@ -98,7 +97,7 @@ def with_lengths(raw, **channels):
 def flags_of(raw, side, **switches):
     """Faults of one channel of a recording."""
     mine, other = (raw.input_force, raw.output_force) if side == "input" else (raw.output_force, raw.input_force)
-    return flag(raw.input_time, mine, raw.input_time, other, ON.model_copy(update=switches))
+    return flag_samples(raw.input_time, mine, raw.input_time, other, ON.model_copy(update=switches))
 
 
 def score(found, put_in):
@@ -155,8 +154,8 @@ def test_time_running_backwards_is_refused_with_sample_and_times():
 def test_a_clock_with_few_digits_is_spread_evenly_and_remarked():
     time = np.arange(1000) / 1000
     coarse = np.floor(time * 600 + 1e-9) / 600
-    assert np.all(np.diff(spread(coarse)) > 0)
-    np.testing.assert_allclose(spread(coarse), time, atol=1 / 600)
+    assert np.all(np.diff(spread_repeated(coarse)) > 0)
+    np.testing.assert_allclose(spread_repeated(coarse), time, atol=1 / 600)
     few = np.floor(RAW.input_time * 800 + 1e-9) / 800
     _, account = prepare(replace(RAW, input_time=few, output_time=few), OFF)
     assert any("repeat the one before" in r for r in account.remarks)
@@ -171,7 +170,7 @@ def test_the_tare_is_the_mean_of_the_quiet_interval_and_its_error_covers_it():
     for seed in range(60):
         generator = np.random.default_rng(seed)
         noise = np.convolve(generator.normal(0, 1, 2100), np.full(20, 0.1), mode="valid")
-        mean, error = tare_of(
+        mean, error = estimate_tare(
             "f", "input_force", np.arange(len(noise)) / 1e3, 3 + noise, (0.0, 2.0), np.ones(len(noise), dtype=bool)
         )
         pulls.append((mean - 3) / error)
@@ -465,7 +464,7 @@ def test_noise_that_a_filter_smoothed_does_not_raise_the_bandwidth():
         f + np.convolve(generator.normal(0, 2, len(f) + 19), np.full(20, 0.05), mode="valid")
         for f in (clean.input_force, clean.output_force)
     ]
-    assert bandwidth_of(noisy[0], noisy[1], 1000.0, main_frequency(noisy[0], noisy[1], 1000.0)) < 30
+    assert estimate_bandwidth(noisy[0], noisy[1], 1000.0, main_frequency(noisy[0], noisy[1], 1000.0)) < 30
 
 
 # --- noise
@@ -503,7 +502,7 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
     heading = generator.choice([-1.0, 0.0, 1.0], size=x.shape)
     rests = Rests(generator.normal(size=x.shape), heading) if rested else None
     exponents = np.array([0.0, 0.05, 0.3])
-    found = play_rows(x, start, exponents, rests)
+    found = play_along_rows(x, start, exponents, rests)
     for e, row in np.ndindex(3, rows):
         y = start[row]
         for t in range(points):
@@ -516,13 +515,13 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
 
 
 @pytest.mark.parametrize("blocks", [7, 8, 50, 1000])
-def test_the_likely_input_is_smoothed_and_pooled_as_scipy_does(blocks):
+def test_the_input_is_smoothed_and_pooled_as_scipy_does(blocks):
     force = np.cumsum(np.random.default_rng(blocks).standard_normal(blocks)) + 0.1 * np.arange(blocks)
-    pooled = likely_input_file._isotonic(force)
+    pooled = input_smoothing._isotonic(force)
     np.testing.assert_allclose(pooled, isotonic_regression(force).x, atol=1e-12)
     assert np.all(np.diff(pooled) >= 0) and np.any(pooled != force)
     level = np.tile([0.0, 1.0, 0.0, -1.0], blocks)[:blocks] + 1e-3 * force  # much noise, none of it beyond what may change
-    smooth = likely_input_file._smooth(level, 100.0)
+    smooth = input_smoothing._smooth(level, 100.0)
     np.testing.assert_allclose(smooth, savgol_filter(level, 7, 2), atol=1e-12)
 
 

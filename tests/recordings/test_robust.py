@@ -5,7 +5,7 @@ import pytest
 from scipy import optimize
 
 from bowdenfit.recordings import loop_strokes, rope_strokes
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.robust import robust_cost, robust_minimum
 
 pytestmark = pytest.mark.extended
@@ -58,13 +58,13 @@ def cycles(exponent: float, drag: float):
 def rope_model(generator):
     force_in, force_out = cycles(0.25, 3.0)
     noisy = [force + 0.2 * generator.normal(size=len(force)) for force in (force_in, force_out)]
-    return lambda p: rope_strokes._residuals(noisy[0], likely_input(noisy[0]), noisy[1], (0.2, 0.2), 40.0, p)
+    return lambda p: rope_strokes._residuals(noisy[0], smooth_input(noisy[0]), noisy[1], (0.2, 0.2), 40.0, p)
 
 
 def loop_model(generator):
     x = 60 * np.sin(np.linspace(0, 20, 900)) + 0.2 * generator.normal(size=900)
     y = loop_strokes.play_between(*loop_strokes.loop_limits(x, 12.0, 0.4), 0.0)[0] + 0.2 * generator.normal(size=900)
-    return lambda p: loop_strokes._residuals(x, likely_input(x), y, 40.0, 0.3, p)
+    return lambda p: loop_strokes._residuals(x, smooth_input(x), y, 40.0, 0.3, p)
 
 
 @pytest.mark.parametrize(

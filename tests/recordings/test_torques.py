@@ -32,7 +32,7 @@ def test_torques_over_the_radii_are_forces(tmp_path):
     found = load_dataset(torques).measurements.table(Recordings)
     assert forces is not None and found is not None
     for end in ("input_force", "output_force"):
-        one, other = (getattr(r.each[0].blocks, end) for r in (forces, found))
+        one, other = (getattr(r.items[0].blocks, end) for r in (forces, found))
         np.testing.assert_allclose(one, other, atol=1e-6)
 
 
@@ -46,7 +46,7 @@ def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
     path = folder_of(tmp_path, [mixed], cable=IN_RADIUS)
     found = load_dataset(path, channels=parse_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
     assert found is not None
-    assert found.each[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
+    assert found.items[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_torques_of_a_single_rope_are_forces_over_the_radii_too(tmp_path):
     found = load_dataset(path).measurements.table(Recordings)
     assert forces is not None and found is not None
     for end in ("input_force", "output_force"):
-        one, other = (getattr(r.each[0].blocks, end) for r in (forces, found))
+        one, other = (getattr(r.items[0].blocks, end) for r in (forces, found))
         np.testing.assert_allclose(one, other, atol=1e-6)
 
 

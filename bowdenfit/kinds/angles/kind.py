@@ -10,7 +10,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.file import Stated
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings
 from bowdenfit.kinds.plausibility import copies, without_runs
@@ -63,9 +63,9 @@ class AngleKind(PlannedKind[AngleTable]):
         table = read_table(path)
         wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
         found = find_columns(table, wanted, source.columns)
-        lengths = require(table, found, route.variable, f"{route.variable}_{route.unit}")
-        columns = [require(table, found, name, f"{name}_deg") for name in contacts]
-        cells = [c.each(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in columns]
+        lengths = require_column(table, found, route.variable, f"{route.variable}_{route.unit}")
+        columns = [require_column(table, found, name, f"{name}_deg") for name in contacts]
+        cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in columns]
         pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
         route_values, angle, limit = rounded(lengths.numbers()), pairs[..., 0].T, pairs[..., 1].T
         made = AngleTable(route_values, tuple(contacts), angle, limit, provenance_of(table))

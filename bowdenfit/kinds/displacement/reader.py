@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError, combine_errors
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import RawTable, read_csv
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, in_order, sliding
 from bowdenfit.kinds.rows import (
@@ -101,7 +101,7 @@ def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) 
         raise DatasetError(
             f"{table.file} has the columns {listed(named)}, which are both read as {name}; leave one out."
         )
-    return require(table, found, named[0] if named else name, f"{name}_{unit}")
+    return require_column(table, found, named[0] if named else name, f"{name}_{unit}")
 
 
 def _check_tensions(values: Vector, column: Column) -> None:

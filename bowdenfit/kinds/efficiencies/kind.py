@@ -8,7 +8,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiencies
 from bowdenfit.kinds.plausibility import GAIN_ERROR, Coarse, beyond, coarse, copies, places_along, without_runs
@@ -83,13 +83,13 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         table = read_table(path)
         names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
         found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
-        column = require(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
+        column = require_column(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
         sd, spread = [0.0] * len(table.rows), found.get("efficiency_sd")
         if spread is not None:
             beside = {cell.row: cell for cell in column.cells}
-            sd = spread.each(lambda c: 0.0 if c.blank else _efficiency_sd(c, spread, beside[c.row], column), 0.0)
+            sd = spread.read_cells(lambda c: 0.0 if c.blank else _efficiency_sd(c, spread, beside[c.row], column), 0.0)
         errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
-        efficiency = column.each(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
+        efficiency = column.read_cells(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
         rows = EfficiencyTable(
             read_route(table, found, route),
             np.array(efficiency),

@@ -75,12 +75,12 @@ def _of_table(table: ForceTable) -> RunDesign:
 
 
 def _of_recordings(recordings: Recordings) -> RunDesign | None:
-    used = [r.strokes.used_sliding & positive(r) for r in recordings.each]
+    used = [r.strokes.used_sliding & positive(r) for r in recordings.items]
     order = [i for i in np.argsort([u.sum() for u in used], kind="stable") if used[i].any()]
     if not order:
         return None
     middle = order[len(order) // 2]
-    recording, where = recordings.each[middle], used[middle]
+    recording, where = recordings.items[middle], used[middle]
     blocks, stroke = recording.blocks, recording.strokes.stroke
     worth = worth_of(recording, np.flatnonzero(where))
     return _joined(blocks.input_force[where], stroke[where], blocks.velocity[where], worth, BLOCK_NOISE)

@@ -11,7 +11,7 @@ from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, taken_in_pairs
+from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, find_columns
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import read_table
@@ -150,7 +150,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     group, remarks = tuple[str, ...](), list[str]()
     with table.faults.collect():
         group, remarks = read_groups(found, table.file, *groups)
-    remarks += taken_in_pairs(table, found, source.columns)
+    remarks += describe_paired_headings(table, found, source.columns)
     if "stroke" not in found:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
@@ -171,7 +171,7 @@ def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     """Velocities, NaN where blank or without a column, and their internal unit."""
     if column is None:
         return np.full(n_rows, np.nan), ""
-    values = np.array(column.each(lambda cell: np.nan if cell.blank else column.value(cell), np.nan))
+    values = np.array(column.read_cells(lambda cell: np.nan if cell.blank else column.value(cell), np.nan))
     return values, INTERNAL_UNITS[speed_dimension(column.unit or "mm/s")]
 
 
@@ -210,7 +210,7 @@ def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
 def _tensions(table: RawTable, found: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
     """Tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
     column = end_column(table, found, end)
-    return forces_of(np.array(column.each(partial(_force, column), np.nan)), table, found, end, pulleys)
+    return forces_of(np.array(column.read_cells(partial(_force, column), np.nan)), table, found, end, pulleys)
 
 
 def _force(column: Column, cell: Cell) -> float:

@@ -116,7 +116,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         preload = nothing
         if (column := found.get("preload")) is not None:
             preload = np.array(
-                column.each(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan)
+                column.read_cells(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan)
             )
         at, own = read_route(table, found, route), read_own_angles(table, found, contacts)
         table.faults.refuse()

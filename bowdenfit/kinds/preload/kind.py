@@ -5,7 +5,7 @@ from typing_extensions import override
 
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
-from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.columns import Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import within_factor
@@ -59,11 +59,11 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
         table = read_table(path)
         wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
         found = find_columns(table, wanted, source.columns, _UNUSED)
-        angles = require(table, found, "wrap_angle", "wrap_angle_deg")
-        preloads = require(table, found, "preload", "preload_N")
+        angles = require_column(table, found, "wrap_angle", "wrap_angle_deg")
+        preloads = require_column(table, found, "preload", "preload_N")
         rows = PreloadTable(
-            np.array(angles.each(lambda cell: read_angle(cell, angles), np.nan)),
-            np.array(preloads.each(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
+            np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan)),
+            np.array(preloads.read_cells(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
             provenance_of(table),
         )
         return TableFromFiles(rows, {path.name: path}, accounts=(table.account,))

@@ -18,10 +18,10 @@ from typing import Any, Literal
 import numpy as np
 
 from bowdenfit.cable.conditions import LEAST_SHARE
-from bowdenfit.cable.drive import Loop, Rope
+from bowdenfit.cable.drive import LoopDrive, RopeDrive
 from bowdenfit.description import Description
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, expected_forces
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import white_noise
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.types import Labels, Vector
@@ -75,9 +75,9 @@ def drift_of(recording: Recording) -> np.ndarray:
 
 
 def likely_forces(blocks: Blocks) -> tuple[Vector, Vector]:
-    """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `likely_input`."""
+    """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `smooth_input`."""
     each = (blocks.input_force, blocks.output_force)
-    likely_in, likely_out = (np.maximum(likely_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in each)
+    likely_in, likely_out = (np.maximum(smooth_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in each)
     return likely_in, likely_out
 
 
@@ -102,7 +102,7 @@ def standing_share(state: np.ndarray, force: np.ndarray) -> np.ndarray:
         return np.ones(0)
     phase = np.append(0, np.cumsum(np.diff(state) != 0))
     first = np.flatnonzero(np.append(True, np.diff(phase) != 0))
-    change = np.abs(np.diff(likely_input(force), prepend=force[0]))
+    change = np.abs(np.diff(smooth_input(force), prepend=force[0]))
     near = np.clip(first[:, None] + np.arange(-_CORNER, _CORNER + 1), 0, len(state) - 1)
     noise, turn = white_noise(force), np.max(change[near], axis=1) / 2
     known = np.maximum(noise**2 / np.maximum(noise**2 + turn**2, 1e-300), _LEAST_KNOWN)
@@ -205,7 +205,7 @@ class Thinned:
         """Whether a flag is set in each group."""
         return np.maximum.reduceat(flags, self.starts)
 
-    def arrays(self, drive: type[Rope | Loop], usable: np.ndarray, censored: bool) -> dict[str, Any]:
+    def arrays(self, drive: type[RopeDrive | LoopDrive], usable: np.ndarray, censored: bool) -> dict[str, Any]:
         """What every likelihood of blocks takes of them, but their weight.
 
         Args:
@@ -218,7 +218,7 @@ class Thinned:
             np.maximum(self.mean(force), drive.least_share * np.max(np.abs(force)))
             for force in (blocks.input_force, blocks.output_force)
         )
-        likely = self.mean(likely_input(blocks.input_force))
+        likely = self.mean(smooth_input(blocks.input_force))
         sliding = self.recording.strokes.contact[self.starts] != 0
         off = input_saturated(self.recording)
         lost = self.any_of(off)
@@ -271,7 +271,7 @@ def side_by_side(
         angles: `ROW_ARRAYS` of each.
     """
     runs = recordings.runs
-    run = np.array([runs.index(r.run) for r in recordings.each])
+    run = np.array([runs.index(r.run) for r in recordings.items])
     free = {name: beside([p[name] for p in parts], "constant") for name in _FREE}
     worth = free.pop("worth")
     counted = free["weight"] > 0

@@ -43,7 +43,7 @@ _UNDER_LOAD = 0.2  # of the largest force of a loop, above which it counts as lo
 
 def preparation_pages(recordings: Recordings) -> list[dict[str, Any]]:
     """Return a dictionary for each recording: its samples, its preparation and its phases, in s, N and Hz."""
-    return [_preparation(recording) for recording in recordings.each]
+    return [_preparation(recording) for recording in recordings.items]
 
 
 def _preparation(recording: Recording) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _preparation(recording: Recording) -> dict[str, Any]:
 def recordings_text(recordings: Recordings) -> list[str]:
     """What was done to the recordings, line by line."""
     pages = preparation_pages(recordings)
-    losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.each]
+    losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.items]
     rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
     lines = narrow_table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
     notes = [
@@ -169,15 +169,15 @@ class RecordingKind(FrictionKind[Recordings]):
     @override
     def describe_single_file(self, table: Recordings) -> str:
         """Return how long it is."""
-        length = sum(float(np.ptp(r.blocks.time)) for r in table.each if len(r.blocks.time))
+        length = sum(float(np.ptp(r.blocks.time)) for r in table.items if len(r.blocks.time))
         return f"a recording of {length:.3g} s"
 
     @override
     def count_readings(self, table: Recordings) -> str:
         """Return how many samples of how many recordings there are, in how many runs."""
-        blocks = sum(int(r.strokes.used_sliding.sum()) for r in table.each)
-        samples, runs = sum(r.account.samples for r in table.each), len(table.runs)
-        of = f"{counted(len(table.each), 'recording')} in {counted(runs, 'run')}"
+        blocks = sum(int(r.strokes.used_sliding.sum()) for r in table.items)
+        samples, runs = sum(r.account.samples for r in table.items), len(table.runs)
+        of = f"{counted(len(table.items), 'recording')} in {counted(runs, 'run')}"
         return f"{counted(samples, 'sample')} of {of} ({counted(blocks, 'sliding block')})"
 
     @override
@@ -187,17 +187,17 @@ class RecordingKind(FrictionKind[Recordings]):
     @override
     def forces(self, table: Recordings) -> Vector:
         """Return the forces at both ends; those of a loop under load, because its force passes through zero [N]."""
-        read = [force for r in table.each for force in (r.blocks.input_force, r.blocks.output_force)]
+        read = [force for r in table.items for force in (r.blocks.input_force, r.blocks.output_force)]
         return np.concatenate([f[f > _UNDER_LOAD * f.max()] for f in read] if table.loop else read)
 
     @override
     def speeds(self, table: Recordings) -> Vector:
-        return np.concatenate([np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in table.each])
+        return np.concatenate([np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in table.items])
 
     @override
     def typical_speeds(self, table: Recordings) -> list[float]:
         """Return the median speed of each recording."""
-        used = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in table.each]
+        used = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in table.items]
         return [float(np.nanmedian(speeds)) for speeds in used if np.isfinite(speeds).any()]
 
     @override
@@ -251,7 +251,7 @@ class RecordingKind(FrictionKind[Recordings]):
         if route is None or angles is None:
             return
         curved = [table.columns.index(c.wrap_angle.column) for c in description.curved if c.wrap_angle.column]
-        for recording in table.each:
+        for recording in table.items:
             outside = not route.range[0] <= recording.route <= route.range[1]
             if outside and not np.isfinite(recording.own_angle[curved]).all() and recording.route not in angles.route:
                 raise DatasetError(
@@ -266,7 +266,7 @@ class RecordingKind(FrictionKind[Recordings]):
         """Look for recordings of noisy cells whose forces are all the same; files may have other names and clocks."""
         first_with: dict[bytes, str] = {}
         copied = []
-        for recording in table.each:
+        for recording in table.items:
             forces = np.concatenate([recording.blocks.input_force, recording.blocks.output_force])
             name = first_with.setdefault(forces.tobytes(), recording.name)
             if name != recording.name and min(recording.account.noise) > NO_NOISE * np.abs(forces).max():
@@ -278,7 +278,7 @@ class RecordingKind(FrictionKind[Recordings]):
     @override
     def why_implausible(self, measured: Recordings, simulated: Recordings) -> str:
         """Return that recordings hardly slide, are nothing but noise, or of an efficiency that no bench reads."""
-        for one, other in zip(measured.each, simulated.each, strict=True):
+        for one, other in zip(measured.items, simulated.items, strict=True):
             for stroke in (PULL, RETURN):
                 before, after = (
                     int(np.sum(r.strokes.used_sliding & (r.strokes.stroke == stroke))) for r in (one, other)
@@ -287,7 +287,7 @@ class RecordingKind(FrictionKind[Recordings]):
                     return "a recording hardly slides"
             if other.strokes.noise > max(FACTOR * one.strokes.noise, SCATTER if not measured.loop else 0.0):
                 return "a recording is nothing but noise"
-        exponents = np.array([r.strokes.exponent for r in simulated.each])
+        exponents = np.array([r.strokes.exponent for r in simulated.items])
         return beyond(exponents[np.isfinite(exponents)], "the efficiency of a recording")
 
 

@@ -175,9 +175,9 @@ class RecordingsTable(TableSettings):
 
 def recorded_angles(recordings: Recordings) -> RowConditions:
     """Route values and own angles, one row a recording."""
-    shape = (len(recordings.each), len(recordings.columns))
-    angle, sd = (np.array([getattr(r, n) for r in recordings.each]).reshape(shape) for n in ("own_angle", "own_sd"))
-    return RowConditions(np.array([r.route for r in recordings.each]), OwnAngles(recordings.columns, angle, sd))
+    shape = (len(recordings.items), len(recordings.columns))
+    angle, sd = (np.array([getattr(r, n) for r in recordings.items]).reshape(shape) for n in ("own_angle", "own_sd"))
+    return RowConditions(np.array([r.route for r in recordings.items]), OwnAngles(recordings.columns, angle, sd))
 
 
 def read_recordings(source: Source) -> TableFromFiles[Recordings]:
@@ -351,7 +351,7 @@ def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndar
 def _check_placed(recordings: Recordings, description: Description) -> None:
     """Refuse a recording that cannot be given a wrap angle in every contact."""
     route = description.route
-    for recording in recordings.each:
+    for recording in recordings.items:
         for contact in description.contact:
             column = contact.wrap_angle.column
             if column is None or np.isfinite(recording.own_angle[recordings.columns.index(column)]):

@@ -13,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.conditions import LEAST_SHARE
-from bowdenfit.cable.drive import Loop, Rope, drive_of
+from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import beside
 from bowdenfit.kinds.recordings.reader import recorded_angles
 from bowdenfit.kinds.term import Truth
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 
@@ -39,17 +39,17 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(truth.key, 4), 4)
     angles, variance = truth.wrap_angles(recorded_angles(recordings))
     error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
-    run = np.array([recordings.runs.index(r.run) for r in recordings.each])
+    run = np.array([recordings.runs.index(r.run) for r in recordings.items])
     mounting = values[RUN_SCATTER] * truth.scatter(of_run, (len(recordings.runs),))[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
-    force = jnp.asarray(beside([likely_input(r.blocks.input_force) for r in recordings.each]))
-    velocity = jnp.asarray(beside([r.blocks.velocity for r in recordings.each]))
-    cells, drive = LoadCells.of(values), drive_of(cable, values, angles, velocity, exponent)
+    force = jnp.asarray(beside([smooth_input(r.blocks.input_force) for r in recordings.items]))
+    velocity = jnp.asarray(beside([r.blocks.velocity for r in recordings.items]))
+    cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
-    places = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.each]).astype(int)
-    fewer = jnp.asarray(beside([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.each]))
-    shape, noise = (places.max() + 1, len(recordings.each)), scale * values[BLOCK_NOISE] * fewer
+    places = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]).astype(int)
+    fewer = jnp.asarray(beside([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.items]))
+    shape, noise = (places.max() + 1, len(recordings.items)), scale * values[BLOCK_NOISE] * fewer
     noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
     errors = [sd * jax.random.normal(k, shape)[places, np.arange(shape[1])] for sd, k in noises]
     return {
@@ -60,11 +60,11 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     }
 
 
-def _starts(drive: Rope | Loop, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
+def _starts(drive: RopeDrive | LoopDrive, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
     """Where the operator starts: a rope where it was in its band when measured, a loop at the force that was measured."""
-    if isinstance(drive, Loop):
-        return jnp.array([r.blocks.output_force[0] for r in recordings.each])
-    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start(r) for r in recordings.each])
+    if isinstance(drive, LoopDrive):
+        return jnp.array([r.blocks.output_force[0] for r in recordings.items])
+    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start(r) for r in recordings.items])
 
 
 def _start(recording: Recording) -> float:
@@ -110,14 +110,14 @@ def recorded_again(description: Description, recordings: Recordings, drawn: Mapp
         DatasetError: Strokes cannot be found.
     """
     each = []
-    for i, recording in enumerate(recordings.each):
+    for i, recording in enumerate(recordings.items):
         n, time = len(recording.blocks.time), recording.blocks.time
         shown, error = drawn["output_force"][:n, i], drawn["output_error"][:n, i]
         late = shown - float(drawn["delay_error"]) * np.gradient(shown, time)
         blocks = replace(recording.blocks, input_force=drawn["input_force"][:n, i], output_force=late + error)
         strokes = _strokes(description, recording, blocks)
         each.append(replace(recording, blocks=blocks, strokes=strokes))
-    return replace(recordings, each=tuple(each))
+    return replace(recordings, items=tuple(each))
 
 
 def _strokes(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
@@ -137,7 +137,7 @@ def refuse_saturated(recordings: Recordings) -> None:
     Raises:
         DatasetError: There are such; which ones would be with another friction is not known from blocks.
     """
-    for recording in recordings.each:
+    for recording in recordings.items:
         if recording.blocks.saturated.any():
             raise DatasetError(
                 f"{recording.file}: {int(recording.blocks.saturated.sum())} blocks of the recording {recording.name!r} are at "

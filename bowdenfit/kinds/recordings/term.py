@@ -62,16 +62,16 @@ def recordings_term(
         censored = settings is not None and _censored(settings, recordings)
         return loop_recordings_term(cable, recordings, rows, labels, censored)
     if settings is None or settings.likelihood == "runs":
-        parts = [sliding_blocks(r, cable.description) for r in recordings.each]
+        parts = [sliding_blocks(r, cable.description) for r in recordings.items]
         _needs_blocks(recordings, parts)
         blocks = _rows(recordings, parts, rows)
         return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
-    for recording in recordings.each:
+    for recording in recordings.items:
         _needs_reversal(recording)
     censored, noise_ratio = _censored(settings, recordings), cable.description.sensors.noise_ratio
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
-        parts = [_all_blocks(r, noise_ratio) for r in recordings.each]
+        parts = [_all_blocks(r, noise_ratio) for r in recordings.items]
         _needs_blocks(recordings, parts)
         blocks = _rows(recordings, parts, rows)
         return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
@@ -80,12 +80,12 @@ def recordings_term(
 
 def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
     """Whether readings at the end of the range count as ones beyond it, and there are any."""
-    return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.each)
+    return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.items)
 
 
 def _label(cable: Cable, recordings: Recordings, run: str) -> str:
     """Name of a run, with its route value where it has just one and does not say it itself."""
-    route, at = cable.description.route, {r.route for r in recordings.each if r.run == run}
+    route, at = cable.description.route, {r.route for r in recordings.items if r.run == run}
     where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
     return f"{run} ({where})" if where and where not in run else run
 
@@ -93,8 +93,8 @@ def _label(cable: Cable, recordings: Recordings, run: str) -> str:
 def _needs_blocks(recordings: Recordings, parts: list[BlocksUsed]) -> None:
     """Every run must have something that the likelihood can use."""
     for run in recordings.runs:
-        mine = [r for r in recordings.each if r.run == run]
-        if not any(len(p.used) for r, p in zip(recordings.each, parts, strict=True) if r.run == run):
+        mine = [r for r in recordings.items if r.run == run]
+        if not any(len(p.used) for r, p in zip(recordings.items, parts, strict=True) if r.run == run):
             under_tension = np.concatenate([positive(r) for r in mine]).mean() > _MOSTLY
             why = _NO_SLIDING if under_tension else _NO_TENSION
             raise DatasetError(
@@ -170,13 +170,13 @@ def _rows(recordings: Recordings, parts: list[BlocksUsed], angles: Mapping[str, 
     def joined(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    pairs = list(zip(recordings.each, parts, strict=True))
+    pairs = list(zip(recordings.items, parts, strict=True))
     return SlidingRows(
         joined("input_force"),
         joined("output_force"),
         joined("log_ratio"),
         joined("stroke").astype(int),
-        np.array([runs.index(r.run) for r in recordings.each])[of_recording],
+        np.array([runs.index(r.run) for r in recordings.items])[of_recording],
         np.concatenate([r.blocks.velocity[p.used] for r, p in pairs]),
         np.concatenate([p.stroke * drift_of(r)[p.used] for r, p in pairs]),
         joined("worth"),

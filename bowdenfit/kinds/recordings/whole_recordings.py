@@ -16,7 +16,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.drive import Each, Loop, Recorded, Rope, drive_of
+from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive, make_drive
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import (
@@ -90,7 +90,7 @@ class BlocksTerm(ABC):
     reading_noise: str = BLOCK_NOISE
 
     @abstractmethod
-    def _first_guess(self, drive: Any, data: Data) -> tuple[Each, Each]:
+    def _first_guess(self, drive: Any, data: Data) -> tuple[PerRecording, PerRecording]:
         """Mounting effect of each recording by its own hysteresis, and how far from it a better one is looked for [1]."""
 
     @property
@@ -111,16 +111,18 @@ class BlocksTerm(ABC):
         }
         return self.data | long
 
-    def _per_run(self, data: Data, blocks: Recorded) -> Float[Array, " runs"]:
+    def _per_run(self, data: Data, blocks: PerTime) -> Float[Array, " runs"]:
         """Sum over the blocks of each run."""
         return jnp.zeros_like(data["n"]).at[data["run"]].add(jnp.sum(blocks, axis=0))
 
     def _drive(self, values: Values, data: Data) -> tuple[Any, Array, Array]:
         """The cable as it lies in each recording, its wrap angles and their variances."""
         angles, variance = resolve_angles(self.cable, values, data)
-        return drive_of(self.cable, values, angles, data["velocity"]), angles, variance
+        return make_drive(self.cable, values, angles, data["velocity"]), angles, variance
 
-    def _followed(self, drive: Rope | Loop, cells: LoadCells, data: Data, mounting: Each) -> tuple[Recorded, Recorded]:
+    def _followed(
+        self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
+    ) -> tuple[PerTime, PerTime]:
         """Deviation of the readings from the operator's output, and the output's derivative by the exponent."""
         stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
         force = cells.true_input(data["likely_force"], drive.least_force)
@@ -141,7 +143,9 @@ class BlocksTerm(ABC):
         of_angles = self.cable.exponent_variance(weights, angles, variance)
         return self._mounted(data, weights, deviation + loading * guess, loading, of_angles)
 
-    def _mounted(self, data: Data, weights: Values, deviation: Recorded, loading: Recorded, of_angles: Each) -> Mounted:
+    def _mounted(
+        self, data: Data, weights: Values, deviation: PerTime, loading: PerTime, of_angles: PerRecording
+    ) -> Mounted:
         """The mounting effect of each run in closed form.
 
         Args:
@@ -158,7 +162,7 @@ class BlocksTerm(ABC):
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
         return Mounted(deviation - loading * effect[data["run"]], effect, sd, total)
 
-    def _beyond(self, data: Data, found: Mounted, noise: Array) -> Recorded:
+    def _beyond(self, data: Data, found: Mounted, noise: Array) -> PerTime:
         """How far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
         return data["censored"] * -found.within * data["newtons"] / noise
 
@@ -199,13 +203,13 @@ class WholeRecordingsTerm(BlocksTerm):
     name: str = RECORDED
     unit: str = "1"
 
-    def _first_guess(self, drive: Rope, data: Data) -> tuple[Each, Each]:
+    def _first_guess(self, drive: RopeDrive, data: Data) -> tuple[PerRecording, PerRecording]:
         guess = jnp.zeros_like(drive.exponent)
         if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
             guess = data["exponent"] - self._typical(drive, data)
         return guess, _ROPE_REACH * jnp.asarray(data["exponent"])
 
-    def _typical(self, drive: Rope, data: Data) -> Each:
+    def _typical(self, drive: RopeDrive, data: Data) -> PerRecording:
         """Friction exponent of each recording at its mean speed [1]."""
         return drive.exponent * drive.friction.rate(drive.values, data["speed"])
 
@@ -238,12 +242,12 @@ def pad_recordings(
 
     The noise ratio is that of the input over that of the output.
     """
-    data = side_by_side(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.each], angles)
-    speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.each]
+    data = side_by_side(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.items], angles)
+    speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.items]
     return data | {
         "reading": np.log(data["output_force"]),
         "newtons": data["output_force"],
-        "exponent": np.array([r.strokes.exponent for r in recordings.each]),
+        "exponent": np.array([r.strokes.exponent for r in recordings.items]),
         "speed": np.array([float(speed.mean()) if len(speed) else float("nan") for speed in speeds]),
     }
 
@@ -251,7 +255,7 @@ def pad_recordings(
 def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
-    arrays = groups.arrays(Rope, positive(recording), censored)
+    arrays = groups.arrays(RopeDrive, positive(recording), censored)
     likely_in, likely_out = (groups.mean(force) for force in likely_forces(recording.blocks))
     of_input = noise_ratio * (recording.strokes.contact[groups.starts] != 0)
     return arrays | {"weight": arrays["worth"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}
@@ -273,7 +277,7 @@ class LoopRecordingsTerm(BlocksTerm):
     name: str = RECORDED_LOSS
     unit: str = "N"
 
-    def _first_guess(self, drive: Loop, data: Data) -> tuple[Each, Each]:
+    def _first_guess(self, drive: LoopDrive, data: Data) -> tuple[PerRecording, PerRecording]:
         """That with which the loop is as wide as the recording's own; none where that is not known."""
         least = _LEAST_PRELOAD * self.cable.friction.conditions.load.value
         by_loss = data["loss"] / (2 * jnp.maximum(drive.preload, least))
@@ -281,7 +285,9 @@ class LoopRecordingsTerm(BlocksTerm):
         guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
         return guess, _LOOP_REACH * (drive.exponent + guess)
 
-    def _lost(self, values: Values, data: Data, drive: Loop, more: Each | float = 0.0) -> Float[Array, " runs"]:
+    def _lost(
+        self, values: Values, data: Data, drive: LoopDrive, more: PerRecording | float = 0.0
+    ) -> Float[Array, " runs"]:
         """Mean force lost in the blocks that move [N], with more friction exponent than the cable's."""
         cells, force = LoadCells.of(values), data["input_force"]
         stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
@@ -323,11 +329,11 @@ def loop_recordings_term(
         censored: Whether a saturated output counts as one beyond the end of the range.
     """
     noise_ratio = cable.description.sensors.noise_ratio
-    parts = [_loop_blocks(r, censored, noise_ratio) for r in recordings.each]
+    parts = [_loop_blocks(r, censored, noise_ratio) for r in recordings.items]
     data = side_by_side(recordings, parts, angles)
     moving = beside([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
-    loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.each]) for name in ("drag", "exponent"))
+    loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.items]) for name in ("drag", "exponent"))
     return LoopRecordingsTerm(
         cable,
         data
@@ -350,7 +356,7 @@ def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> di
     `moving` is the number of samples that show the loss, with the sign of the motion.
     """
     blocks, strokes, groups = recording.blocks, recording.strokes, group_blocks(recording)
-    arrays = groups.arrays(Loop, ~blocks.saturated, censored)
+    arrays = groups.arrays(LoopDrive, ~blocks.saturated, censored)
     stroke = strokes.stroke[groups.starts]
     used = strokes.used_sliding & ~blocks.saturated
     return arrays | {

@@ -13,7 +13,7 @@ from bowdenfit.description.file import Stated
 from bowdenfit.description.values import QuantityValue
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Kind, Readings
@@ -94,7 +94,7 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
             f"{table.file} needs the angle of the joint (angle_deg), or the torque in the rope (torque_N_m), and has "
             f"{'both; leave one of the two columns out' if 'angle' in found else 'neither'}."
         )
-    clock = require(table, found, "time", "time_s")
+    clock = require_column(table, found, "time", "time_s")
     time = np.asarray(clock.numbers())
     is_torque = "torque" in found
     reading = np.asarray(found["torque" if is_torque else "angle"].numbers()) / (1000.0 if is_torque else 1.0)

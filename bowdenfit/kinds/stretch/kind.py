@@ -9,7 +9,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
@@ -63,11 +63,11 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
     found = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)
     check_spelling(table, found, optional)
     loads, angles, stretches = (
-        require(table, found, name, f"{name}_{unit}")
+        require_column(table, found, name, f"{name}_{unit}")
         for name, unit in (("load", "N"), ("wrap_angle", "deg"), ("stretch", "mm"))
     )
-    load = np.array(loads.each(lambda cell: read_tension(cell, loads, "a load"), np.nan))
-    wrap_angle = np.array(angles.each(lambda cell: read_angle(cell, angles), np.nan))
+    load = np.array(loads.read_cells(lambda cell: read_tension(cell, loads, "a load"), np.nan))
+    wrap_angle = np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan))
     stretch = stretches.numbers()
     unloading = _branches(found.get("branch"), len(load))
     table.faults.refuse()
@@ -102,7 +102,7 @@ def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[s
 def _branches(column: Column | None, n_rows: int) -> Flags:
     if column is None:
         return np.zeros(n_rows, dtype=bool)
-    return np.array(column.each(_branch, False), dtype=bool)
+    return np.array(column.read_cells(_branch, False), dtype=bool)
 
 
 def _branch(cell: Cell) -> bool:

@@ -11,7 +11,7 @@ from jax import Array
 from bowdenfit.cable.drive import LEAST_EXPONENT
 from bowdenfit.cable.elasticity import PRELOAD
 from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.description.device import Device, asked_for
+from bowdenfit.description.device import Device, missing_settings
 from bowdenfit.errors import DatasetError, DescriptionError, UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.physics.loop import free_motion_loss, slack_load
@@ -138,7 +138,7 @@ def _pulley_radius(fit: Record, device: Device | None) -> float:
     cable_radius = fit.dataset.description.cable.output_pulley_radius
     stated = device.known(RADIUS).get(RADIUS) if device is not None else None
     if cable_radius is None and stated is None:
-        raise asked_for("the torque at the joint", [RADIUS])
+        raise missing_settings("the torque at the joint", [RADIUS])
     if cable_radius is None and stated is not None:
         return stated.value * 1e3
     assert cable_radius is not None
@@ -156,7 +156,7 @@ def _mounting_scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
     if RUN_SCATTER in {p.name for p in fit.model.space.parameters}:
         return _typical_value(fit, RUN_SCATTER), True
     if device is None or not device.states(SCATTER):
-        raise asked_for(
+        raise missing_settings(
             "this fit has one mounting of the cable and cannot tell how the next one will differ; what is safe in the next",
             [SCATTER],
         )

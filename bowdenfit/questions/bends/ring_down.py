@@ -51,7 +51,7 @@ def device_with_ring_down(fit: Record, path: Path) -> Device:
             f"device.toml, {RINGDOWN}: the fit of {ring_down.name} is not to be trusted "
             f"({listed(ring_down.reasons)}); sample longer."
         )
-    return device.told(_known_from_ring_down(ring_down, device))
+    return device.with_fitted(_known_from_ring_down(ring_down, device))
 
 
 def _known_from_ring_down(ring_down: Record, device: Device) -> dict[str, Known]:

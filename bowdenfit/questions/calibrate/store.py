@@ -7,7 +7,7 @@ from typing import Any
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.engines import JOBS_FOLDER
-from bowdenfit.inputs import or_damaged
+from bowdenfit.inputs import damage_as
 from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (
     DETAILS_TEXT,
@@ -105,7 +105,7 @@ def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, 
     # A line that was being written when the program was stopped is made again.
     with folder_to_write(path.parent):
         write_text(path, "".join(json.dumps(line) + "\n" for line in (earlier, *pages)))
-    with or_damaged(_damaged_error(path)):
+    with damage_as(_damaged_error(path)):
         replications = [deserialize(Replication, page) for page in pages]
         if not (
             all(map(_is_valid, replications))

@@ -50,7 +50,7 @@ def describe_recording_file(
     if recordings is not None:
         lines += ["", *recordings_text(recordings)]
         lines += [
-            filled(f"Note: {remark}") for r in recordings.each for remark in (*r.account.remarks, *r.strokes.remarks)
+            filled(f"Note: {remark}") for r in recordings.items for remark in (*r.account.remarks, *r.strokes.remarks)
         ]
     elif obstacle:
         lines += ["", *map(filled, f"As a recording it cannot be used yet: {obstacle}".splitlines())]

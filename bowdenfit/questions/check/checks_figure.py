@@ -19,7 +19,7 @@ from bowdenfit.plots.style import (
     WIDE,
     in_paper_style,
 )
-from bowdenfit.words import counted, percent
+from bowdenfit.words import capitalized, counted, percent
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -141,7 +141,7 @@ def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure
             _distribution(here[0], table)
         for axes, (label, numbers) in zip(here[bool(len(table.at)) :], table.numbers.items(), strict=True):
             _deviations(axes, table, label, numbers)
-        here[0].set_title(f"{table.name.capitalize()}: {counted(len(table.labels), 'reading')}", loc="left")
+        here[0].set_title(f"{capitalized(table.name)}: {counted(len(table.labels), 'reading')}", loc="left")
         used += here
     legend_above(figure, used, columns=3)
     return figure

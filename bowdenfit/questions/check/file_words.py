@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from bowdenfit.dataset import Dataset
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, candidates
+from bowdenfit.files.matching import Quantity, find_candidates
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.file_kind import FileKind, columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, columns_of
@@ -85,7 +85,7 @@ def _kind_in_words(raw: RawTable, data: Dataset | None) -> str:
 
 def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
     """Every column: its unit, what it is read as, and its range."""
-    can_be = candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
+    can_be = find_candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
     read_as = dict(named)
     for quantity, columns in can_be.items():
         for candidate in columns:

@@ -131,7 +131,7 @@ def _where_low_and_high(departure: Departure, groups: Sequence[str]) -> tuple[st
         return "in the first third of the readings", "in the last third"
     name, _, unit = departure.against.rstrip(")").partition(" (")
     low, high = (f"{float(f'{value:.3g}'):g}{f' {unit}' if unit else ''}" for value in (departure.low, departure.high))
-    return f"around a {name.lower()} of {low}", f"around {high}"
+    return f"around a {name[:1].lower()}{name[1:]} of {low}", f"around {high}"
 
 
 def _suggest_remedy(fit: Record, departure: Departure) -> str:

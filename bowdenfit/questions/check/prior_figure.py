@@ -18,7 +18,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
-from bowdenfit.words import counted
+from bowdenfit.words import capitalized, counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -84,7 +84,7 @@ def _readings(axes: Axes, table: PriorTable) -> None:
     _scale(axes, table)
     if np.all(table.numbers == np.round(table.numbers)):
         axes.locator_params(axis="x", integer=True)
-    axes.set_title(table.name.capitalize())
+    axes.set_title(capitalized(table.name))
     axes.set(xlabel=table.place, ylabel=table.label)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import bowdenfit.questions.compensate.words  # noqa: F401  registers the text of the answer
 from bowdenfit.arguments import Bends
-from bowdenfit.description.device import ENCODER, Device, Known, asked_for
+from bowdenfit.description.device import ENCODER, Device, Known, missing_settings
 from bowdenfit.device.draws import draw_device
 from bowdenfit.device.limits import safe_shares
 from bowdenfit.device.motion import (
@@ -157,7 +157,7 @@ def simulate_devices(
         *device.lacking(*keys, *needs_stiffness),
         *([ENCODER] if device.controller.encoder_counts is None else []),
     ]:
-        raise asked_for("a simulation", missing)
+        raise missing_settings("a simulation", missing)
     assert loop.stiffness is not None
     n = len(loop.friction)
     stated = device.known(*keys)
@@ -266,5 +266,5 @@ def answer_compensation(
     if not simulate:
         return answer
     if description is None:
-        raise asked_for("a simulation", NEEDED)
+        raise missing_settings("a simulation", NEEDED)
     return replace(answer, simulated=simulate_devices(fit, description, loop, answer, schedule))

@@ -13,7 +13,7 @@ from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError, DescriptionError, StoreError, UsageError
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require
+from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.naming import parse_sources
 from bowdenfit.files.tables import read_table
@@ -116,12 +116,16 @@ def _read_inspection_table(path: Path) -> list[Inspection]:
     texts = ("cable", "file", "lubricated", *_TEMPERATURES)
     columns = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
     cables = [
-        cell.text.strip() for cell in require(table, columns, "cable", "cable").each(_require_text, _blank(table))
+        cell.text.strip()
+        for cell in require_column(table, columns, "cable", "cable").read_cells(_require_text, _blank(table))
     ]
-    files = [cell.text.strip() for cell in require(table, columns, "file", "file").each(_require_text, _blank(table))]
+    files = [
+        cell.text.strip()
+        for cell in require_column(table, columns, "file", "file").read_cells(_require_text, _blank(table))
+    ]
     unknown = [UNKNOWN] * len(table.rows)
-    cycles = columns["cycles"].each(_parse_cycles, UNKNOWN) if "cycles" in columns else unknown
-    lubricated = columns["lubricated"].each(_parse_flag, UNKNOWN) if "lubricated" in columns else unknown
+    cycles = columns["cycles"].read_cells(_parse_cycles, UNKNOWN) if "cycles" in columns else unknown
+    lubricated = columns["lubricated"].read_cells(_parse_flag, UNKNOWN) if "lubricated" in columns else unknown
     temperature = _parse_temperatures(table, columns) or unknown
     table.faults.refuse()
     rows = [row[0].row for row in table.rows]
@@ -175,7 +179,7 @@ def _parse_temperatures(table: RawTable, columns: dict[str, Column]) -> list[flo
             raise cell.refuse(f"{cell.shown} is no temperature at which a cable is inspected; correct it, or its unit.")
         return value
 
-    return columns[headings[0]].each(read, UNKNOWN) if headings else []
+    return columns[headings[0]].read_cells(read, UNKNOWN) if headings else []
 
 
 def _refuse_duplicates(numbered: Sequence[tuple[Inspection, str]]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.engines import JOBS_FOLDER
-from bowdenfit.inputs import or_damaged
+from bowdenfit.inputs import damage_as
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.results.folder import (
     SUMMARY_TEXT,
@@ -94,7 +94,7 @@ class FleetStore:
     def _read_finished(self) -> dict[str, PieceFit]:
         """Return the fits of a finished fleet."""
         draws, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
-        with or_damaged(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
+        with damage_as(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
             return self._as_fits(draws)
 
     def _as_fits(self, draws: FleetDraws) -> dict[str, PieceFit]:
@@ -115,7 +115,7 @@ class FleetStore:
         for path in sorted((self.folder / PIECES_FOLDER).glob("*.npz")):
             damaged = StoreError(f"{path} is damaged")
             try:
-                with or_damaged(damaged):
+                with damage_as(damaged):
                     fits: Sequence[PieceFit] = read_arrays(path, {_FITS: tuple[PieceFit, ...]})[_FITS]
                     if not all(_is_valid(fit) for fit in fits):
                         raise damaged
@@ -170,7 +170,7 @@ def read_start(folder: Path) -> dict[str, Any]:
     for path in (folder / PIECES_FOLDER / START_FILE, folder / FLEET_PAGE):
         if path.exists():
             page = read_page(path)
-            with or_damaged(StoreError(f"{path} is damaged; start over with --force.")):
+            with damage_as(StoreError(f"{path} is damaged; start over with --force.")):
                 refuse_invalid_seed(page["seed"])
                 return dict(page)
     raise StoreError(f"{folder} holds no fleet to resume; leave --resume out.")

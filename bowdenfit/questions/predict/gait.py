@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
-from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.columns import Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
@@ -105,8 +105,8 @@ def _read_gait(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray |
     table = read_table(path)
     named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
     columns = find_columns(table, (Quantity("wrap_angle", "angle"), Quantity("moment_arm", "length")), named)
-    source = require(table, columns, "wrap_angle", "wrap_angle_deg")
-    angles = np.array(source.each(lambda cell: read_angle(cell, source), np.nan))
+    source = require_column(table, columns, "wrap_angle", "wrap_angle_deg")
+    angles = np.array(source.read_cells(lambda cell: read_angle(cell, source), np.nan))
     arms = np.array(columns["moment_arm"].numbers()) if "moment_arm" in columns else None
     table.faults.refuse()
     if not len(angles):
@@ -179,7 +179,7 @@ def _forces_over_gait(
 ) -> dict[str, np.ndarray]:
     """Forces at the other end [N] of every draw (rows) at route values (columns): the mean, in a new mounting, and the ends."""
     model, cable = fit.model, fit.model.cable
-    function: Callable[..., Array] = cable.input_force_bent if inverse else cable.output_force_bent
+    function: Callable[..., Array] = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 
     def average_over_gait(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> dict[str, Array]:
         angles = cable.wrap_angles(values, at)

@@ -26,7 +26,7 @@ from bowdenfit.plots.style import (
     in_paper_style,
 )
 from bowdenfit.questions.recorded.dependences import Dependence, dependences
-from bowdenfit.words import counted
+from bowdenfit.words import capitalized, counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -70,7 +70,7 @@ def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Fig
         axes.set_xlabel(one.label)
         if one.note:
             axes.text(0.97, 0.05, one.note, transform=axes.transAxes, ha="right", va="bottom", fontsize=SMALL)
-        axes.set_title(" ".join(filter(None, (one.what.capitalize(), one.place))))
+        axes.set_title(" ".join(filter(None, (capitalized(one.what), one.place))))
         if i % columns == 0:
             axes.set_ylabel(EFFICIENCY)
     low, high = span(

@@ -66,7 +66,7 @@ def dependences(fit: Record) -> tuple[Dependence, ...] | None:
     if recordings is None or not friction.options:
         return None
     (at, place), found_dependences = usual_length(fit), []
-    recordings_here = [r for r in recordings.each if not place or r.route == at]
+    recordings_here = [r for r in recordings.items if not place or r.route == at]
     if friction.depends_on_load:
         points = [_points_by_load(r) for r in recordings_here if _is_pulling(r).any()]
         forces = np.concatenate([r.blocks.input_force[_is_pulling(r)] for r in recordings_here])

@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.drive import Loop, Rope, drive_of
+from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.recordings.blocks import beside
@@ -17,7 +17,7 @@ from bowdenfit.kinds.recordings.reader import recorded_angles
 from bowdenfit.kinds.row_angles import resolve_angles, row_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.recording import Recordings
 
 DRAWS = 200  # enough for the edges of a band
@@ -41,7 +41,7 @@ class RecordingFollower:
     def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
         self._data = _block_arrays(model, recordings, angles)
         values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
-        mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.each)), jnp.float64)
+        mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.items)), jnp.float64)
         function = jax.vmap(_follow_function(model), in_axes=(0, 0, None))
         self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
 
@@ -60,16 +60,16 @@ class RecordingFollower:
 
 def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
     """Blocks of all recordings side by side, the shorter ones standing still at their end."""
-    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.each]
-    chosen = list(zip(recordings.each, shown, strict=True))
-    drive = Loop if model.cable.is_loop else Rope
+    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.items]
+    chosen = list(zip(recordings.items, shown, strict=True))
+    drive = LoopDrive if model.cable.is_loop else RopeDrive
     rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
     rows = row_angles(model.description, recorded_angles(recordings), angles).data
     held = {
         name: beside([getattr(r.blocks, name)[s] for r, s in chosen])
         for name in ("input_force", "output_force", "velocity")
     }
-    likely = beside([likely_input(r.blocks.input_force)[s] for r, s in chosen])
+    likely = beside([smooth_input(r.blocks.input_force)[s] for r, s in chosen])
     return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
 
 
@@ -77,7 +77,7 @@ def _follow_function(model: Model) -> Callable[[Mapping[str, Array], Array, Mapp
     """Function of one draw's values, of mounting effects and of the blocks."""
 
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
-        drive = drive_of(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
+        drive = make_drive(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
         output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)

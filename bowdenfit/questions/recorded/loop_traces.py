@@ -34,7 +34,7 @@ def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
     angle = angles.sum(axis=1) if contact is None else angles[:, contact]
     order = np.argsort(angle, kind="stable")
     for group in np.split(order, np.flatnonzero(np.diff(angle[order]) > _SAME_ANGLE) + 1):
-        parts += [_recording_points(float(angle[group].mean()), recordings.each[i]) for i in group.tolist()]
+        parts += [_recording_points(float(angle[group].mean()), recordings.items[i]) for i in group.tolist()]
     return np.concatenate(parts, axis=1)
 
 

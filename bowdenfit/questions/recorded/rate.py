@@ -83,7 +83,7 @@ def usual_length(fit: Record) -> tuple[float, str]:
     route, recordings = fit.dataset.description.route, fit.dataset.measurements.table(Recordings)
     if route is None:
         return 0.0, ""
-    recorded = recordings.each if recordings is not None else ()
+    recorded = recordings.items if recordings is not None else ()
     values = [r.route for r in recorded if route.range[0] <= r.route <= route.range[1]]
     at = max(set(values), key=values.count) if values else route.middle
     return at, f"at {at:g} {route.unit}"

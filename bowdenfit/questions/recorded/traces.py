@@ -79,7 +79,7 @@ def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
         predicted, exponent = _predicted(fit, recordings, follower)
         fitted = _fitted(fit, recordings, follower)
     recording_traces = []
-    for i, recording in enumerate(recordings.each):
+    for i, recording in enumerate(recordings.items):
         block_numbers = choose_blocks(len(recording.blocks.time))
         forces = predicted[:, : len(block_numbers), i], fitted[: len(block_numbers), i]
         recording_traces.append(RecordingTrace(recording, recordings.loop, block_numbers, *forces, exponent[:, i]))
@@ -88,7 +88,7 @@ def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
 
 def _predicted(fit: Record, recordings: Recordings, follower: RecordingFollower) -> tuple[np.ndarray, np.ndarray]:
     """Quantiles of the output force with a new mounting, and of the friction exponent without."""
-    values, n = thinned_parameter_values(fit, DRAWS), len(recordings.each)
+    values, n = thinned_parameter_values(fit, DRAWS), len(recordings.items)
     if fit.sampled is None:
         force, exponent = follower(values, np.zeros((DRAWS, n)))
         return force[:1], exponent[:1]
@@ -104,9 +104,9 @@ def _fitted(fit: Record, recordings: Recordings, follower: RecordingFollower) ->
     """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
     center = {name: np.full(DRAWS, np.median(draws)) for name, draws in thinned_parameter_values(fit, DRAWS).items()}
     grid = np.linspace(-_MAX_MOUNTING, _MAX_MOUNTING, DRAWS)
-    force, _ = follower(center, np.repeat(grid[:, None], len(recordings.each), axis=1))
+    force, _ = follower(center, np.repeat(grid[:, None], len(recordings.items), axis=1))
     columns = []
-    for i, recording in enumerate(recordings.each):
+    for i, recording in enumerate(recordings.items):
         block_numbers = choose_blocks(len(recording.blocks.time))
         used, measured = recording.strokes.used_sliding[block_numbers], recording.blocks.output_force[block_numbers]
         distance = np.abs(_force_difference(force[:, : len(block_numbers), i], measured, recordings.loop))

@@ -18,7 +18,7 @@ from pydantic import Field, ValidationError
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
-from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.terms import drawn_readings, with_drawn_readings
@@ -120,7 +120,7 @@ def read_fleet_plan(path: Path) -> FleetPlan:
     try:
         fleet = _Plan.model_validate({"fleet": raw["fleet"]}).fleet
     except ValidationError as error:
-        raise wrong_keys(error, raw, _Plan, path.name, "write it, such as cables = 40") from None
+        raise explain_validation_error(error, raw, _Plan, path.name, "write it, such as cables = 40") from None
     return FleetPlan(read_bench(path), fleet)
 
 

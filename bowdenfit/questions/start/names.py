@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection
 
 from pydantic import TypeAdapter, ValidationError
 
-from bowdenfit.description import TAKEN, Contact, Name
+from bowdenfit.description import RESERVED_NAMES, Contact, Name
 from bowdenfit.description.placeholders import PLACEHOLDERS
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.start.question import Question
@@ -61,7 +61,7 @@ def ask_coefficient_name(words: str, default: str, columns: Collection[str]) -> 
         name = _checked_name(typed)
         _refuse_invalid(lambda: Contact.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
         of_curves = {f"{column}_{ending}" for column in columns for ending in _OF_CURVE}
-        if name in PARAMETERS or name in TAKEN or name in of_curves or _NUMBERED.fullmatch(name):
+        if name in PARAMETERS or name in RESERVED_NAMES or name in of_curves or _NUMBERED.fullmatch(name):
             raise UsageError(
                 f"{shown(name)} is what results call another number; write another name, such as {default}."
             )

@@ -11,8 +11,8 @@ import numpy as np
 from bowdenfit.files import read_channels
 from bowdenfit.files.clocks import is_clock, names_time
 from bowdenfit.files.headings import heading_of, split_brackets
-from bowdenfit.files.matching import Quantity, candidates, plain_name
-from bowdenfit.files.spellings import spelled
+from bowdenfit.files.matching import Quantity, find_candidates, plain_name
+from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import FORCES, FileKind, file_kind
@@ -112,7 +112,7 @@ class MeasuredFile:
         headings = [(each.name, each.below) for each in self.columns]
         wanted = FORCES if quantity in FORCES else (quantity,)
         matches = [
-            (self.columns[each.position], each.unit or "") for each in candidates(headings, wanted)[quantity.name]
+            (self.columns[each.position], each.unit or "") for each in find_candidates(headings, wanted)[quantity.name]
         ]
         return [column if column.unit else self.set_unit(column, unit) for column, unit in matches]
 
@@ -127,7 +127,7 @@ class MeasuredFile:
     def _says_unit(self, quantity: Quantity, column: FileColumn) -> bool:
         """Whether its unit stands where readers of tables find it."""
         wanted = FORCES if quantity in FORCES else (quantity,)
-        (match,) = candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
+        (match,) = find_candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
         return match is not None and match.unit == column.unit and bool(column.unit)
 
     def set_unit(self, column: FileColumn, unit: str) -> FileColumn:
@@ -185,10 +185,10 @@ def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
     number_columns = {each.name: each for each in columns_of(table)}
     columns = []
     for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
-        if not heading or (names_time(heading) and not spelled(heading, below)):
+        if not heading or (names_time(heading) and not parse_heading(heading, below)):
             continue
         cells = [row[i] for row in table.rows]
-        numbers, other = number_columns.get(heading), spelled(heading, below)
+        numbers, other = number_columns.get(heading), parse_heading(heading, below)
         unit = (other.unit if other else "") or heading_of(heading, below).unit
         spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
         different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.description.device import ENCODER, Device, Known, asked_for
+from bowdenfit.description.device import ENCODER, Device, Known, missing_settings
 from bowdenfit.device.draws import draw_device
 from bowdenfit.device.motion import Hand
 from bowdenfit.device.plant import LoopTransmission, Plant
@@ -243,7 +243,7 @@ def _refuse_missing(device: Device, loop: LoopDraws) -> None:
     needs_stiffness = ("rope.stiffness",) if loop.stiffness is None else ()
     count = [ENCODER] if device.controller.encoder_counts is None else []
     if missing := [*device.lacking(*NEEDED, *needs_stiffness), *count]:
-        raise asked_for("teleoperation", missing)
+        raise missing_settings("teleoperation", missing)
 
 
 def _master_and_slave(draws: Draws, stiffness: np.ndarray, wall: float) -> MasterSlave:

@@ -11,15 +11,24 @@ import numpy as np
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import pieces
-from bowdenfit.recordings.preparation.bandwidth import bandwidth_of, main_frequency
-from bowdenfit.recordings.preparation.blocks import CommonClock, average, block_samples, refuse_too_long
-from bowdenfit.recordings.preparation.checks import check, check_sign
-from bowdenfit.recordings.preparation.clock import GOOD, KINDS, NO_OVERLAP, QUIET, Sampled, read_at, spread, step_of
+from bowdenfit.recordings.preparation.bandwidth import estimate_bandwidth, main_frequency
+from bowdenfit.recordings.preparation.blocks import CommonClock, average_blocks, choose_block_samples, refuse_too_long
+from bowdenfit.recordings.preparation.checks import check_recording, check_sign
+from bowdenfit.recordings.preparation.clock import (
+    GOOD,
+    KINDS,
+    NO_OVERLAP,
+    QUIET,
+    Sampled,
+    read_at,
+    spread_repeated,
+    step_of,
+)
 from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
-from bowdenfit.recordings.preparation.flags import flag
+from bowdenfit.recordings.preparation.flags import flag_samples
 from bowdenfit.recordings.preparation.noise import noise_about_trend
-from bowdenfit.recordings.preparation.tare import tare_of
-from bowdenfit.recordings.recording import Account, Blocks, Flagged, RawRecording
+from bowdenfit.recordings.preparation.tare import estimate_tare
+from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Vector
 
 _SHOWN_FLAGS = 300
@@ -53,7 +62,7 @@ def prepare(raw: RawRecording, settings: Preparation) -> tuple[Blocks, Account]:
         cells together.
 
     Raises:
-        DatasetError: The recording cannot be one; see `checks.check` and `tare.tare_of`.
+        DatasetError: The recording cannot be one; see `checks.check_recording` and `tare.estimate_tare`.
     """
     return average_recording(inspect_recording(raw, settings))
 
@@ -81,30 +90,30 @@ class Inspected:
 
 def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
     """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
-    remarks = check(raw)
+    remarks = check_recording(raw)
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
     return Inspected(raw, settings, remarks, cleaned, together, _delay(raw.loop, together, settings))
 
 
-def average_recording(found: Inspected, one_for_all: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
+def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
     """The steps after the delay is known; see `prepare`.
 
     Args:
         found: The recording.
         one_for_all: Delay and its standard error [s] that replace those of this recording.
     """
-    raw, settings, remarks, cleaned = found.raw, found.settings, found.remarks, found.cleaned
-    delay = found.delay if one_for_all is None else Delay(*one_for_all, found.delay.exponent)
-    common = _together(raw, cleaned, settings, delay.value) if delay.value else found.together
+    raw, settings, remarks, cleaned = inspected.raw, inspected.settings, inspected.remarks, inspected.cleaned
+    delay = inspected.delay if shared_delay is None else Delay(*shared_delay, inspected.delay.exponent)
+    common = _together(raw, cleaned, settings, delay.value) if delay.value else inspected.together
     _require_some_good(raw, common)
     good = common.fault == GOOD
     filled = [pieces.Filled(force, good) for force in (common.input_force, common.output_force)]
     main = main_frequency(filled[0], filled[1], 1 / common.step)
-    bandwidth = bandwidth_of(filled[0], filled[1], 1 / common.step, main, raw.loop)
+    bandwidth = estimate_bandwidth(filled[0], filled[1], 1 / common.step, main, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
-    samples = _samples_of_block(found, common, bandwidth, main, noise)
-    blocks, counts = average(common, samples)
+    samples = _samples_of_block(inspected, common, bandwidth, main, noise)
+    blocks, counts = average_blocks(common, samples)
     account = Account(
         counts=counts,
         samples=len(common.time),
@@ -125,19 +134,19 @@ def average_recording(found: Inspected, one_for_all: tuple[float, float] | None 
 
 def _clean(raw: RawRecording, settings: Preparation) -> _Cleaned:
     """Flag and tare each channel on its own clock, and check its sign."""
-    times = spread(raw.input_time), spread(raw.output_time)
+    times = spread_repeated(raw.input_time), spread_repeated(raw.output_time)
     forces = raw.input_force, raw.output_force
     pairs = ((0, 1), (1, 0))
-    found = [flag(times[one], forces[one], times[two], forces[two], settings) for one, two in pairs]
+    flagged = [flag_samples(times[one], forces[one], times[two], forces[two], settings) for one, two in pairs]
     names = "input_force", "output_force"
-    tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, found, strict=True)]
+    tares = [_tare(raw.file, name, channel, settings) for name, (channel, _) in zip(names, flagged, strict=True)]
     channels = [
-        replace(c, force=c.force - tare if tare else c.force) for (c, _), (tare, _) in zip(found, tares, strict=True)
+        replace(c, force=c.force - tare if tare else c.force) for (c, _), (tare, _) in zip(flagged, tares, strict=True)
     ]
     for name, channel in zip(names, channels, strict=True):
         if not raw.loop:
             check_sign(raw.file, name, channel.force)
-    ends = max(e[0] for _, e in found), min(e[1] for _, e in found)
+    ends = max(e[0] for _, e in flagged), min(e[1] for _, e in flagged)
     return _Cleaned(channels[0], channels[1], ends, (tares[0][0], tares[1][0]), (tares[0][1], tares[1][1]))
 
 
@@ -149,7 +158,7 @@ def _tare(file: str, name: str, channel: Sampled, settings: Preparation) -> tupl
             f"{file}: {name} is to be tared, but no quiet interval is stated. State the start and end of an interval "
             "without load in seconds, or no tare."
         )
-    return tare_of(file, name, channel.time, channel.force, settings.quiet, channel.fault == GOOD)
+    return estimate_tare(file, name, channel.time, channel.force, settings.quiet, channel.fault == GOOD)
 
 
 def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> CommonClock:
@@ -177,7 +186,7 @@ def _velocity(raw: RawRecording, time: Vector) -> Vector:
     there = np.isfinite(raw.velocity)
     if there.sum() < 2:
         return np.broadcast_to(np.nan, len(time))
-    clock = spread(raw.velocity_time)
+    clock = spread_repeated(raw.velocity_time)
     if there.all() and pieces.same(clock, time):
         return raw.velocity
     return pieces.interpolated(time, clock, raw.velocity, there, outside=np.nan)
@@ -215,20 +224,20 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
 
 
 def _samples_of_block(
-    found: Inspected, common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float]
+    inspected: Inspected, common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float]
 ) -> int:
     """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
-    raw, cleaned, settings = found.raw, found.cleaned, found.settings
+    raw, cleaned, settings = inspected.raw, inspected.cleaned, inspected.settings
     if settings.block == "auto":
         thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
-        each = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
+        per_sample = noise[0] * math.sqrt(thinned[0]), noise[1] * math.sqrt(thinned[1])
         refuse_too_long(raw.file, raw.name, common, main)
-        return block_samples(common, bandwidth, main, each, raw.loop)
+        return choose_block_samples(common, bandwidth, main, per_sample, raw.loop)
     block = _stated_block(settings)
     return max(1, round(block / common.step)) if block > 0 else 0
 
 
-def _flagged(common: CommonClock) -> Flagged:
+def _flagged(common: CommonClock) -> FlaggedSamples:
     """The samples left out, evenly thinned to a few hundred of each kind, in order of time."""
     chosen = []
     for kind in range(GOOD + 1, NO_OVERLAP):
@@ -236,7 +245,7 @@ def _flagged(common: CommonClock) -> Flagged:
         chosen.append(where[np.unique(np.linspace(0, len(where) - 1, min(len(where), _SHOWN_FLAGS)).astype(int))])
     at = np.sort(np.concatenate(chosen))
     kinds = tuple(KINDS[k] for k in common.fault[at].tolist())
-    return Flagged(kinds, common.time[at], common.input_force[at], common.output_force[at])
+    return FlaggedSamples(kinds, common.time[at], common.input_force[at], common.output_force[at])
 
 
 def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[str]:

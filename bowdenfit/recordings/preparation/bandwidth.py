@@ -18,7 +18,7 @@ _NOISE_TO_SIGNAL = 1.0
 _COHERENT = 1 / (1 + _NOISE_TO_SIGNAL) ** 2
 
 
-def bandwidth_of(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:
+def estimate_bandwidth(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:
     """Frequency up to which the forces move together [Hz].
 
     The lower of two estimates, each a signal-to-noise ratio of 1. The first is where the spectra have come down to twice

@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, KINDS, SATURATED
-from bowdenfit.recordings.preparation.shapes import ChosenVector, Places
+from bowdenfit.recordings.preparation.shapes import ChosenVector, Positions
 from bowdenfit.recordings.recording import Blocks
 from bowdenfit.types import Flags, Labels, Vector
 
@@ -39,13 +39,13 @@ class CommonClock:
 
     def part(self, some: slice) -> "CommonClock":
         """A piece of it, in double precision."""
-        pulled, given, velocity = (
-            pieces.numbers(each, some) for each in (self.input_force, self.output_force, self.velocity)
+        input_, output, velocity = (
+            pieces.numbers(column, some) for column in (self.input_force, self.output_force, self.velocity)
         )
-        return CommonClock(self.time[some], self.step, pulled, given, velocity, self.fault[some])
+        return CommonClock(self.time[some], self.step, input_, output, velocity, self.fault[some])
 
 
-def block_samples(
+def choose_block_samples(
     common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float], loop: bool = False
 ) -> int:
     """Samples of a block, chosen from the data.
@@ -99,19 +99,19 @@ def _span(common: CommonClock) -> float:
 def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -> int:
     """Samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
     evenly = slice(None, None, -(-len(common.time) // pieces.PLENTY))
-    pulled, given = (pieces.numbers(force, evenly) for force in (common.input_force, common.output_force))
-    good = (common.fault[evenly] == GOOD) & (loop | ((pulled > 0) & (given > 0)))
+    input_, output = (pieces.numbers(force, evenly) for force in (common.input_force, common.output_force))
+    good = (common.fault[evenly] == GOOD) & (loop | ((input_ > 0) & (output > 0)))
     if not good.any():
         return 1
-    pulled, given = pulled[good], given[good]
-    apart = pulled - given if loop else np.log(pulled / given)
-    single = float(np.hypot(*noise) if loop else np.median(np.hypot(noise[0] / pulled, noise[1] / given)))
+    input_, output = input_[good], output[good]
+    apart = input_ - output if loop else np.log(input_ / output)
+    single = float(np.hypot(*noise) if loop else np.median(np.hypot(noise[0] / input_, noise[1] / output)))
     low, high = np.quantile(apart, (0.1, 0.9))
     band = np.sqrt(max(((high - low) / 2) ** 2 - single**2, single**2 / 100))
     return int(np.ceil((single / (_NOISE_IN_BAND * band)) ** 2)) if single > 0 else 1
 
 
-def average(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
+def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
     """Means of the good samples over equal stretches of time, and where every sample went.
 
     A block of whose readings more than half are at the end of a load cell's range is marked, and holds the means of those;
@@ -130,17 +130,17 @@ def average(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
         lost.append(_means(part, place, (part.fault == SATURATED) & _saturated_blocks(fault, place)))
         counts += np.bincount(fault, minlength=len(KINDS))
         start = stop
-    joined = [np.concatenate(each) for each in zip(*kept, *lost, strict=True)]
+    joined = [np.concatenate(column) for column in zip(*kept, *lost, strict=True)]
     order = np.argsort(joined[0], kind="stable")
-    place, pulled, given, velocity, count = (column[order] for column in joined)
+    place, input_, output, velocity, count = (column[order] for column in joined)
     middle = common.time[0] + common.step * ((place + 0.5) * max(samples, 1) - 0.5)
-    saturated = (np.arange(len(order)) >= sum(len(each[0]) for each in kept))[order]
+    saturated = (np.arange(len(order)) >= sum(len(column[0]) for column in kept))[order]
     time = common.time[place] if samples == 0 else middle
-    blocks = Blocks(time, pulled, given, velocity, count, saturated)
+    blocks = Blocks(time, input_, output, velocity, count, saturated)
     return blocks, dict(zip(KINDS, counts.tolist(), strict=True))
 
 
-def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Places, int]:
+def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Positions, int]:
     """The block of each sample from one on, as far as whole blocks go in a piece, and where they end."""
     length = pieces.PIECE
     while True:
@@ -171,7 +171,7 @@ def _swept(fault: Labels, place: Labels) -> Labels:
 
 def _means(
     common: CommonClock, place: Labels, chosen: Flags
-) -> tuple[Places, ChosenVector, ChosenVector, ChosenVector, Places]:
+) -> tuple[Positions, ChosenVector, ChosenVector, ChosenVector, Positions]:
     """Number of each block with chosen samples, the means of the two forces and the velocity, and the counts."""
     where = np.flatnonzero(chosen)
     starts = np.flatnonzero(np.append(True, np.diff(place[where]) > 0)) if len(where) else np.zeros(0, dtype=int)

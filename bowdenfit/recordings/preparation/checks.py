@@ -15,7 +15,7 @@ SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what
 _MOST_REPEATED = 0.5
 
 
-def check(raw: RawRecording) -> tuple[str, ...]:
+def check_recording(raw: RawRecording) -> tuple[str, ...]:
     """Refuse a recording that cannot be one, and remark on what is odd.
 
     Args:

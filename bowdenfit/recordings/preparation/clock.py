@@ -49,7 +49,7 @@ def gaps_of(time: Vector) -> Flags:
     return gaps
 
 
-def spread(time: Vector) -> Vector:
+def spread_repeated(time: Vector) -> Vector:
     """The clock with repeated times spread evenly up to the next different time, so that it increases strictly [s]."""
     if rises(time, strictly=True):
         return time

@@ -4,7 +4,7 @@ While the rope slides at a constant rate a delay looks like friction: log F_in -
 tells them apart are kinks: starts, stops, reversals and uneven rates.
 
 A drag looks like a delay, too, where the force changes at a constant rate, so that both are looked for together. The input is
-led through the play operator as it may have been without noise (`likely_input`), on a coarse clock that is coarser for slower
+led through the play operator as it may have been without noise (`smooth_input`), on a coarse clock that is coarser for slower
 cycles.
 
 COMMON_ERROR is what smoothing and noise shift in every recording of a bench alike [s]. What noise that stays alike and
@@ -22,14 +22,14 @@ from bowdenfit.recordings.preparation.rests import (
     Rests,
     at_drag,
     band_of,
-    play_rows,
-    rests_of,
+    play_along_rows,
+    read_rests,
     shift_rows,
     sides,
     starts,
     with_drag,
 )
-from bowdenfit.recordings.preparation.segments import Segments, reverses, segments_of
+from bowdenfit.recordings.preparation.segments import Segments, cut_segments, reverses
 from bowdenfit.recordings.preparation.shapes import ChosenVector, OtherVector
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
@@ -78,28 +78,28 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
     Returns:
         The delay with its standard error, or 0 with a remark where the recording does not tell.
     """
-    segments = segments_of(time, input_force, output_force, good)
+    segments = cut_segments(time, input_force, output_force, good)
     if segments is None or not len(_usable(segments)):
-        return _untold("it has too few good readings above zero force")
+        return _undetermined("it has too few good readings above zero force")
     if not reverses(segments):
-        return _untold("the force never turns around")
+        return _undetermined("the force never turns around")
     start = _coarse(segments)
     segments = _touched(segments, start)
     point, _ = _refined(segments, None, start)
     for _ in range(_ROUNDS):
-        point, _ = _refined(segments, rests_of(segments, point), point)
+        point, _ = _refined(segments, read_rests(segments, point), point)
     point, error = _with_drag_too(segments, point)
     sd = float(np.hypot(error, COMMON_ERROR))
     if not _slides_both_ways(segments, point):
-        return _untold("the output does not follow the input both ways")
+        return _undetermined("the output does not follow the input both ways")
     if not np.isfinite(sd) or sd > min(RANGE / 2, 2 * max(shortest, segments.step)):
-        return _untold(f"its standard error would be {sd:.2g} s")
+        return _undetermined(f"its standard error would be {sd:.2g} s")
     if abs(point[2]) > RANGE - segments.step:
-        return _untold(f"the best fit lies at the end of the range of {RANGE} s that was searched")
+        return _undetermined(f"the best fit lies at the end of the range of {RANGE} s that was searched")
     return Delay(float(point[2]), sd, float(point[0]))
 
 
-def _untold(why: str) -> Delay:
+def _undetermined(why: str) -> Delay:
     remark = f"How much later the output channel is than the input channel cannot be told from this recording, because {why}."
     return Delay(0.0, float("nan"), float("nan"), f"{remark} No delay was assumed; state one if it is known.")
 
@@ -111,14 +111,14 @@ def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, flo
     where both explain the recording about as well, how far they are apart is an error.
     """
     some = _SOME_DRAG * float(np.exp(np.median(segments.y)))
-    found = []
+    fits = []
     for start in (np.append(point, 0.0), np.array([point[0], point[1], 0.0, some])):
         for _ in range(_ROUNDS):
-            rests = rests_of(with_drag(segments, float(start[3])), start[:3])
+            rests = read_rests(with_drag(segments, float(start[3])), start[:3])
             start, covariance = _refined(segments, rests, start)
-        rest, _ = _linearized(segments, rests, np.sqrt(_inner(segments)), start, start[3:])
-        found.append((float(rest @ rest), start, float(covariance[2, 2]), _by_noise(segments, rest)))
-    (least, best, variance, by_noise), (more, other, *_) = sorted(found, key=lambda each: each[0])
+        residuals, _ = _linearized(segments, rests, np.sqrt(_inner(segments)), start, start[3:])
+        fits.append((float(residuals @ residuals), start, float(covariance[2, 2]), _by_noise(segments, residuals)))
+    (least, best, variance, by_noise), (more, other, *_) = sorted(fits, key=lambda fit: fit[0])
     apart = (best[2] - other[2]) / 2 if more < _AS_WELL * least else 0.0
     return best, float(np.sqrt(variance + by_noise**2 + apart**2))
 
@@ -126,13 +126,13 @@ def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, flo
 def _slides_both_ways(segments: Segments, point: ChosenVector) -> bool:
     """Whether the rope slides, for more than moments, toward the motor and back."""
     seen, exponent = with_drag(segments, float(point[3])), float(point[0])
-    output = play_rows(seen.x, starts(seen, float(point[1])), point[:1])[0]
+    output = play_along_rows(seen.x, starts(seen, float(point[1])), point[:1])[0]
     stands, side = sides(seen, output, exponent)
     used = _inner(segments) > USED
     return all(np.count_nonzero(~stands & used & (side == sign)) > _MOVES * np.count_nonzero(used) for sign in (1, -1))
 
 
-def _by_noise(segments: Segments, rest: ChosenVector) -> float:
+def _by_noise(segments: Segments, residuals: ChosenVector) -> float:
     """Time in which the force moves by as much as the model is off, or noise is [s].
 
     Noise that stays alike, and what the model leaves out, shift the delay by that much; the curvature does not know.
@@ -141,7 +141,7 @@ def _by_noise(segments: Segments, rest: ChosenVector) -> float:
     if not used.any():
         return float("inf")
     rate = np.gradient(segments.x, axis=1)[used] / segments.step
-    off = np.hypot(1.4826 * np.median(np.abs(rest)), np.median(segments.jitter[used]))
+    off = np.hypot(1.4826 * np.median(np.abs(residuals)), np.median(segments.jitter[used]))
     return float(off / np.sqrt(np.mean(rate**2)))
 
 
@@ -167,23 +167,23 @@ def _coarse(every: Segments) -> Vector:
     weight = _inner(segments)
     center, half = band_of(segments)
     exponents = half * _FRICTIONS
-    outputs = play_rows(segments.x, starts(segments, -center), exponents)
+    outputs = play_along_rows(segments.x, starts(segments, -center), exponents)
     stride = max(1, round(0.01 / segments.step))
     reach = round(RANGE / segments.step) // stride * stride
-    best, found = np.inf, np.zeros(3)
+    best, best_point = np.inf, np.zeros(3)
     for shift in range(-reach, reach + 1, stride):
         rests = segments.y - outputs[:, :, np.clip(np.arange(weight.shape[1]) - shift, 0, weight.shape[1] - 1)]
         ratios = np.tensordot(rests, weight, axes=2) / weight.sum()
         losses = np.tensordot(rests**2, weight, axes=2) - weight.sum() * ratios**2
         least = int(np.argmin(losses))
         if losses[least] < best:
-            best, found = losses[least], np.array([exponents[least], ratios[least], shift * segments.step])
-    return found
+            best, best_point = losses[least], np.array([exponents[least], ratios[least], shift * segments.step])
+    return best_point
 
 
 def _touched(segments: Segments, point: OtherVector) -> Segments:
     """Weight only where the model knows the output: since it first touched the band in a segment."""
-    output = play_rows(segments.x, starts(segments, float(point[1])), np.array([point[0]]))[0]
+    output = play_along_rows(segments.x, starts(segments, float(point[1])), np.array([point[0]]))[0]
     _, side = sides(segments, output, float(point[0]))
     known = shift_rows((side != 0).astype(float), float(point[2]) / segments.step) == 1
     return replace(segments, weight=np.where(known, segments.weight, 0.0))
@@ -192,29 +192,29 @@ def _touched(segments: Segments, point: OtherVector) -> Segments:
 def _refined(segments: Segments, rests: Rests | None, start: Vector) -> tuple[Vector, Matrix]:
     """Gauss-Newton from a good start, each step taken only if it helps; the last point and its covariance."""
     weight = np.sqrt(_inner(segments))
-    point, damping, begun = start, 1.0, start[3:]
-    rest, slopes = _linearized(segments, rests, weight, point, begun)
+    point, damping, initial_drag = start, 1.0, start[3:]
+    residuals, slopes = _linearized(segments, rests, weight, point, initial_drag)
     for _ in range(_MOST_STEPS):
-        step = damping * np.linalg.lstsq(slopes, rest, rcond=None)[0]
+        step = damping * np.linalg.lstsq(slopes, residuals, rcond=None)[0]
         tried = np.array(
             [max(point[0] + step[0], 1e-6), np.clip(point[1] + step[1], -_MOST_RATIO, _MOST_RATIO)]
             + [np.clip(point[2] + step[2], -RANGE, RANGE)]
-            + [np.clip(point[3] + each, 0.0, np.exp(np.max(segments.y))) for each in step[3:]]
+            + [np.clip(point[3] + change, 0.0, np.exp(np.max(segments.y))) for change in step[3:]]
         )
-        new_rest, new_slopes = _linearized(segments, rests, weight, tried, begun)
-        if new_rest @ new_rest > rest @ rest:
+        new_residuals, new_slopes = _linearized(segments, rests, weight, tried, initial_drag)
+        if new_residuals @ new_residuals > residuals @ residuals:
             damping /= 4
             continue
-        point, rest, slopes = tried, new_rest, new_slopes
+        point, residuals, slopes = tried, new_residuals, new_slopes
         if abs(step[2]) < 5e-5:
             break
     freedom = max(int(np.count_nonzero(weight)) - 5, 1)
-    variance = float(rest @ rest) / freedom * correlation_time(rest)
+    variance = float(residuals @ residuals) / freedom * correlation_time(residuals)
     return point, variance * np.linalg.pinv(slopes.T @ slopes)
 
 
 def _linearized(
-    segments: Segments, rests: Rests | None, weight: Matrix, point: OtherVector, begun: ChosenVector
+    segments: Segments, rests: Rests | None, weight: Matrix, point: OtherVector, initial_drag: ChosenVector
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weighted residuals at exponent, ratio, delay and, if that is asked about, drag, and how the model changes with each.
 
@@ -229,20 +229,21 @@ def _linearized(
     """
     exponent, ratio, delay = (float(value) for value in point[:3])
     plain = segments
-    if len(begun):
+    if len(initial_drag):
         segments = with_drag(plain, float(point[3]))
-        rests = at_drag(rests, ratio, float(point[3] - begun[0])) if rests else None
+        rests = at_drag(rests, ratio, float(point[3] - initial_drag[0])) if rests else None
         weight = weight * np.exp(segments.y - plain.y)
     change, wide, points = 0.01 * exponent, 4.0, delay / segments.step
     exponents = np.array([exponent, exponent + change, exponent - change])
-    outputs = play_rows(segments.x, starts(segments, ratio), exponents, rests)
+    outputs = play_along_rows(segments.x, starts(segments, ratio), exponents, rests)
     model, more, less = shift_rows(outputs, points)
     later, earlier = (shift_rows(outputs[0], points + shift) for shift in (wide, -wide))
     slopes = [(more - less) / (2 * change), np.ones_like(model), (later - earlier) / (2 * wide * segments.step)]
-    if len(begun):
+    if len(initial_drag):
         more_drag = 0.01 * float(np.exp(np.median(plain.y)))
         other = with_drag(plain, float(point[3]) + more_drag)
-        moved = play_rows(other.x, starts(other, ratio), exponents[:1], at_drag(rests, ratio, more_drag) if rests else None)[0]
+        other_rests = at_drag(rests, ratio, more_drag) if rests else None
+        moved = play_along_rows(other.x, starts(other, ratio), exponents[:1], other_rests)[0]
         slopes.append((shift_rows(moved, points) - model - other.y + segments.y) / more_drag)
     stands, side = sides(segments, outputs[0], exponent)
     if rests is not None:

@@ -10,19 +10,19 @@ from bowdenfit.files.pieces import first_set, interpolated, last_set, parts, sam
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
-from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Places
+from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Positions
 from bowdenfit.types import Flags, Labels, Vector
 
 _SPIKE_SDS = 8.0
 _HALF_WINDOW = 5
 _LONGEST_SPIKE = 3
 _SHORTEST_RUN = 10
-_CHANCE = 1e-6
+_PROBABILITY = 1e-6
 _CLOSED = 1
 
 
 @dataclass(frozen=True)
-class Runs:
+class EqualRuns:
     """Long stretches of equal successive values: of `_SHORTEST_RUN` samples or more.
 
     Args:
@@ -42,28 +42,28 @@ class Runs:
         return _from_to(self.start[chosen], self.start[chosen] + self.length[chosen], samples)
 
 
-def runs_of(values: OtherVector) -> Runs:
+def runs_of(values: OtherVector) -> EqualRuns:
     """Split into stretches of equal successive values; each missing value is a stretch of its own."""
-    begun, counts = 0, dict[int, int]()
+    run_start, counts = 0, dict[int, int]()
     starts, lengths = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
     for part in parts(len(values)):
         some = values[part.start : part.stop + 1]
         ends = part.start + 1 + np.flatnonzero(some[1:] != some[:-1])
         ends = np.append(ends, len(values)) if part.stop == len(values) else ends
-        first = np.append(begun, ends[:-1])[: len(ends)]
+        first = np.append(run_start, ends[:-1])[: len(ends)]
         length = ends - first
-        for each, count in zip(*np.unique(length, return_counts=True), strict=True):
-            counts[int(each)] = counts.get(int(each), 0) + int(count)
+        for samples, count in zip(*np.unique(length, return_counts=True), strict=True):
+            counts[int(samples)] = counts.get(int(samples), 0) + int(count)
         starts.append(first[length >= _SHORTEST_RUN])
         lengths.append(length[length >= _SHORTEST_RUN])
-        begun = int(ends[-1]) if len(ends) else begun
+        run_start = int(ends[-1]) if len(ends) else run_start
     start, kinds = np.concatenate(starts), sorted(counts)
-    covered = np.cumsum([counts[each] * each for each in kinds])
+    covered = np.cumsum([counts[samples] * samples for samples in kinds])
     typical = kinds[int(np.searchsorted(covered, len(values) / 2))]
-    return Runs(start, np.concatenate(lengths), np.asarray(values[start], dtype=float), typical)
+    return EqualRuns(start, np.concatenate(lengths), np.asarray(values[start], dtype=float), typical)
 
 
-def flag(
+def flag_samples(
     time: Vector, force: Vector, other_time: OtherVector, other_force: OtherVector, settings: Preparation
 ) -> tuple[Sampled, tuple[float, float]]:
     """Find what is wrong with the samples of one channel; the readings stay as they are.
@@ -154,15 +154,15 @@ def _clipped_at(force: Vector, other: Vector, other_resolution: float, lag: int)
     return (low if clipped_low else -math.inf, high if clipped_high else math.inf)
 
 
-def _longest_by_chance(force: Vector, runs: Runs) -> float:
+def _longest_by_noise(force: Vector, runs: EqualRuns) -> float:
     """Repeats that noise makes less than once in a million recordings; infinite for a channel without enough noise."""
     finite = _sampled(force)
     noise, step = noise_of(finite), quantum_of(finite)
     if noise < 0.3 * step or noise == 0:
         return math.inf
     same = math.erf(step / (2 * math.sqrt(2) * noise))
-    chance = math.log(_CHANCE / len(force)) / math.log(same) if 0 < same < 1 else 0.0
-    return max(float(_SHORTEST_RUN), chance, 5.0 * runs.typical)
+    by_noise = math.log(_PROBABILITY / len(force)) / math.log(same) if 0 < same < 1 else 0.0
+    return max(float(_SHORTEST_RUN), by_noise, 5.0 * runs.typical)
 
 
 def _sampled(force: Vector) -> ChosenVector:
@@ -171,9 +171,9 @@ def _sampled(force: Vector) -> ChosenVector:
     return some[np.isfinite(some)]
 
 
-def _long_while_moving(force: Vector, other: Vector, other_resolution: float, runs: Runs) -> ChosenFlags:
+def _long_while_moving(force: Vector, other: Vector, other_resolution: float, runs: EqualRuns) -> ChosenFlags:
     """Which of the runs are longer than chance makes them, while the other force changes by more than its resolution."""
-    chosen = runs.length >= _longest_by_chance(force, runs)
+    chosen = runs.length >= _longest_by_noise(force, runs)
     for i in np.flatnonzero(chosen).tolist():
         inside = other[runs.start[i] : runs.start[i] + runs.length[i]]
         chosen[i] = float(inside.max()) - float(inside.min()) > other_resolution
@@ -186,7 +186,7 @@ def _range_of(force: Vector) -> tuple[float, float]:
     return float(np.min(force, where=there, initial=np.inf)), float(np.max(force, where=there, initial=-np.inf))
 
 
-def _rises_at(value: float, other: Vector, runs: Runs, lag: int) -> float:
+def _rises_at(value: float, other: Vector, runs: EqualRuns, lag: int) -> float:
     """How far the other force rises at most while a channel rests at a value, after the first `lag` samples."""
     chosen = (runs.value == value) & (runs.length > max(lag, _SHORTEST_RUN))
     parts = [other[s + lag : s + n] for s, n in zip(runs.start[chosen], runs.length[chosen], strict=True)]
@@ -202,7 +202,7 @@ def _closed(flags: Flags) -> Flags:
     return flags | _from_to(where[near], where[near + 1], len(flags))
 
 
-def _from_to(start: Places, end: Places, samples: int) -> Flags:
+def _from_to(start: Positions, end: Positions, samples: int) -> Flags:
     """Samples from any start up to its end."""
     edges = np.zeros(samples + 1, dtype=np.int8)
     edges[start] += 1  # neither any start nor any end is there twice
@@ -225,12 +225,12 @@ def spikes(force: Vector) -> Flags:
     for part in parts(len(force)):
         start, stop = _with_neighbors(there, part)
         where = start + np.flatnonzero(there[start:stop])
-        found = (
+        positions = (
             where[_spikes_in(np.asarray(force[where], dtype=float), noise)]
             if len(where) > 2 * _HALF_WINDOW
             else where[:0]
         )
-        flags[found[(found >= part.start) & (found < part.stop)]] = True
+        flags[positions[(positions >= part.start) & (positions < part.stop)]] = True
     return flags
 
 
@@ -242,7 +242,7 @@ def _with_neighbors(there: Flags, part: slice) -> tuple[int, int]:
     return start, stop
 
 
-def _spikes_in(values: Vector, noise: float) -> Places:
+def _spikes_in(values: Vector, noise: float) -> Positions:
     padded = np.pad(values, _HALF_WINDOW, mode="reflect")
     beside = (padded[: -2 * _HALF_WINDOW] + padded[2 * _HALF_WINDOW :]) / 2
     suspects = np.flatnonzero(np.abs(values - beside) > _SPIKE_SDS / 2 * noise)
@@ -254,7 +254,7 @@ def _spikes_in(values: Vector, noise: float) -> Places:
     return off[_sudden(padded, off, distance)] if len(off) else off
 
 
-def _sudden(padded: OtherVector, off: Places, distance: ChosenVector) -> ChosenFlags:
+def _sudden(padded: OtherVector, off: Positions, distance: ChosenVector) -> ChosenFlags:
     """Whether each suspect is in a short group that the force jumps to, and back from, by half its distance or more."""
     first = np.append(True, np.diff(off) > 1)
     group = np.cumsum(first) - 1

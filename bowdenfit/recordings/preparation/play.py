@@ -78,7 +78,7 @@ def clear_of_turns(state: Labels, force: Vector) -> Labels:
 
     Args:
         state: Contact of each block with an operator that follows `force`.
-        force: A likely input force, which noise makes level in steps; see `likely_input`.
+        force: A likely input force, which noise makes level in steps; see `smooth_input`.
     """
     step = (np.diff(state) != 0) | (np.diff(force) != 0)
     level = np.append(0, np.cumsum(step))

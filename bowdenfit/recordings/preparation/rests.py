@@ -36,7 +36,7 @@ class Rests:
     heading: Matrix
 
 
-def play_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | None = None) -> np.ndarray:
+def play_along_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rests | None = None) -> np.ndarray:
     """Play operator along each row for each exponent at once: an array of exponents, rows and points.
 
     Keeping a value between two limits, and then between two others, keeps it between two limits again: so the limits of
@@ -113,7 +113,7 @@ def sides(segments: Segments, output: Matrix, exponent: float) -> tuple[np.ndarr
     return touch == 0, side
 
 
-def rests_of(segments: Segments, point: OtherVector) -> Rests:
+def read_rests(segments: Segments, point: OtherVector) -> Rests:
     """Read the level of each rest from the output.
 
     A rest starts where the input comes close to the end of its pull or return, and ends where the play operator touches
@@ -124,7 +124,7 @@ def rests_of(segments: Segments, point: OtherVector) -> Rests:
         point: Friction exponent [1], log ratio of the sensors [1], and delay [s], all of them roughly right.
     """
     exponent, ratio, delay = (float(value) for value in point)
-    output = play_rows(segments.x, starts(segments, ratio), np.array([exponent]))[0]
+    output = play_along_rows(segments.x, starts(segments, ratio), np.array([exponent]))[0]
     stands, side = sides(segments, output, exponent)
     seen = shift_rows(segments.y, -delay / segments.step) - ratio
     attached = exponent - side * (segments.x - output) <= _AWAY * segments.jitter

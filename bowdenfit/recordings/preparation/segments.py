@@ -6,9 +6,9 @@ import numpy as np
 
 from bowdenfit.files import pieces
 from bowdenfit.recordings.preparation.bandwidth import main_frequency
-from bowdenfit.recordings.preparation.likely_input import likely_input
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.noise import noise_of
-from bowdenfit.recordings.preparation.shapes import ChosenVector, Places
+from bowdenfit.recordings.preparation.shapes import ChosenVector, Positions
 from bowdenfit.types import Flags, Labels, Matrix, Vector
 
 _STEP = 0.005
@@ -42,7 +42,7 @@ class Segments:
     width: float = _WIDTH
 
 
-def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: Flags) -> Segments | None:
+def cut_segments(time: Vector, input_force: Vector, output_force: Vector, good: Flags) -> Segments | None:
     """Average onto a coarse clock and cut into stretches of equal length, the liveliest of which are kept."""
     span = float(time[-1] - time[0])
     rate = (len(time) - 1) / span
@@ -56,7 +56,7 @@ def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: F
         return None
     coarser = _coarser([_filled(total, count) for total in sums], step)
     whole = len(count) // coarser * coarser
-    count, *sums = (each[:whole].reshape(-1, coarser).sum(axis=1) for each in (count, *sums))
+    count, *sums = (column[:whole].reshape(-1, coarser).sum(axis=1) for column in (count, *sums))
     step, length, width = coarser * step, max(min(length, len(count)), 1), coarser * _WIDTH
     points, forces = len(count), [_filled(total, count) for total in sums]
     x, y = (np.log(force) for force in forces)
@@ -64,14 +64,14 @@ def segments_of(time: Vector, input_force: Vector, output_force: Vector, good: F
     columns = _smooth(x, step, width), _smooth(y, step, width), weights, jitters, forces[0]
     rows = points // length
     x, y, weight, jitter, pulled = (v[: rows * length].reshape(rows, length) for v in columns)
-    chosen = _liveliest(x, max(1, _MOST_POINTS // length))
-    moved = np.stack([_smooth(np.log(likely_input(force)), step, width) for force in pulled[chosen]])
+    chosen = _most_varied(x, max(1, _MOST_POINTS // length))
+    moved = np.stack([_smooth(np.log(smooth_input(force)), step, width) for force in pulled[chosen]])
     return Segments(step, moved, y[chosen], weight[chosen], jitter[chosen], width)
 
 
 def _sums(
     time: Vector, forces: tuple[Vector, Vector], good: Flags, step: float, points: int, length: int
-) -> tuple[Places, ChosenVector, ChosenVector]:
+) -> tuple[Positions, ChosenVector, ChosenVector]:
     """Number of good readings above zero at each point of the coarse clock, and sums of both forces.
 
     Of a recording with very many points, those of stretches evenly from all of it.
@@ -89,7 +89,7 @@ def _sums(
     stretches = [(0, points)]
     if not every:
         stretches = [(row * length, length) for row in np.linspace(0, rows - 1, looked_at).astype(int).tolist()]
-    found: list[tuple[np.ndarray, ...]] = []
+    totals: list[tuple[np.ndarray, ...]] = []
     for begin, wide in stretches:
         ends = (
             [0, len(time)]
@@ -104,8 +104,8 @@ def _sums(
             place = np.clip(((time[some] - time[0]) / step).astype(int) - begin, 0, wide - 1)[usable]
             for total, weights in zip(sums, (None, x[usable], y[usable]), strict=True):
                 total += np.bincount(place, weights, minlength=wide)
-        found.append(sums)
-    count, of_input, of_output = (np.concatenate(each) for each in zip(*found, strict=True))
+        totals.append(sums)
+    count, of_input, of_output = (np.concatenate(column) for column in zip(*totals, strict=True))
     return count, of_input, of_output
 
 
@@ -145,7 +145,7 @@ def _jitter(force: Vector, step: float, width: float) -> Vector:
     return max(noise_of(force) / np.sqrt(points), 1e-4 * float(force.max())) / force
 
 
-def _liveliest(x: Matrix, most: int) -> Places:
+def _most_varied(x: Matrix, most: int) -> Positions:
     """Rows in which the rate changes most, in order."""
     lag = max(1, x.shape[1] // 50)
     bends = np.abs(x[:, 2 * lag :] - 2 * x[:, lag:-lag] + x[:, : -2 * lag]).sum(axis=1)

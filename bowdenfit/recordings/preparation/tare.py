@@ -11,7 +11,7 @@ _PARTS = 8
 _LARGEST_MOVE = 5.0
 
 
-def tare_of(
+def estimate_tare(
     file: str, name: str, time: Vector, force: Vector, quiet: tuple[float, float], good: Flags
 ) -> tuple[float, float]:
     """Mean of a channel's good samples in the quiet interval and its standard error [N].
@@ -64,5 +64,5 @@ def _check_still(file: str, name: str, inside: Vector, quiet: tuple[float, float
 def _scatter(part: Vector) -> float:
     place = np.arange(len(part)) - (len(part) - 1) / 2
     centered = part - part.mean()
-    rest = centered - place * (centered @ place) / (place @ place)
-    return float(np.sqrt(rest @ rest / (len(part) - 2)))
+    residuals = centered - place * (centered @ place) / (place @ place)
+    return float(np.sqrt(residuals @ residuals / (len(part) - 2)))

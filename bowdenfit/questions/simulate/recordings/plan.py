@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from bowdenfit.description import Description, QuantityValue
 from bowdenfit.description.values import Frozen
-from bowdenfit.description.wrong_keys import wrong_keys
+from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DatasetError, DescriptionError, suggest_name
 from bowdenfit.kinds.descriptions import description_without_recordings
 from bowdenfit.questions.simulate.recordings.planned import PlannedRecording, RecordingsPage, plan_recordings
@@ -76,7 +76,7 @@ def parse_recordings_plan(raw: Mapping[str, Any], text: str, file: str = "bench.
         page = _Plan.model_validate({"recordings": raw["recordings"]}).recordings
     except ValidationError as error:
         remedy = 'write it, such as speeds = ["20 r/min"]'
-        raise wrong_keys(error, raw, _Plan, file, remedy) from None
+        raise explain_validation_error(error, raw, _Plan, file, remedy) from None
     measured = _measured_angles(page, description, file)
     recordings = plan_recordings(_with_reference_force(page, raw, file), description, file)
     _check_lengths(recordings, measured, description, file)

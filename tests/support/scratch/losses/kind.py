@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.files.columns import Quantity, find_columns, require
+from bowdenfit.files.columns import Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import read_csv
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.table_files import TableFromFiles
@@ -30,7 +30,7 @@ class LossKind(Kind[LossTable]):
         path = source.file
         table = read_csv(path)
         found = find_columns(table, (Quantity("input_force", "force"), Quantity("loss", "force")), source.columns)
-        force, loss = (np.array(require(table, found, name, f"{name}_N").numbers()) for name in ("input_force", "loss"))
+        force, loss = (np.array(require_column(table, found, name, f"{name}_N").numbers()) for name in ("input_force", "loss"))
         return TableFromFiles(LossTable(force, loss), {path.name: path}, accounts=(table.account,))
 
     def describe(self, table, description):

@@ -21,7 +21,7 @@ _BEYOND = 3.0  # of the noise: what smoothing may change; more is a corner, or a
 _NOISY = 0.5  # of the typical change from block to block: noise that hardly ever passes for motion
 
 
-def likely_input(force: Vector) -> Vector:
+def smooth_input(force: Vector) -> Vector:
     """A series like a measured one that is smooth, and rises and falls by turns as that does beyond its noise.
 
     It is smoothed by polynomials over few blocks (Savitzky and Golay 1964) as far as noise goes, if there is much. Where it
@@ -40,9 +40,9 @@ def likely_input(force: Vector) -> Vector:
         ahead = heading[start:] == heading[start]
         stop = len(force) if ahead.all() else start + int(np.argmin(ahead))
         if stop < len(force):  # the operator sees a turn when its band is crossed: the force was at its extreme before
-            found = start + int(np.argmax(heading[start] * smooth[start:stop])) + 1
-            heading[found:stop] = heading[stop]
-            stop = found
+            turn = start + int(np.argmax(heading[start] * smooth[start:stop])) + 1
+            heading[turn:stop] = heading[stop]
+            stop = turn
         up = 1.0 if heading[start] >= 0 else -1.0
         likely[start:stop] = up * _isotonic(up * smooth[start:stop])
         start = stop

@@ -1,4 +1,4 @@
-"""How the unknowns hang together: every two of them, and each alone on the diagonal."""
+"""Corner plot of the draws: joint credible regions of every two parameters, and the marginals on the diagonal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "Which unknowns hang together"
+HEADING = "Corner plot: which parameters are correlated"
 MOST_QUANTITIES = 8
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
@@ -60,9 +60,10 @@ def data(fit: Record) -> Pairs | None:
 def caption(data: Pairs) -> str:
     """What is drawn, in plain words."""
     return (
-        "Every two unknowns against each other, and each alone on the diagonal. Dark and light: the smallest areas that "
-        "hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements tell a combination of "
-        "the two better than either alone. Dashed: median and 90 % interval. "
+        "Corner plot: every two parameters against each other, and the distribution of each on the diagonal. Dark and light: "
+        "the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two parameters "
+        "are correlated: the measurements determine a combination of them better than either. Dashed: median and 90 % "
+        "interval. "
         f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} sampled values."
     )
@@ -148,7 +149,7 @@ def _remarks(data: Pairs, shown: int) -> list[str]:
     if data.best:
         remarks.append(f"Optimum: best {data.best}")
     if shown < len(data.quantities):
-        remarks.append(f"{shown} of {len(data.quantities)} unknowns shown")
+        remarks.append(f"{shown} of {len(data.quantities)} parameters shown")
     return remarks
 
 

@@ -163,8 +163,8 @@ def number_with_unit(example: str) -> Reader:
             return read_quantity(value, name, example)
         if _is_number_with_unit(value) and math.isfinite(value[0]):
             return float(value[0]), value[1]
-        value, unit = read_quantity(example, name, example)
-        example_pair = f"({value:g}, {unit!r})"
+        example_value, unit = read_quantity(example, name, example)
+        example_pair = f"({example_value:g}, {unit!r})"
         raise UsageError(
             f"{name} = {shown(value)} is not a number with its unit; write it as {example!r}, or as {example_pair}."
         )

@@ -175,8 +175,9 @@ def contradiction(stated: str | None, written: str | None) -> str:
     stated = (stated or "").strip().lstrip("-\u2212")
     if not stated or not written or not (is_unit(stated) and is_unit(written)):
         return ""
-    same_kind = _same_kind(_parsed(stated), _parsed(written))
-    if same_kind and math.isclose(float(_registry().Quantity(1.0, _parsed(stated)).to(_parsed(written)).magnitude), 1.0):
+    if not _same_kind(_parsed(stated), _parsed(written)):  # which is refused where it is converted
+        return ""
+    if math.isclose(float(_registry().Quantity(1.0, _parsed(stated)).to(_parsed(written)).magnitude), 1.0):
         return ""
     return (
         f"its heading says {written} and the option, or cable.toml, says {stated}; correct the one that is wrong, or leave the "

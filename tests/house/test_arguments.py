@@ -73,7 +73,7 @@ def test_what_is_not_clear_is_refused_with_what_to_write(fit, keywords, words):
         (lambda on_body: bf.fit(on_body, settings=3), "settings = 3 must be a list of texts"),
         (lambda on_body: bf.read(on_body, wrap_angle=180), "wrap_angle = 180 is not a number with its unit"),
         (lambda on_body: bf.calibrate(on_body, replications=1), "replications = 1 must be a whole number from 2"),
-        (lambda on_body: bf.predict(on_body), "found must be a fit; write bowdenfit.load("),
+        (lambda on_body: bf.predict(on_body), "fit must be a fit; write bowdenfit.load("),
         (lambda _: bf.compare(["a"]), "fits must be a dictionary of fits by name"),
         (lambda _: bf.compare({"one": "fits/a"}), "fits['one'] must be a fit; write bowdenfit.load('fits/a')"),
     ],

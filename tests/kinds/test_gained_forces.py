@@ -37,7 +37,7 @@ MISTAKES = {
     "columns swapped": (lambda r: r.swapped(), ["input_force and output_force", "swapped"]),
     "strokes exchanged": (lambda r: replace(r, stroke=-r.stroke), ["pull and return"]),
     "returns taken for pulls": (_without_strokes, ["add a column stroke"]),
-    "output in lbf": (lambda r: replace(r, force_out=LBF * r.force_out), ["unit", "lbf and N", "map the column"]),
+    "output in lbf": (lambda r: replace(r, force_out=LBF * r.force_out), ["unit", "lbf and N", "correct the heading"]),
     "input in lbf": (lambda r: replace(r, force_in=LBF * r.force_in), ["unit", "lbf and N", "returning"]),
     "cells of unlike gain": (
         lambda r: replace(r, force_out=1.22 * r.force_out), ["differ in gain", "the run '1'", "input_gain_error_sd"]

@@ -272,7 +272,7 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
         ("efficiency", {"Cable length (mm)", "Efficiency (%)", "Density (1/mm)", "Probability (%)"}),
         ("coefficients", {r"$\mu_1$", r"$\mu_2$", r"$\mu_3$", "Density"}),
         ("pairs", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Efficiency at\noptimum (%)"}),
-        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Stored draw"}),
+        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Stored sample"}),
         ("residuals", {"Efficiency (%)", "Measured less predicted median\n(percentage points)"}),
     ],
 )

@@ -54,7 +54,7 @@ def data(fit: Record) -> Traces | None:
 def caption(data: Traces) -> str:
     """What is drawn, in plain words."""
     return (
-        "Trace plot: the path of every parameter through the stored draws, a color for each independent start. Where the "
+        "Trace plot: the path of every parameter through the stored samples, a color for each independent start. Where the "
         "sampling has converged they lie on top of each other and drift neither up nor down. Right of each panel: the "
         f"distribution of each. {explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
@@ -124,7 +124,7 @@ def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
     number_below(trace, whole=True)
     trace.set_ylabel(_in_two_lines(label), fontsize=SMALL, va="center")
     if last:
-        trace.set_xlabel("Stored draw", fontsize=SMALL, va="center")
+        trace.set_xlabel("Stored sample", fontsize=SMALL, va="center")
     else:
         trace.tick_params(labelbottom=False)
     place_labels(figure, trace, 0.5, 0.27)
@@ -140,8 +140,8 @@ def _in_two_lines(label: str) -> str:
 def _legend_title(chains: bool) -> str:
     """What lines and bands are."""
     if chains:
-        return f"Line: median of each {STRETCHES}th of the draws; shaded: its {WIDE_INTERVAL}; right of each panel: density"
-    return f"Thick: median of the walkers at a draw; thin: their {WIDE_INTERVAL}; right of each panel: density"
+        return f"Line: median of each {STRETCHES}th of the samples; shaded: its {WIDE_INTERVAL}; right of each panel: density"
+    return f"Thick: median of the values at a sample; thin: their {WIDE_INTERVAL}; right of each panel: density"
 
 
 def _draw_legend(figure: Figure, n_ensembles: int, key: str) -> None:

@@ -182,7 +182,7 @@ class Recordings(Part):
 
     Args:
         columns: Contact columns that `own_angle` refers to.
-        each: The recordings.
+        items: The recordings.
         velocity_unit: "mm/s" or "rad/s", what the blocks' velocities are in; empty where none was recorded or stated.
         delay_sd: Standard error of the delay that all of them were shifted by [s]; 0 where it is known.
         loop: Whether they are of a pull-pull loop; forces are then differences of two tensions, of either sign.

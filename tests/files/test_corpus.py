@@ -44,8 +44,8 @@ def test_a_file_is_said_to_be_what_it_is_and_its_command_reads_it(run, monkeypat
         np.testing.assert_allclose(ends, [truth["first"], truth["last"]], rtol=ANY_DIGITS)
         assert len(table.run) == truth["readings"]
     else:
-        assert table.each[0].account.samples == truth["readings"]
-        assert table.each[0].strokes.exponent == pytest.approx(np.pi * truth["mu"], rel=0.05)
+        assert table.items[0].account.samples == truth["readings"]
+        assert table.items[0].strokes.exponent == pytest.approx(np.pi * truth["mu"], rel=0.05)
 
 
 @pytest.mark.parametrize("name", UNDERSTOOD)

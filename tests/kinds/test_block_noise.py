@@ -89,7 +89,7 @@ def test_drifts_hold_less_noise_than_the_change_from_block_to_block(bench):
     """By which a delay would seem a third smaller at 2 N, and better known than it is; without noise they are that change."""
     by_blocks, by_drifts = np.zeros((2, 4, 7))
     for seed in range(4):
-        noisy, quiet = (bench[2](seed, sigma_block=each).each for each in (2.0, 1e-6))
+        noisy, quiet = (bench[2](seed, sigma_block=each).items for each in (2.0, 1e-6))
         for i, (one, other) in enumerate(zip(noisy, quiet, strict=True)):
             change = np.gradient(np.log(np.maximum(one.blocks.output_force, 1.0)), one.blocks.time)
             mine = (one.strokes.stroke == 1) & one.strokes.used_sliding & other.strokes.used_sliding

@@ -197,7 +197,7 @@ def test_recordings_with_clipped_readings_are_refused():
     first = recordings.items[0]
     clipped = replace(first, blocks=replace(first.blocks, saturated=first.blocks.input_force > 100))
     with pytest.raises(DatasetError, match="end of a load cell's range"):
-        refuse_saturated(replace(recordings, each=(clipped, *recordings.items[1:])))
+        refuse_saturated(replace(recordings, items=(clipped, *recordings.items[1:])))
 
 
 # What no bench would hand in ---------------------------------------------------------------------------------------

@@ -280,7 +280,7 @@ def test_a_loop_measured_at_another_preload_is_named_with_its_distance(simulated
     assert loop.conflict > 0.8 * max(d.conflict for d in found)
     assert loop.parameter == "preload"
     assert loop.sds > 4
-    assert loop.rest == pytest.approx(15, abs=0.5)
+    assert loop.others == pytest.approx(15, abs=0.5)
 
 
 def test_the_report_says_which_table_disagrees_and_the_fit_goes_on(tmp_path):

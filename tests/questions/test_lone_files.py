@@ -88,7 +88,7 @@ def test_tensions_called_t1_and_t2_are_no_clocks(tmp_path):
     time, force, output = recorded()
     path = write(tmp_path, ("t", "T1", "T2"), (time, force, output))
     (table,) = bf.read(path, wrap_angle=(180, "deg"), channels=["input_force=T1:N", "output_force=T2:N"]).measurements.tables
-    assert table.each[0].account.samples == len(time)
+    assert table.items[0].account.samples == len(time)
 
 
 @pytest.mark.parametrize(("step", "n"), [(30.0, 12), (5.0, 20)])

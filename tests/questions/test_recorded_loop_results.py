@@ -49,7 +49,7 @@ def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
     page = json.loads(json.dumps(_measurements_page(measurements), allow_nan=False))
     again = _measurements(page).table(Recordings)
     assert again.loop
-    for one, other in zip(again.items, measurements.table(Recordings).each, strict=True):
+    for one, other in zip(again.items, measurements.table(Recordings).items, strict=True):
         assert one.strokes.drag == other.strokes.drag
         np.testing.assert_equal(one.strokes.exponent, other.strokes.exponent)
         assert np.array_equal(one.blocks.output_force, other.blocks.output_force)

@@ -82,7 +82,7 @@ def test_every_run_s_own_exponent_is_found_to_a_thousandth(plain, truth):
     """
     fit, _ = plain
     term = next(t for t in fit.model.terms if t.name == "recorded_efficiency")
-    delay = -fit.dataset.measurements.table(Recordings).each[0].account.delay
+    delay = -fit.dataset.measurements.table(Recordings).items[0].account.delay
     for i, recording in enumerate(truth["recordings"]):
         cells = term.data["run"] == i
         weight = term.data["weight"][cells]
@@ -103,7 +103,7 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     again = bf.load(folder)
     assert details_text(again) == details_text(fit)
     for before, after in zip(
-        fit.dataset.measurements.table(Recordings).each, again.dataset.measurements.table(Recordings).items, strict=True
+        fit.dataset.measurements.table(Recordings).items, again.dataset.measurements.table(Recordings).items, strict=True
     ):
         np.testing.assert_array_equal(before.blocks.input_force, after.blocks.input_force)
         np.testing.assert_array_equal(before.strokes.stroke, after.strokes.stroke)
@@ -115,14 +115,14 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
 def test_no_sample_disappears_without_being_counted(plain):
     fit, folder = plain
     page = json.loads((folder / "summary.json").read_text())
-    lengths = {r.file: r.account.samples for r in fit.dataset.measurements.table(Recordings).each}
+    lengths = {r.file: r.account.samples for r in fit.dataset.measurements.table(Recordings).items}
     for row in page["recordings"]:
         assert sum(row["counts"].values()) == row["samples"] == lengths[row["file"]]
 
 
 def test_the_summary_says_where_the_samples_went_and_how_much_mountings_differ(plain):
     text = " ".join(details_text(plain[0]).split())
-    samples = sum(r.account.samples for r in plain[0].dataset.measurements.table(Recordings).each)
+    samples = sum(r.account.samples for r in plain[0].dataset.measurements.table(Recordings).items)
     assert f"{samples} samples of 7 recordings in 7 runs" in text
     assert "From one mounting of the cable to the next the efficiency scatters by" in text
     assert "% of itself" in text
@@ -194,7 +194,7 @@ def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_r
 def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_draws(plain, recorded):
     fit, _ = plain
     recordings = fit.dataset.measurements.table(Recordings)
-    fewer = fit.dataset.measurements.with_tables(replace(recordings, each=recordings.each[:5]))
+    fewer = fit.dataset.measurements.with_tables(replace(recordings, items=recordings.items[:5]))
     other = replace(fit, dataset=replace(fit.dataset, measurements=fewer))
     with pytest.raises(UsageError, match="same readings"):
         bf.compare({"a": fit, "b": other})

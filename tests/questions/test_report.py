@@ -204,7 +204,7 @@ def test_a_folder_that_is_no_fit_or_was_edited_is_refused(refuse, tmp_path):
     (tmp_path / "fit").mkdir()
     assert "is not a results folder" in refuse("report", tmp_path / "fit")
     (tmp_path / "fit" / "fit.json").write_text('{"schema": 6, "description": 3}')
-    assert "is damaged" in refuse("report", tmp_path / "fit")
+    assert "damaged)" in refuse("report", tmp_path / "fit")
 
 
 def test_a_fit_whose_report_cannot_be_written_is_kept(on_body, tmp_path, monkeypatch):

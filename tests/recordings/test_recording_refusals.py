@@ -443,7 +443,7 @@ def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path,
     describe(tmp_path)
     data = load_dataset(tmp_path)
     moved = replace(data.measurements.table(Recordings).items[0], route=float(at))
-    recordings = replace(data.measurements.table(Recordings), each=(moved,))
+    recordings = replace(data.measurements.table(Recordings), items=(moved,))
     if not refused:
         KINDS["recordings"].check(recordings, data.description, data.measurements)
         return
@@ -507,7 +507,7 @@ def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
     data = load_dataset(folder, [f'tables.recordings.likelihood="{likelihood}"'])
     first, *others = data.measurements.table(Recordings).items
     blocks = replace(first.blocks, output_force=-np.abs(first.blocks.output_force))
-    recordings = replace(data.measurements.table(Recordings), each=(replace(first, blocks=blocks), *others))
+    recordings = replace(data.measurements.table(Recordings), items=(replace(first, blocks=blocks), *others))
     bad = replace(data, measurements=data.measurements.with_tables(recordings))
     with jax.enable_x64(True), pytest.raises(DatasetError, match=r"nothing of the run .* can be used") as error:
         build_model(bad)

@@ -71,7 +71,7 @@ class Laboratory:
             dataset = Dataset(description, empty_tables(description, design), {})
             plan = CalibrationPlan(dataset, dataset, SEED)
             self.benches[key] = Replicator(plan, self.fits, self.disturb, anything)
-        found = self.benches[key].replications(list(seeds))
+        found = self.benches[key].replicate(list(seeds))
         return [{name: each.rank for name, each in replication.ranked.items()} for replication in found]
 
 

@@ -47,7 +47,7 @@ class Reader:
 
     Args:
         read: Returns the argument as the function takes it, from what was written and the name to call it by in a refusal.
-        written: Type of the text on the command line, which `read` accepts too.
+        command_line_type: Type of the text on the command line, which `read` accepts too.
     """
 
     read: Callable[[Any, str], Any]

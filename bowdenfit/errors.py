@@ -85,7 +85,7 @@ class Faults:
     """Collects errors while reading goes on, and raises them together, so that users see all of them at once.
 
     Args:
-        found: The errors collected so far.
+        faults: The errors collected so far.
     """
 
     faults: list[BowdenfitError] = field(default_factory=list)

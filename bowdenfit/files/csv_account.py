@@ -16,7 +16,7 @@ def account_of_csv(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple
     Args:
         path: The file.
         sheet: What its first lines tell.
-        found: What its last rows hold, which were read one by one.
+        columns: What its last rows hold, which were read one by one.
         quick: Where the rows end that were read at once [bytes], and how many these are.
         stop: Where the last whole row ends [bytes].
     """

@@ -31,7 +31,7 @@ class Layout:
         kinds: What the cells of each column are.
         named: Whether there is a row of headings.
         score: How much speaks for this reading of the sheet: the number of cells that are numbers.
-        given: Number of cells in the row of headings.
+        heading_cells: Number of cells in the row of headings.
         over: Positions of the rows of headings and units.
         by_numbers: Whether the headings are a row of numbers, which may be data.
     """

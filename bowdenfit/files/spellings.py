@@ -102,8 +102,8 @@ def parse_heading(heading: str, unit: str = "") -> Spelling | None:
     return None
 
 
-def likely_wrap_angle(heading: str, unit: str = "") -> str | None:
-    """Return the unit of a column that is likely to hold wrap angles, empty where none is written; None for any other.
+def likely_wrap_angle(heading: str, unit: str = "") -> Spelling | None:
+    """Return that a column is likely to hold wrap angles, with the unit that the file gives; None for any other column.
 
     Args:
         heading: As written, with or without its unit.
@@ -116,7 +116,12 @@ def likely_wrap_angle(heading: str, unit: str = "") -> str | None:
         return None
     if not written and not words & (_ANGULAR - _WITH_UNIT_ALONE):
         return None
-    return written or next((_COUNTED[word] for word in words if word in _COUNTED), "")
+    return Spelling("wrap_angle", written or None, "said")
+
+
+def implied_angle_unit(heading: str) -> str:
+    """Return the unit that a heading of angles is itself, as "Turns" and "deg" are; empty for any other."""
+    return next((_COUNTED[word] for word in _words(heading) if word in _COUNTED), "")
 
 
 def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:

@@ -14,7 +14,7 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, find_candidates
 from bowdenfit.files.naming import option_naming
-from bowdenfit.files.spellings import likely_wrap_angle, parse_heading
+from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, HEAD, FileKind, file_kind, numbers_in, stated_angle
 from bowdenfit.units import ColumnSource, dimension_of, is_unit
@@ -292,11 +292,11 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
     likely = dict[str, str]()
     units = dict(zip(table.header, table.units, strict=True))
     for column in columns_of(table):
-        unit = likely_wrap_angle(column.name, units[column.name])
-        if unit is not None and column.high > column.low:
-            has_unit = likely_wrap_angle(column.name, units[column.name] or "1") not in (None, "")
+        spelling = likely_wrap_angle(column.name, units[column.name])
+        if spelling is not None and column.high > column.low:
             in_radians = column.high <= _MOST_RADIANS and column.mean != round(column.mean)
-            likely[column.name] = "" if unit and has_unit else unit or ("rad" if in_radians else "deg")
+            unwritten = implied_angle_unit(column.name) or ("rad" if in_radians else "deg")
+            likely[column.name] = "" if spelling.unit else unwritten
     return likely
 
 

@@ -10,8 +10,8 @@ def describe_curve(has_draws: bool, quantity: str = "") -> str:
     """Return the sentence that explains a line with a 90 % band.
 
     Args:
-        drawn: Whether there are draws; else the line is the least-squares estimate.
-        what: The quantity shown, such as "the output force".
+        has_draws: Whether there are draws; else the line is the least-squares estimate.
+        quantity: The quantity shown, such as "the output force".
     """
     of = f" of {quantity}" if quantity else ""
     if not has_draws:

@@ -48,7 +48,7 @@ def write_figure(figure: AnswerFigure, answer: Any, folder: Path, name: str, cab
     """Write the figure of an answer in every format, and its caption beside it.
 
     Args:
-        figure, found, cable: See `answer_figure`.
+        figure, answer, cable: See `answer_figure`.
         folder: Where to; made if it is missing.
         name: Of the files.
     """

@@ -194,7 +194,7 @@ def titles_and_captions(data: Mapping[str, Any], cable: str, mark: str) -> dict[
     """Title and caption of each figure, by name.
 
     Args:
-        shown: Data of the figures, by name.
+        data: Data of the figures, by name.
         cable: Name of the cable.
         mark: See `mark_of`.
     """

@@ -116,7 +116,7 @@ def write_page(page: "HtmlPage", figures_folder: Path, path: Path) -> Path:
 
     Args:
         page: The page.
-        drawn: Where its figures are, as PNG.
+        figures_folder: Where its figures are, as PNG.
         path: The file.
     """
     from bowdenfit.pages.page import render_page

@@ -16,8 +16,8 @@ def copy_captions(source: Path, target: Path) -> None:
     """Copy the captions of figures that stay in a folder, to be written again with those of others.
 
     Args:
-        there: The folder.
-        place: Where others are being written.
+        source: The folder.
+        target: Where others are being written.
     """
     if (source / CAPTIONS).is_file():
         write_text(target / CAPTIONS, read_text(source / CAPTIONS))
@@ -27,7 +27,7 @@ def write_captions(captions: Mapping[str, str], folder: Path, order: Iterable[st
     """Write the captions of some figures, a paragraph each, beside those of the others in the folder.
 
     Args:
-        said: By figure.
+        captions: By figure.
         folder: Where the figures are.
         order: Of figures; others follow.
     """

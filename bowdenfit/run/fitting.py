@@ -147,7 +147,7 @@ class Programs:
     Args:
         samplers: What each sampler runs, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
-        of_draws: Programs that questions will need.
+        draw_programs: Programs that questions will need.
     """
 
     samplers: dict[str, Any]

@@ -20,7 +20,7 @@ def why_implausible(measured: Dataset, simulated: Dataset) -> str:
 
     Args:
         measured: What was measured.
-        drawn: What was simulated in its place.
+        simulated: What was simulated in its place.
     """
     reasons = (
         kind.why_implausible(measured.measurements.table(kind.table), table)

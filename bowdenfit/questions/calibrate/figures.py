@@ -21,7 +21,7 @@ def draw_calibration(calibration: Calibration, folder: Path) -> list[Path]:
     """Draw and write all figures of a calibration, and what each shows in words.
 
     Args:
-        found: The calibration.
+        calibration: The calibration.
         folder: Where the files go; made if it is missing.
     """
     figures = select_figures(calibration).items()

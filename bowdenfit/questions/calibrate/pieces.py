@@ -40,7 +40,7 @@ class ReplicationPiece:
     """Replications of a plan.
 
     Args:
-        asked: The plan.
+        job: The plan.
         numbers: Which; each is the same whatever else is run.
         versions: Where the work comes from.
     """
@@ -54,7 +54,7 @@ def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int)
     """The work, cut so that so many workers end at about the same time.
 
     Args:
-        asked: The plan.
+        job: The plan.
         numbers: Of the replications.
         workers: At a time; one gets as much at once as is fitted together.
     """

@@ -22,7 +22,7 @@ def calibration_page(calibration: Calibration) -> HtmlPage:
     """The page of a calibration.
 
     Args:
-        found: The calibration.
+        calibration: The calibration.
     """
     first, *others = verdict_sentences(calibration)
     table = [PageTable(HEADS, tuple(quantity_rows(calibration)))] if calibration.quantities else []

@@ -34,7 +34,7 @@ class StatedTruth:
     Args:
         parameter: Which.
         low, high: The range [shown unit]; the same for one value.
-        by_factors: Whether every doubling within the range is as likely as the next.
+        log_uniform: Whether every doubling within the range is as likely as the next.
     """
 
     parameter: Parameter

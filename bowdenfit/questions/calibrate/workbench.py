@@ -77,7 +77,7 @@ class Replicator:
         plan: What is replicated.
         laboratory: What fits; may be shared.
         disturb: What is done to simulated tables before they are fitted, for calibrations that must fail.
-        refusal: Why simulated tables are not to be had from a bench, in a word; empty if they may be.
+        why_implausible: Why simulated tables are not to be had from a bench, in a word; empty if they may be.
     """
 
     plan: CalibrationPlan

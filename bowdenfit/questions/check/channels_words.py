@@ -29,7 +29,7 @@ def describe_recording_file(
 
     Args:
         file: What was read.
-        why: Why it is taken for a recording, as a clause.
+        reason: Why it is taken for a recording, as a clause.
         command: What fits it.
         recordings: The file as a recording, where its channels say which is which.
         obstacle: What keeps it from being one, in a sentence.

@@ -29,7 +29,7 @@ def describe_table_file(
 
     Args:
         raw: The file as read.
-        found: What it is taken for.
+        file: What it is taken for.
         commands: What fits it; two where it could be either.
         data: The data set that it makes; None if it makes none yet.
         obstacle: What keeps it from that, in a sentence.

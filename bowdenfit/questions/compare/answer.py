@@ -54,7 +54,7 @@ class Comparison(Display):
         weights: Of each in the mixture of all that predicts best.
         predictions: Of each, reading by reading.
         omitted: Readings that the fits do not share.
-        described: What each assumes, in words.
+        descriptions: What each assumes, in words.
         parameters: Coefficients and the like, by parameter and fit.
         optimal_length: Of each fit with a route, with its unit.
         rate_effects: Of the fits in which friction may depend on speed.

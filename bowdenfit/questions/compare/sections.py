@@ -20,7 +20,7 @@ def comparison_page(comparison: Comparison) -> HtmlPage:
     """The page of a comparison.
 
     Args:
-        found: The comparison.
+        comparison: The comparison.
     """
     heads, rows = score_table(comparison)
     first, *others = verdict_sentences(comparison)

@@ -47,7 +47,7 @@ class LossByContact:
     """Shares of the contacts, the largest first.
 
     Args:
-        place: Where on the route, in words; empty without a route.
+        position: Where on the route, in words; empty without a route.
         contacts: Each contact's share.
     """
 

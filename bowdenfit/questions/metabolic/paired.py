@@ -68,7 +68,7 @@ def probability_below(mean: float, error: float, persons: int, prior_sd: float =
     Args:
         mean, error: Of the difference, and its standard error.
         persons: How many.
-        before: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
+        prior_sd: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
     """
     if math.isinf(prior_sd):
         return float(stats.t.cdf(-mean / error, persons - 1))

@@ -44,7 +44,7 @@ def rank_measurements(
 
     Args:
         fit: The fit, with a posterior.
-        wanted: The answer; see `answer_of`.
+        target_name: The answer; see `answer_of`.
         candidates: Such as "angle@450"; whatever the tables can hold if none is named.
         costs: Cost of a measurement of each kind; then candidates are ranked by what they do for their cost.
 

@@ -42,7 +42,7 @@ def choose_target(fit: Record, name: str | None) -> TargetQuantity:
 
     Args:
         fit: The fit.
-        wanted: "optimal-length", "optimal-efficiency", "efficiency@470", or a parameter. If omitted the optimal length where
+        name: "optimal-length", "optimal-efficiency", "efficiency@470", or a parameter. If omitted the optimal length where
             there is a route, else the friction coefficient, or with several the efficiency at the nominal wrap angles.
 
     Raises:

@@ -39,7 +39,7 @@ def next_measurement(
     """Rank what could be measured next by how far it would narrow an answer, on average.
 
     Args:
-        found: The fit, or its results folder.
+        fit: The fit, or its results folder.
         answer: What is to be known better: optimal-length, optimal-efficiency, efficiency@470, or a parameter such as mu1.
         candidates: A measurement that you could make, such as angle@450, force@470, efficiency@470, stretch@90deg,50N,
             preload@90deg or loop@90deg,30N; may be repeated.

@@ -20,7 +20,7 @@ def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
     """What to measure next and when to stop, in sentences and a table of the best candidates.
 
     Args:
-        found: The ranking.
+        ranking: The ranking.
         top: How many candidates the table shows.
     """
     more = len(ranking.ranked) - top

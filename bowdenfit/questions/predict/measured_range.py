@@ -66,7 +66,7 @@ def clip_to_tension(force: np.ndarray, input_force: float, slack_word: str = "sl
     Args:
         force: Forces by draws (rows), negative where nothing is left [N].
         input_force: What they are left of [N].
-        word: What a rope is that does not pull.
+        slack_word: What a rope is that does not pull.
     """
     share = np.mean(force <= _ROUNDING * input_force, axis=0)
     words = [

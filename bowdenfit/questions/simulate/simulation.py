@@ -47,7 +47,7 @@ def draw_true_values(
         tables: Of the shape of what is measured.
         truth: What is given.
         key: Random key.
-        once: See `simulate`.
+        run_once: See `simulate`.
 
     Raises:
         UsageError: A name in `truth` is no parameter.
@@ -84,8 +84,8 @@ def simulate(
         values: True value of every parameter [internal units].
         key: Random key.
         noise: Whether readings scatter; without noise every reading is what the model expects.
-        once: Whether this design is measured just once, so that one program of its own is compiled in a third of the time of
-            some hundred small ones, which would serve again.
+        run_once: Whether this design is measured just once, so that one program of its own is compiled, in a third of the time
+            of some hundred small ones, which would serve again.
     """
     dataset = Dataset(description, empty_tables(description, design), {})
     return resimulate(dataset, values, key, noise=noise, beyond_curves=True, run_once=run_once)
@@ -112,7 +112,7 @@ def resimulate(
         noise: Whether readings scatter.
         beyond_curves: Whether angles outside the range of the curves are drawn too, from the curves; else they are kept, as
             the rows' own wrap angles are.
-        once: See `simulate`.
+        run_once: See `simulate`.
 
     Raises:
         DatasetError: A table cannot be drawn anew, or the recordings drawn have no strokes that could be found.

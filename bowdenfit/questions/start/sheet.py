@@ -82,7 +82,7 @@ class MeasuredFile:
         why: Why it is taken for that, as a clause.
         likely: The kind that it may be where it does not say.
         sources: Columns that the description must name, by quantity.
-        taken: Headings of the columns that are known.
+        assigned: Headings of the columns that are known.
         settings: What else stands beside the file in the description.
         has_clock: Whether a recording says when its samples were taken.
     """

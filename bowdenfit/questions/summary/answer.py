@@ -29,7 +29,7 @@ class KeyQuantity:
 
     Args:
         name: As in cable.toml.
-        what: What it is.
+        description: What it is.
         unit: Its unit, empty without one.
         value: Median, or estimate of least squares.
         interval: 90 % interval; what is known instead where there is none.

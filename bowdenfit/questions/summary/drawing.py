@@ -1,33 +1,22 @@
-"""Drawing the figures of a fit into a folder: copied where the fit has drawn them before, else drawn from stored data."""
+"""Figures of a fit in a folder: copied where the fit has drawn them, which loads no NumPy, else drawn from stored data."""
 
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.plots.write import FORMATS, PNG
 from bowdenfit.questions import summary
-from bowdenfit.questions.figures import (
-    FIGURES,
-    collect_figure_data,
-    parse_page_width,
-    read_figure_data,
-    titles_and_captions,
-    warning_mark,
-    write_figure_files,
-)
 from bowdenfit.questions.writing import Files
-from bowdenfit.results.answer_cache import read_answers
 from bowdenfit.results.figures_folder import captions_if_unchanged, copy_captions, write_captions
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
-from bowdenfit.results.folder import FIT, fill_folder_atomically, read_page
+from bowdenfit.results.folder import fill_folder_atomically
 
-# Captions of the figures by name, the order of all figures in captions.txt, and a function that writes the files of the
-# figures into a folder in some formats.
-_FigureFiles = tuple[dict[str, str], Sequence[str], Callable[[Path, Sequence[str]], None]]
+if TYPE_CHECKING:
+    from bowdenfit.questions.summary.figure_files import FigureFiles
 
 
 def draw_into_folder(
@@ -56,7 +45,7 @@ def draw_into_folder(
         raise UsageError("a fit by itself has no folder; name one for the figures.")
     endings = _check_formats(formats)
     existing = _find_drawn_figures(results, names, endings) if results is not None and width is None else None
-    captions, order, write_files = existing or _prepare_figures(fit, names, width)
+    captions, order, write_files = existing or summary.prepare_figures(fit, names, width)
     with fill_folder_atomically(Path(output)) as folder:
         copy_captions(Path(output), folder)
         write_files(folder, endings)
@@ -65,7 +54,7 @@ def draw_into_folder(
     return Files(Path(output) / name for name in (*files, captions_file.name))
 
 
-def _find_drawn_figures(results: Path, names: Sequence[str], endings: Sequence[str]) -> _FigureFiles | None:
+def _find_drawn_figures(results: Path, names: Sequence[str], endings: Sequence[str]) -> "FigureFiles | None":
     """Return figures that the fit has drawn before, to be copied; None where they must be drawn."""
     captions = captions_if_unchanged(results, names, endings)
     if captions is None:
@@ -80,46 +69,9 @@ def _copy_figures(source: Path, names: Sequence[str], folder: Path, endings: Seq
             shutil.copyfile(source / f"{name}.{ending}", folder / f"{name}.{ending}")
 
 
-def _prepare_figures(fit: Any, names: Sequence[str], width: NumberWithUnit | None) -> _FigureFiles:
-    """Return figures that are to be drawn."""
-    page = parse_page_width(width)
-    data, cable, mark = _collect_data(fit, names)
-    return titles_and_captions(data, cable, mark), tuple(FIGURES), partial(_draw_figures, data, (cable, page, mark))
-
-
-def _draw_figures(
-    figures: Mapping[str, Any], look: tuple[str, float | None, str], folder: Path, endings: Sequence[str]
-) -> None:
-    for name, data in figures.items():
-        write_figure_files(name, data, folder, endings, *look)
-
-
 def _check_formats(names: Sequence[str]) -> Sequence[str]:
     """Return the endings of the files; PNG where none is named."""
     for name in names:
         if name not in FORMATS:
             raise UsageError(f"there is no format {name!r} for figures{suggest_name(name, list(FORMATS))}")
     return tuple(dict.fromkeys(names)) or (PNG,)
-
-
-def _collect_data(fit: Any, names: Sequence[str]) -> tuple[dict[str, Any], str, str]:
-    """Return the data of the figures, the name of the cable, and the warning on figures of a fit that is not to be trusted.
-
-    Data that are stored in the results folder are read back, which needs neither the model nor JAX.
-    """
-    for name in names:
-        if name not in FIGURES:
-            raise UsageError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
-    results = Path(fit) if isinstance(fit, str | Path) else None
-    data = read_figure_data(results, names) if results is not None else {}
-    if data and results is not None:
-        cable, troubles = read_page(results / FIT)["description"]["name"], read_answers(results)["troubles"]
-    else:
-        from bowdenfit.results.store import load
-
-        record = load(results) if results is not None else fit
-        data, cable = dict(collect_figure_data(record, names)), record.name
-        troubles = tuple(summary.assess_fit(record).troubles)
-    if missing := [name for name in names if name not in data]:
-        raise UsageError(f"this fit has nothing to show in the figure {missing[0]!r}; leave it out.")
-    return data, cable, warning_mark(troubles)

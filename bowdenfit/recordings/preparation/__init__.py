@@ -100,8 +100,8 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
     """The steps after the delay is known; see `prepare`.
 
     Args:
-        found: The recording.
-        one_for_all: Delay and its standard error [s] that replace those of this recording.
+        inspected: The recording.
+        shared_delay: Delay and its standard error [s] that replace those of this recording.
     """
     raw, settings, remarks, cleaned = inspected.raw, inspected.settings, inspected.remarks, inspected.cleaned
     delay = inspected.delay if shared_delay is None else Delay(*shared_delay, inspected.delay.exponent)

@@ -225,7 +225,7 @@ def _linearized(
         rests: Of the recording with the drag that was begun with.
         weight: Roots of weights.
         point: The parameters.
-        begun: The drag that was begun with [N]; empty if it is not asked about.
+        initial_drag: The drag that was begun with [N]; empty if it is not asked about.
     """
     exponent, ratio, delay = (float(value) for value in point[:3])
     plain = segments

@@ -17,7 +17,7 @@ def write_recordings(recording_set: RecordingSet, folder: Path) -> None:
     """Write cable.toml, the recordings, the angles and truth.json.
 
     Args:
-        made: What was made.
+        recording_set: What was made.
         folder: Where to.
     """
     plan = recording_set.plan

@@ -45,13 +45,13 @@ def load_description(
     """
     text, stated = read_toml(path, overrides)
     raw, wrong = with_columns(stated, columns or {}), Faults()
-    left = find_placeholders(raw, text, path.name)
-    wrong.faults += left.values()
+    placeholders = find_placeholders(raw, text, path.name)
+    wrong.faults += placeholders.values()
     try:
         description = parse_description(raw, path.name)
     except DescriptionError as error:
-        wrong.faults += [each for each in error.faults or (error,) if not _is_about(each.key_path, left)]
-        keys = {str(each.key_path[0]) if each.key_path else "schema" for each in wrong.faults}
+        wrong.faults += [fault for fault in error.faults or (error,) if not _is_about(fault.key_path, placeholders)]
+        keys = {str(fault.key_path[0]) if fault.key_path else "schema" for fault in wrong.faults}
         if keys & _ASKED_BY_TABLES or not keys <= set(raw):
             wrong.refuse()
         try:
@@ -67,9 +67,9 @@ def load_description(
     return description
 
 
-def _is_about(place: Place, left: Mapping[Place, DescriptionError]) -> bool:
+def _is_about(key_path: Place, placeholders: Mapping[Place, DescriptionError]) -> bool:
     """Whether a fault is one of a placeholder's."""
-    return any(bool(place) and place[: len(other)] == other[: len(place)] for other in left)
+    return any(bool(key_path) and key_path[: len(placeholder)] == placeholder[: len(key_path)] for placeholder in placeholders)
 
 
 def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:

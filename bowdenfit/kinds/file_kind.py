@@ -62,14 +62,14 @@ def stated_angle(path: Path) -> tuple[str, str] | None:
     Args:
         path: The file; only the first lines of a text are looked at.
     """
-    found = {_angle(match): "a line of the file" for line in _lines(path) for match in _IN_TEXT.finditer(line)}
-    found = found or {_angle(match): "its name" for match in _IN_NAME.finditer(path.stem)}
-    return next(iter(found.items())) if len(found) == 1 else None
+    angles = {_angle(match): "a line of the file" for line in _lines(path) for match in _IN_TEXT.finditer(line)}
+    angles = angles or {_angle(match): "its name" for match in _IN_NAME.finditer(path.stem)}
+    return next(iter(angles.items())) if len(angles) == 1 else None
 
 
 def _angle(match: re.Match[str]) -> str:
-    said = match.groupdict()
-    number, unit = said["a"] or said.get("d") or "", said["b"] or said.get("c") or ""
+    groups = match.groupdict()
+    number, unit = groups["a"] or groups.get("d") or "", groups["b"] or groups.get("c") or ""
     return number.replace(",", ".") + ("rad" if unit.lower() == "rad" else "deg")
 
 
@@ -150,10 +150,10 @@ def _without_headings(path: Path, error: DatasetError) -> FileKind:
 
 def _by_columns(path: Path, table: RawTable) -> FileKind:
     clock = next((i for i, _ in enumerate(table.header) if _is_time(table, i)), None)
-    found = {name for name, columns in find_candidates(_headings(table), COLUMNS).items() if columns}
+    quantities = {name for name, columns in find_candidates(_headings(table), COLUMNS).items() if columns}
     forces = {quantity.name for quantity in FORCES}
-    kind = "efficiencies" if "efficiency" in found and not forces <= found else "forces"
-    rows_alone = next((name for name in ("run", "stroke", "group") if name in found), "")
+    kind = "efficiencies" if "efficiency" in quantities and not forces <= quantities else "forces"
+    rows_alone = next((name for name in ("run", "stroke", "group") if name in quantities), "")
     if _has_one_force_and_a_position(table):
         return FileKind("displacement", "it has one force and a displacement")
     if clock is not None:
@@ -175,11 +175,11 @@ def _lines_above(path: Path, table: RawTable) -> list[str]:
 def _has_one_force_and_a_position(table: RawTable) -> bool:
     """Whether a table has a single column of forces, at the motor if it says where, and one of displacements."""
     headings = _headings(table)
-    found = {name: len(columns) for name, columns in find_candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
+    counts = {name: len(columns) for name, columns in find_candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
     units = [heading_of(heading, unit).unit for heading, unit in headings]
     forces = sum(unit is not None and is_unit(unit) and dimension_of(unit) == "force" for unit in units)
-    at_motor = found["force"] + found["input_force"] == 1 and not found["output_force"]
-    return at_motor and forces <= 1 and found["displacement"] + found["position"] == 1
+    at_motor = counts["force"] + counts["input_force"] == 1 and not counts["output_force"]
+    return at_motor and forces <= 1 and counts["displacement"] + counts["position"] == 1
 
 
 def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
@@ -221,13 +221,13 @@ def _is_time(table: RawTable, column: int) -> bool:
 
 def numbers_in(table: RawTable, column: int) -> list[float]:
     """The numbers of a column, as they stand there; NaN where a cell holds none."""
-    found = []
+    numbers = []
     for row in table.rows:
         try:
-            found.append(row[column].number())
+            numbers.append(row[column].number())
         except DatasetError:
-            found.append(math.nan)
-    return found
+            numbers.append(math.nan)
+    return numbers
 
 
 def _steps(table: RawTable, column: int) -> list[float]:

@@ -48,7 +48,7 @@ class HeadedColumn:
 
 def columns_of(table: RawTable) -> list[HeadedColumn]:
     """The columns of numbers of a table but for clocks."""
-    found = []
+    columns = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
         known = [value for value in numbers_in(table, i) if np.isfinite(value)]
         if (
@@ -56,8 +56,8 @@ def columns_of(table: RawTable) -> list[HeadedColumn]:
             and len(known) > len(table.rows) / 2
             and not (names_time(heading) and not parse_heading(heading, unit))
         ):
-            found.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
-    return found
+            columns.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
+    return columns
 
 
 def name_ends(
@@ -71,38 +71,38 @@ def name_ends(
         stated: What the user has named already, by quantity.
         always: Whether forces are named that say themselves what they are.
     """
-    columns = [each for each in columns if each.name not in [source.name for source in stated.values()]]
-    can_be = find_candidates([(each.name, each.unit) for each in columns], FORCES, tuple(stated))
-    ends = {name: columns[found[0].position] for name, found in can_be.items() if found}
-    sure = {name for name, found in can_be.items() if len(found) == 1}
+    columns = [column for column in columns if column.name not in [source.name for source in stated.values()]]
+    can_be = find_candidates([(column.name, column.unit) for column in columns], FORCES, tuple(stated))
+    ends = {name: columns[candidates[0].position] for name, candidates in can_be.items() if candidates}
+    sure = {name for name, candidates in can_be.items() if len(candidates) == 1}
     provided = []
-    asked = [quantity.name for quantity in FORCES if quantity.name not in stated]
-    missing = [name for name in asked if name not in ends]
-    rest = _forces_among([each for each in columns if each not in ends.values()])
-    if missing and len(rest) == len(missing):
-        rest = sorted(rest, key=lambda each: -each.mean)  # a pulled cable loses force
-        ends |= dict(zip(missing, rest, strict=True))
+    unnamed = [quantity.name for quantity in FORCES if quantity.name not in stated]
+    missing = [name for name in unnamed if name not in ends]
+    others = _forces_among([column for column in columns if column not in ends.values()])
+    if missing and len(others) == len(missing):
+        others = sorted(others, key=lambda column: -column.mean)  # a pulled cable loses force
+        ends |= dict(zip(missing, others, strict=True))
         provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
     elif missing:
         ends |= {name: HeadedColumn("NAME", "N") for name in missing}
         provided += [f"NAME is the {option.removeprefix('--')} of the {name}" for name in missing]
-    elif len(sure) < len(asked):
+    elif len(sure) < len(unnamed):
         provided += [f"{shown(ends[name].name)} is the {name}" for name in ends if name not in sure]
     options = []
-    for name in asked:
+    for name in unnamed:
         unit = "" if _unit(ends[name]) else "N"
         if always or unit or name not in sure:
             options.append(option_naming(name, ends[name].name, unit, option))
-    if any(not _unit(each) for each in ends.values()):
+    if any(not _unit(column) for column in ends.values()):
         provided.append("the forces are in newtons, as the file does not say")
     return options, provided
 
 
 def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
     """The columns that can be forces: those in units of force, or where there are none those without any unit."""
-    measured = [each for each in columns if not _SPREAD.search(each.name)]
-    of_force = [each for each in measured if (unit := _unit(each)) and is_unit(unit) and dimension_of(unit) == "force"]
-    return of_force or [each for each in measured if not _unit(each)]
+    measured = [column for column in columns if not _SPREAD.search(column.name)]
+    of_force = [column for column in measured if (unit := _unit(column)) and is_unit(unit) and dimension_of(unit) == "force"]
+    return of_force or [column for column in measured if not _unit(column)]
 
 
 def _unit(column: HeadedColumn) -> str:
@@ -141,12 +141,12 @@ def table_command(
     options, provided = list[str](), list[str]()
     if kind == "forces":
         numbers, others = columns_of(table), _of_others(headings)
-        words, could_be = _of_words(headings, numbers), [each for each in numbers if each.name not in others]
+        words, could_be = _of_words(headings, numbers), [column for column in numbers if column.name not in others]
         options, provided = name_ends(could_be, "--column", {**words, **stated}, always)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(table, path)
-    found = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
+    command = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
     named = [option for option in (*angle, *options) if option.startswith("--column")]
-    return replace(found, names_more=bool(named) and not any(option.endswith("=NAME") for option in named))
+    return replace(command, names_more=bool(named) and not any(option.endswith("=NAME") for option in named))
 
 
 def recording_command(
@@ -173,19 +173,19 @@ def recording_command(
     return _command(path, [*angle, *_named(stated, "--channel"), *options], [*of_angle, *provided])
 
 
-def either(path: Path, table: RawTable, found: FileKind) -> list[FitCommand]:
+def either(path: Path, table: RawTable, guess: FileKind) -> list[FitCommand]:
     """The commands for a file that could be a table or a recording, in this order."""
-    kind = found.kind if found.other == "recordings" else found.other
+    kind = guess.kind if guess.other == "recordings" else guess.other
     clocks = [i for i, heading in enumerate(table.header) if names_time(heading)]
-    channels = [HeadedColumn(*_split(each.name, each.unit), each.mean) for each in columns_of(table)]
+    channels = [HeadedColumn(*_split(column.name, column.unit), column.mean) for column in columns_of(table)]
     return [table_command(path, table, kind, {}, True), recording_command(path, channels, bool(clocks), {}, True)]
 
 
-def refuse_either(path: Path, table: RawTable, found: FileKind) -> DatasetError:
+def refuse_either(path: Path, table: RawTable, guess: FileKind) -> DatasetError:
     """The refusal of a file that could be a table or a recording."""
-    of_table, of_recording = either(path, table, found)
+    of_table, of_recording = either(path, table, guess)
     return DatasetError(
-        f"{path.name} could be a table of readings or a recording: {found.why}; say which, for a table by {of_table.text}, for "
+        f"{path.name} could be a table of readings or a recording: {guess.why}; say which, for a table by {of_table.text}, for "
         f"a recording by {of_recording.text}."
     )
 
@@ -196,10 +196,10 @@ def only_kind(path: Path, has_channels: bool, named: Sequence[str]) -> str:
     Raises:
         DatasetError: It could be of either of two; says the command for each.
     """
-    found = file_kind(path, has_channels, named)
-    if found.other:
-        raise refuse_either(path, read_table(path, HEAD), found)
-    return found.kind
+    guess = file_kind(path, has_channels, named)
+    if guess.other:
+        raise refuse_either(path, read_table(path, HEAD), guess)
+    return guess.kind
 
 
 def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) -> bool:
@@ -248,20 +248,20 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
 
 def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
     """Forces whose columns say what they are and hold no numbers, so that no other column is to be taken for them."""
-    known = {each.name for each in numbers}
-    found = {
-        name: [headings[each.position][0] for each in columns]
+    known = {column.name for column in numbers}
+    names_of = {
+        name: [headings[column.position][0] for column in columns]
         for name, columns in find_candidates(headings, FORCES).items()
     }
     return {
-        name: ColumnSource(name=named[0]) for name, named in found.items() if named and not known.intersection(named)
+        name: ColumnSource(name=named[0]) for name, named in names_of.items() if named and not known.intersection(named)
     }
 
 
 def _of_others(headings: Sequence[tuple[str, str]]) -> set[str]:
     """Columns that say themselves that they are something other than a force, such as the label of a run."""
-    found = find_candidates(headings, BESIDE_FORCES)
-    return {headings[columns[0].position][0] for columns in found.values() if len(columns) == 1}
+    candidates = find_candidates(headings, BESIDE_FORCES)
+    return {headings[columns[0].position][0] for columns in candidates.values() if len(columns) == 1}
 
 
 def _split(heading: str, unit: str) -> tuple[str, str]:

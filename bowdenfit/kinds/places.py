@@ -80,10 +80,10 @@ def _bends(term: Term) -> np.ndarray | None:
         return None
     bends = np.rad2deg(np.sum(np.where(own, at["own"], 0.0), axis=1))
     if rows is not None:
-        each = [bends[rows.run == run] for run in np.unique(rows.run)]
-        if any(np.ptp(of_run) > _ONE_PLACE * np.ptp(bends) for of_run in each):
+        angles_of_runs = [bends[rows.run == run] for run in np.unique(rows.run)]
+        if any(np.ptp(of_run) > _ONE_PLACE * np.ptp(bends) for of_run in angles_of_runs):
             return None
-        bends = np.array([of_run.mean() for of_run in each])
+        bends = np.array([of_run.mean() for of_run in angles_of_runs])
     return bends if len(bends) == n else None
 
 
@@ -99,7 +99,7 @@ def route_values(term: Term) -> np.ndarray | None:
     if "run" not in data:
         return values if len(values) == n else None
     of_run = [values[data["run"] == run] for run in range(n)]
-    return np.array([each.mean() if np.ptp(each) <= _ONE_PLACE * np.ptp(values) else np.nan for each in of_run])
+    return np.array([at_run.mean() if np.ptp(at_run) <= _ONE_PLACE * np.ptp(values) else np.nan for at_run in of_run])
 
 
 def _flat(by_curve: Mapping[str, Any]) -> np.ndarray:

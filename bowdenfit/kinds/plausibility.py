@@ -55,7 +55,7 @@ def beyond(loss: np.ndarray, what: str) -> str:
 
 def parts(group: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
     """The values of each group."""
-    return [values[group == each] for each in np.unique(group)]
+    return [values[group == label] for label in np.unique(group)]
 
 
 def within_factor(real: float, made: float) -> bool:
@@ -99,8 +99,8 @@ def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, alon
         settings, read, along, curve: As of `Compared`; all rows lie on one curve if that is omitted.
     """
     n = len(along)
-    none, each = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
-    return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, each)
+    none, curves = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
+    return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, curves)
 
 
 def places_along(rows: ForceRows) -> Vector:
@@ -115,13 +115,13 @@ def copies(compared: Compared) -> list[str]:
     alike, repeated = _alike(rows, parts), _repeated(rows, parts)
     if not alike and not repeated:
         return []
-    chances, told = _chances(compared), []
+    chances, sentences = _chances(compared), []
     for same in alike:
         first, *others = (compared.names[k] for k in same)
         one = parts[same[0]]
         if _log_chance(chances, compared.read[one]) + 2 * np.log(len(parts)) < np.log(CHANCE):
             hold = "holds" if len(others) == 1 else "hold"
-            told.append(
+            sentences.append(
                 f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
             )
     for times, those in repeated.items():
@@ -129,8 +129,8 @@ def copies(compared: Compared) -> list[str]:
         if (1 - 1 / times) * _log_chance(chances, compared.read[where]) < np.log(CHANCE):
             whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
             often = _MULTIPLES.get(times, f"{times} times")
-            told.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
-    return told
+            sentences.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
+    return sentences
 
 
 def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
@@ -143,12 +143,12 @@ def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
 
 def _repeated(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
     """Runs in which every row stands equally often, by how often that is, if more than once."""
-    found: dict[int, list[int]] = defaultdict(list)
+    runs_by_count: dict[int, list[int]] = defaultdict(list)
     for k, where in parts.items():
         times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
         if times > 1:
-            found[times].append(k)
-    return found
+            runs_by_count[times].append(k)
+    return runs_by_count
 
 
 def _log_chance(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
@@ -162,29 +162,29 @@ def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
     By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
     width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
     """
-    found = np.ones(compared.read.shape[1])
+    probabilities = np.ones(compared.read.shape[1])
     for c, read in enumerate(compared.read.T):
         known = np.isfinite(read) & np.isfinite(compared.along)
         squares = freedom = 0.0
         for curve in np.unique(compared.curve[known]):
             here = known & (compared.curve == curve)
             points = np.unique(np.column_stack([compared.along[here], read[here]]), axis=0)
-            rest, left = _about_a_polynomial(*points.T)
-            squares, freedom = squares + rest, freedom + left
+            residual, left = _about_a_polynomial(*points.T)
+            squares, freedom = squares + residual, freedom + left
         values = np.unique(read[known])
         if freedom < _LEAST_FREEDOM or len(values) < 2:
             continue
         scatter = np.sqrt(squares / freedom)
         last_digit = np.diff(values).min()
         if scatter > max(_FINE * last_digit, NO_NOISE * np.sqrt(np.mean(values**2))):
-            found[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
-    return found
+            probabilities[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
+    return probabilities
 
 
 def _about_a_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
     """Sum of squares about a polynomial of x, and its degrees of freedom."""
-    places = len(np.unique(x))
-    degree = min(_DEGREE, places - 2) if places > 3 else places - 1
+    n_different = len(np.unique(x))
+    degree = min(_DEGREE, n_different - 2) if n_different > 3 else n_different - 1
     width = np.ptp(x)
     design = np.vander((x - x.min()) / width if width > 0 else np.zeros(len(x)), degree + 1)
     fit = np.linalg.lstsq(design, y, rcond=None)[0]
@@ -222,9 +222,9 @@ def coarse(file: str, settings: Float[np.ndarray, "rows settings"], read: Vector
     if not np.all(read > 0):
         return None
     settings = np.nan_to_num(settings, nan=-1.0)
-    places = np.unique(settings, axis=0)
+    conditions = np.unique(settings, axis=0)
     different = np.unique(np.column_stack([settings, read]), axis=0)[:, -1]
-    if len(different) > len(places) or len(read) - len(places) < _LEAST_AGAIN:
+    if len(different) > len(conditions) or len(read) - len(conditions) < _LEAST_AGAIN:
         return None
     last_digit = _last_digit(read)
     if last_digit == 0:

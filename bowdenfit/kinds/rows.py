@@ -143,18 +143,18 @@ def read_angle(cell: Cell, column: Column) -> float:
 
 
 def read_strokes(
-    found: Mapping[str, Column], n_rows: int, held: str = ", or hold (0, read while nothing slides)"
+    columns: Mapping[str, Column], n_rows: int, held: str = ", or hold (0, read while nothing slides)"
 ) -> Labels:
     """Strokes of a table; all pulling without a column.
 
     Args:
-        found: Columns of the table.
+        columns: Columns of the table.
         n_rows: Number of its rows.
         held: What a refusal says of held readings; empty where the table may have none.
     """
-    if "stroke" not in found:
+    if "stroke" not in columns:
         return np.ones(n_rows, dtype=int)
-    return np.array(found["stroke"].read_cells(lambda cell: _stroke(cell, held), 1))
+    return np.array(columns["stroke"].read_cells(lambda cell: _stroke(cell, held), 1))
 
 
 def _stroke(cell: Cell, held: str) -> int:
@@ -172,11 +172,11 @@ def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quanti
     return (*([route_column(route)] if route else []), *angles)
 
 
-def read_route(table: RawTable, found: Mapping[str, Column], route: Route | None) -> Vector:
+def read_route(table: RawTable, columns: Mapping[str, Column], route: Route | None) -> Vector:
     """Route variable of every row; NaN without a route."""
     if route is None:
         return np.full(len(table.rows), np.nan)
-    return rounded(require_column(table, found, route.variable, f"{route.variable}_{route.unit}").numbers())
+    return rounded(require_column(table, columns, route.variable, f"{route.variable}_{route.unit}").numbers())
 
 
 def rounded(values: Iterable[float]) -> Vector:
@@ -184,12 +184,12 @@ def rounded(values: Iterable[float]) -> Vector:
     return np.array([float(f"{value:.12g}") for value in values])
 
 
-def read_own_angles(table: RawTable, found: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
+def read_own_angles(table: RawTable, columns: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
     """Wrap angles that rows carry themselves."""
     n = len(table.rows)
     angle, sd = np.full((n, len(contacts)), np.nan), np.full((n, len(contacts)), np.nan)
     for k, name in enumerate(contacts):
-        for target, column in ((angle, found.get(name)), (sd, found.get(f"{name}_sd"))):
+        for target, column in ((angle, columns.get(name)), (sd, columns.get(f"{name}_sd"))):
             if column is not None:
                 target[:, k] = column.read_cells(partial(_own_angle, column), np.nan)
     return OwnAngles(tuple(contacts), angle, sd)
@@ -224,10 +224,10 @@ def read_tension(cell: Cell, column: Column, what: str) -> float:
     return value
 
 
-def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Sequence[Quantity]) -> None:
+def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Sequence[Quantity]) -> None:
     """A column that nothing reads must not be a misspelled one that would have been read."""
-    read = {column.heading for column in found.values()}
-    missing = [quantity.name for quantity in optional if quantity.name not in found]
+    read = {column.heading for column in columns.values()}
+    missing = [quantity.name for quantity in optional if quantity.name not in columns]
     for heading in table.header:
         name = heading.lower().partition(" ")[0].partition("_")[0]
         near = get_close_matches(name, missing, n=1, cutoff=_ALIKE) if heading and heading not in read else []
@@ -239,11 +239,11 @@ def check_spelling(table: RawTable, found: Mapping[str, Column], optional: Seque
                 )
 
 
-def end_column(table: RawTable, found: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
+def end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
     """The column of one end, "input" or "output".
 
     Args:
-        table, found: Where it is looked for.
+        table, columns: Where it is looked for.
         end: Which end.
         is_loop: Whether torques are as usual as forces, so that both are named where there are none.
 
@@ -251,25 +251,25 @@ def end_column(table: RawTable, found: Mapping[str, Column], end: str, *, is_loo
         DatasetError: There is none of forces and none of torques, or one of each.
     """
     force, torque = f"{end}_force", f"{end}_torque"
-    if force in found and torque in found:
+    if force in columns and torque in columns:
         raise DatasetError(f"{table.file} has both {force} and {torque}; leave one of the two columns out.")
     named = f"{force}_N or {torque}_N_m" if is_loop else f"{force}_N"
-    return found[torque] if torque in found else require_column(table, found, force, named)
+    return columns[torque] if torque in columns else require_column(table, columns, force, named)
 
 
-def forces_of(values: Vector, table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def forces_of(values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Forces at one end [N], from what its column holds.
 
     Args:
         values: Numbers of `end_column`, in N or N mm.
-        table, found: Where they were read.
+        table, columns: Where they were read.
         end: "input" or "output".
         pulleys: Their radii.
 
     Raises:
         DatasetError: They are torques, and the radius of that pulley is not stated.
     """
-    return pulleys.forces(values, end, table.file) if f"{end}_torque" in found else values
+    return pulleys.forces(values, end, table.file) if f"{end}_torque" in columns else values
 
 
 def route_heading(description: Description) -> list[str]:

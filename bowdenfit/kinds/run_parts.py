@@ -67,9 +67,9 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
             f"{term.name} has {len(counts):,} parts, and at most {_MOST_PARTS} can be left out one by one; use --leave-out "
             f"{'load' if unit == 'reading' else 'run'}."
         )
-    each = len(term.data["mean"]) // len(term.labels)
+    cells_per_run = len(term.data["mean"]) // len(term.labels)
     left = [
-        with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), each)
+        with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), cells_per_run)
         for i in range(len(counts))
     ]
     ratio, load = (np.bincount(part, values) / counts for values in (term.rows.log_ratio, term.rows.input_force))
@@ -102,7 +102,7 @@ def _load_levels(rows: SlidingRows, run: Labels) -> Labels:
     level = np.zeros(len(run), dtype=int)
     group = run * 2 + (rows.stroke > 0)
     for which in np.unique(group):
-        mine = np.flatnonzero(group == which)
-        order = mine[np.argsort(rows.input_force[mine], kind="stable")]
-        level[order] = np.arange(len(mine)) * min(_MOST_LOADS, len(mine)) // len(mine)
+        rows_in_group = np.flatnonzero(group == which)
+        order = rows_in_group[np.argsort(rows.input_force[rows_in_group], kind="stable")]
+        level[order] = np.arange(len(rows_in_group)) * min(_MOST_LOADS, len(rows_in_group)) // len(rows_in_group)
     return level

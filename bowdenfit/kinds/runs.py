@@ -92,10 +92,10 @@ class RunsTerm:
         cell, first = _cells(self.cable, self.rows)
         runs, run = np.unique(self.rows.run, return_inverse=True)
         of_cell = np.searchsorted(runs, self.rows.run[first])
-        place = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
+        position = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
         most = len(self.data["mean"]) // len(runs)
         ratio = self.cable.description.sensors.noise_ratio
-        return inside_runs((of_cell * most + place)[cell], run, self.rows, ratio)
+        return inside_runs((of_cell * most + position)[cell], run, self.rows, ratio)
 
     def _shown(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
@@ -154,8 +154,8 @@ class RunsTerm:
         """
         if np.any(self.data["n"] > 1) or len(self.labels) < _FEWEST or self.cable.description.noise != "normal":
             return {}
-        found = jax.jit(lambda v, data: self._deviations(v, data, v))(dict(values), self.data)
-        squares, per_noise = np.asarray(found.mounting) ** 2, 1 / np.asarray(found.total)
+        deviations = jax.jit(lambda v, data: self._deviations(v, data, v))(dict(values), self.data)
+        squares, per_noise = np.asarray(deviations.mounting) ** 2, 1 / np.asarray(deviations.total)
         shares = np.concatenate([[0.0], np.geomspace(_LEAST_SHARE, 1 / _LEAST_SHARE, 49)]) / np.median(per_noise)
         variance = 1 + shares[:, None] * per_noise
         tau_squared = np.mean(squares / variance, axis=1)
@@ -167,18 +167,18 @@ class RunsTerm:
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
         """Log likelihood of each run, all samples together."""
-        found = self._deviations(values, data, values)
+        deviations = self._deviations(values, data, values)
         noise, n = values[self.reading_noise], data["n"]
-        squares = data["scatter"] + found.inside + self._per_run(data, found.within**2)
-        constant = (data["log_weights"] - jnp.log(found.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
+        squares = data["scatter"] + deviations.inside + self._per_run(data, deviations.within**2)
+        constant = (data["log_weights"] - jnp.log(deviations.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
         inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
-        return inside + noise_law(self.cable.description).log_density(found.mounting, 0.0, found.sd)
+        return inside + noise_law(self.cable.description).log_density(deviations.mounting, 0.0, deviations.sd)
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " cells_and_runs"]:
         """Standardized residuals: between runs, and between the cells of a run."""
-        found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
-        inside = jnp.sqrt(data["weight"]) * found.within / jax.lax.stop_gradient(values[self.reading_noise])
-        between = noise_law(self.cable.description).residual(found.mounting / jax.lax.stop_gradient(found.sd))
+        deviations = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
+        inside = jnp.sqrt(data["weight"]) * deviations.within / jax.lax.stop_gradient(values[self.reading_noise])
+        between = noise_law(self.cable.description).residual(deviations.mounting / jax.lax.stop_gradient(deviations.sd))
         return jnp.concatenate([between, inside])
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " runs"]:
@@ -187,9 +187,9 @@ class RunsTerm:
 
     def simulate(self, values: Mapping[str, Array], data: Mapping[str, Any], key: Array) -> Float[Array, " runs"]:
         """Efficiency of each run as the bench would give it [1]."""
-        found = self._deviations(values, data, values)
-        mounting = found.sd * scatter(key, found.sd.shape, self.cable.description)
-        return transmission_efficiency(data["run_mean"] - found.plain + mounting)
+        deviations = self._deviations(values, data, values)
+        mounting = deviations.sd * scatter(key, deviations.sd.shape, self.cable.description)
+        return transmission_efficiency(data["run_mean"] - deviations.plain + mounting)
 
     def observed(self) -> np.ndarray:
         """Mean efficiency of each run [1]."""
@@ -252,18 +252,18 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     }
 
 
-def with_cells(data: dict[str, Any], runs: int, each: int) -> dict[str, Any]:
+def with_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, Any]:
     """The same sums with more cells for each run, which have no weight.
 
     Args:
         data: What `run_sums` gave.
         runs: Number of runs.
-        each: Number of cells for each.
+        cells_per_run: Number of cells for each.
     """
     cells, now = len(data["mean"]), len(data["mean"]) // runs
-    place = np.arange(each)
-    source = (np.arange(0, cells, now)[:, None] + np.where(place < now, place, 0)).ravel()
-    filled = np.tile(place < now, runs)
+    position = np.arange(cells_per_run)
+    source = (np.arange(0, cells, now)[:, None] + np.where(position < now, position, 0)).ravel()
+    filled = np.tile(position < now, runs)
     long = {name: values[source] for name, values in data.items() if name not in _OF_RUNS}
     return data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
 
@@ -271,10 +271,10 @@ def with_cells(data: dict[str, Any], runs: int, each: int) -> dict[str, Any]:
 def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
     """Cells, in order of their runs, padded to equally many a run with weightless copies of the run's first."""
     starts, counts = np.searchsorted(run, np.arange(run[-1] + 1)), np.bincount(run)
-    place = np.arange(np.max(counts))[None, :]
-    source = np.where(place < counts[:, None], starts[:, None] + place, starts[:, None]).ravel()
+    position = np.arange(np.max(counts))[None, :]
+    source = np.where(position < counts[:, None], starts[:, None] + position, starts[:, None]).ravel()
     padded = {name: values[source] for name, values in cells.items()}
-    filled = (place < counts[:, None]).ravel()
+    filled = (position < counts[:, None]).ravel()
     return padded | {name: np.where(filled, padded[name], 0.0) for name in _WEIGHTS}
 
 
@@ -302,10 +302,10 @@ def _bins(values: Vector, group: Labels, most: int) -> Labels:
     """Bins of equal counts within each group; values that are few or all alike keep to themselves."""
     bins = np.zeros(len(values), dtype=int)
     for name in np.unique(group):
-        mine = group == name
-        distinct, where = np.unique(values[mine], return_inverse=True)
+        rows = group == name
+        distinct, where = np.unique(values[rows], return_inverse=True)
         if len(distinct) > most:
-            edges = np.quantile(values[mine], np.linspace(0, 1, most + 1)[1:-1])
-            where = np.searchsorted(edges, values[mine])
-        bins[mine] = where
+            edges = np.quantile(values[rows], np.linspace(0, 1, most + 1)[1:-1])
+            where = np.searchsorted(edges, values[rows])
+        bins[rows] = where
     return bins

@@ -110,15 +110,15 @@ def expected_forces(
     bend, freedom = np.zeros(len(distance)), float(len(distance) - np.max(group, initial=-1) - 1)
     along = input_force + noise_ratio**2 * slope * distance / across
     few = np.zeros(len(distance), dtype=bool)
-    for mine in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):
-        if offsets and len(mine) >= _FEWEST_TO_SHIFT:
-            bend[mine], more = _shift(along[mine], distance[mine])
+    for rows in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):
+        if offsets and len(rows) >= _FEWEST_TO_SHIFT:
+            bend[rows], more = _shift(along[rows], distance[rows])
             freedom -= more
-        elif len(mine) >= _FEWEST_TO_BEND:
-            bend[mine], more = _bend(along[mine], distance[mine])
+        elif len(rows) >= _FEWEST_TO_BEND:
+            bend[rows], more = _bend(along[rows], distance[rows])
             freedom -= more
-        elif np.any(np.abs(np.log(output_force[mine] / (slope * input_force)[mine])) > _FAR_OFF):
-            few[mine] = True
+        elif np.any(np.abs(np.log(output_force[rows] / (slope * input_force)[rows])) > _FAR_OFF):
+            few[rows] = True
     left = np.where(few, 0.0, distance - bend)
     expected_in = input_force + noise_ratio**2 * slope * left / across
     expected_out = output_force - left / across
@@ -219,10 +219,10 @@ def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float
     one = np.unique(group, return_index=True)[1]
     ratio = mean(log_ratio)
     of_cell = np.bincount(cell, weight * log_ratio) / np.maximum(np.bincount(cell, weight), 1e-300)
-    places = {label: mean(values) for label, values in at.items()}
+    covariates = {label: mean(values) for label, values in at.items()}
     return InsideRuns(
         cell[one], run[one], total, ratio - of_cell[cell[one]], ratio,
-        float(np.sum(weight * (log_ratio - ratio[group]) ** 2)), float(np.sum(worth)), places,
+        float(np.sum(weight * (log_ratio - ratio[group]) ** 2)), float(np.sum(worth)), covariates,
     )  # fmt: skip
 
 

@@ -204,9 +204,9 @@ class TermKind(ABC, Generic[AnyTable]):
         An array called "slipped" says which readings a bench could not have taken as it says it did.
         """
 
-    def with_readings(self, description: Description, table: AnyTable, drawn: Mapping[str, np.ndarray]) -> AnyTable:
+    def with_readings(self, description: Description, table: AnyTable, readings: Mapping[str, np.ndarray]) -> AnyTable:
         """Return the table with the readings that `draw` gave; here they have the names of the table's fields."""
-        changed: AnyTable = replace(table, **drawn)  # type: ignore[type-var]
+        changed: AnyTable = replace(table, **readings)  # type: ignore[type-var]
         return changed
 
     def check_drawable(self, description: Description, table: AnyTable) -> None:

@@ -188,5 +188,5 @@ def drawn_tables(
         DatasetError: The strokes of a recording cannot be found.
     """
     for kind, table in measured_kinds(tables):
-        drawn = {field: np.asarray(array) for field, array in readings[kind.name].items()}
-        yield kind.with_readings(description, table, drawn)
+        arrays = {field: np.asarray(array) for field, array in readings[kind.name].items()}
+        yield kind.with_readings(description, table, arrays)

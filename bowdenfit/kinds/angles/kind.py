@@ -62,11 +62,11 @@ class AngleKind(PlannedKind[AngleTable]):
         detection_limit = stated.to("angle") if stated else None
         table = read_table(path)
         wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
-        found = find_columns(table, wanted, source.columns)
-        lengths = require_column(table, found, route.variable, f"{route.variable}_{route.unit}")
-        columns = [require_column(table, found, name, f"{name}_deg") for name in contacts]
-        cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in columns]
-        pairs = np.array(cells, dtype=float).reshape(len(columns), len(table.rows), 2)
+        columns = find_columns(table, wanted, source.columns)
+        lengths = require_column(table, columns, route.variable, f"{route.variable}_{route.unit}")
+        angle_columns = [require_column(table, columns, name, f"{name}_deg") for name in contacts]
+        cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in angle_columns]
+        pairs = np.array(cells, dtype=float).reshape(len(angle_columns), len(table.rows), 2)
         route_values, angle, limit = rounded(lengths.numbers()), pairs[..., 0].T, pairs[..., 1].T
         made = AngleTable(route_values, tuple(contacts), angle, limit, provenance_of(table))
         return TableFromFiles(made, {path.name: path}, accounts=(table.account,))

@@ -59,29 +59,29 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     ]
     others = (Quantity("run", "text"), Quantity("stroke", "text"))
     wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(route, contacts))
-    found = find_columns(table, wanted, source.columns, _UNUSED)
-    check_spelling(table, found, others)
+    columns = find_columns(table, wanted, source.columns, _UNUSED)
+    check_spelling(table, columns, others)
     force_column, x_column = (
-        _one_of(table, found, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
+        _one_of(table, columns, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
     )
-    if "output_force" in found:
+    if "output_force" in columns:
         raise DatasetError(
             f"{table.file} has forces at both ends; name it under tables.forces, which tells friction without any spring, or "
             "leave one of the two columns out."
         )
     force, displacement = np.array(force_column.numbers()), np.array(x_column.numbers())
-    own, at = read_own_angles(table, found, contacts), read_route(table, found, route)
-    strokes = read_strokes(found, len(force), held="")
+    own, at = read_own_angles(table, columns, contacts), read_route(table, columns, route)
+    strokes = read_strokes(columns, len(force), held="")
     table.faults.refuse()
     _check_tensions(force, force_column)
-    stroke = _check_moving(strokes, found)
+    stroke = _check_moving(strokes, columns)
     how = settings.rows or ("sliding" if stroke is not None else "in order")
     if how == "sliding" and stroke is None:
         raise DatasetError(
             f"{table.file} has no stroke column, so nobody knows which way the rope slides in a row; add one (pull or return), "
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
-    run, names = _runs(found.get("run"), at, own)
+    run, names = _runs(columns.get("run"), at, own)
     motion = (
         sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
     )
@@ -89,19 +89,19 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
     if not any(name.startswith(ZERO) for name in source.description.prior):
         _check_runs(rows)
-    rows, remarks = _choose_rows(rows, settings, "stroke" in found)
+    rows, remarks = _choose_rows(rows, settings, "stroke" in columns)
     _check_force(rows)
     return TableFromFiles(rows, {path.name: path}, tuple(remarks), (table.account,))
 
 
-def _one_of(table: RawTable, found: Mapping[str, Column], name: str, unit: str) -> Column:
+def _one_of(table: RawTable, columns: Mapping[str, Column], name: str, unit: str) -> Column:
     """A column by either of its names."""
-    named = [each for each in _NAMES[name] if each in found]
-    if len(named) > 1:
+    present = [spelling for spelling in _NAMES[name] if spelling in columns]
+    if len(present) > 1:
         raise DatasetError(
-            f"{table.file} has the columns {listed(named)}, which are both read as {name}; leave one out."
+            f"{table.file} has the columns {listed(present)}, which are both read as {name}; leave one out."
         )
-    return require_column(table, found, named[0] if named else name, f"{name}_{unit}")
+    return require_column(table, columns, present[0] if present else name, f"{name}_{unit}")
 
 
 def _check_tensions(values: Vector, column: Column) -> None:
@@ -114,31 +114,31 @@ def _check_tensions(values: Vector, column: Column) -> None:
         )
 
 
-def _check_moving(strokes: Labels, found: Mapping[str, Column]) -> Labels | None:
+def _check_moving(strokes: Labels, columns: Mapping[str, Column]) -> Labels | None:
     """The strokes, of which none is held; None without a column."""
-    if "stroke" not in found:
+    if "stroke" not in columns:
         return None
     if not strokes.all():
         why = "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
-        raise combine_errors([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
+        raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
     return strokes
 
 
 def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
     """One run is what the column calls so, at one route value and one set of wrap angles."""
-    said = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
-    where = [
+    labels = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
+    conditions = [
         ", ".join(
             [f"{at:.5g}"] * bool(np.isfinite(at)) + [f"{angle:.5g} deg" for angle in angles if np.isfinite(angle)]
         )
         for at, angles in zip(route, np.rad2deg(own.angle), strict=True)
     ]
-    places: dict[str, set[str]] = {}
-    for label, place in zip(said, where, strict=True):
-        places.setdefault(label, set()).add(place)
+    conditions_of_label: dict[str, set[str]] = {}
+    for label, condition in zip(labels, conditions, strict=True):
+        conditions_of_label.setdefault(label, set()).add(condition)
     keys = [
-        f"{label} ({place})" if label and len(places[label]) > 1 else label or place or "all"
-        for label, place in zip(said, where, strict=True)
+        f"{label} ({condition})" if label and len(conditions_of_label[label]) > 1 else label or condition or "all"
+        for label, condition in zip(labels, conditions, strict=True)
     ]
     names = tuple(dict.fromkeys(keys))
     return np.array([names.index(key) for key in keys]), names
@@ -147,9 +147,9 @@ def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels,
 def _check_runs(table: DisplacementTable) -> None:
     """A run of one reading says nothing, because where its displacement begins is fitted."""
     n = np.bincount(table.run)
-    alone = np.flatnonzero(n[table.run] == 1).tolist()
-    if alone:
-        which = few([f"{table.origin.place(i)} ({table.run_names[table.run[i]]})" for i in alone])
+    single_rows = np.flatnonzero(n[table.run] == 1).tolist()
+    if single_rows:
+        which = few([f"{table.origin.place(i)} ({table.run_names[table.run[i]]})" for i in single_rows])
         raise DatasetError(
             f"{which}: a run of one reading, which tells nothing, since where its displacement begins is fitted; the "
             "usual causes are a slipped digit in its wrap angle, another label than the rows beside it, and angles that "

@@ -54,8 +54,8 @@ def readings(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
 
 def turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
     """Turns by depth, each with the place of the one before it among those of lower depth."""
-    place = places_of(turns)
-    at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": place[turns.after], "run": turns.run}
+    rank = places_of(turns)
+    at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": rank[turns.after], "run": turns.run}
     return tuple(
         {name: values[turns.depth == depth] for name, values in at.items()}
         for depth in range(int(turns.depth.max()) + 1)
@@ -71,9 +71,9 @@ def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | 
 
 def places_of(turns: Turns) -> np.ndarray:
     """Place of each turn where they are ordered by depth."""
-    place = np.empty(len(turns.depth), dtype=int)
-    place[np.argsort(turns.depth, kind="stable")] = np.arange(len(turns.depth))
-    return place
+    rank = np.empty(len(turns.depth), dtype=int)
+    rank[np.argsort(turns.depth, kind="stable")] = np.arange(len(turns.depth))
+    return rank
 
 
 def zero_names(table: DisplacementTable) -> tuple[str, ...]:
@@ -173,17 +173,17 @@ class DisplacementTerm:
 
     def _one_by_one(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Mean and standard deviation of each reading by those before it in its run."""
-        found = self._readings(values, data, values)
-        told = _before(found.slope**2 / found.variance, data["start"])
-        said = _before(found.slope * found.deviation / found.variance, data["start"])
-        of_run = found.of_runs[data["run"]]
-        left = of_run / (1 + of_run * told)
-        return found.mean + found.slope * left * said, jnp.sqrt(found.variance + found.slope**2 * left)
+        linear = self._readings(values, data, values)
+        information = _before(linear.slope**2 / linear.variance, data["start"])
+        score = _before(linear.slope * linear.deviation / linear.variance, data["start"])
+        of_run = linear.of_runs[data["run"]]
+        left = of_run / (1 + of_run * information)
+        return linear.mean + linear.slope * left * score, jnp.sqrt(linear.variance + linear.slope**2 * left)
 
     def expected(self, values: Values, data: Data) -> Float[Array, " rows"]:
         """Expected forces in the mounting of each run, as its readings together show it [N]."""
-        found = self._readings(values, data, values)
-        return found.mean + found.slope * found.mounting[0][data["run"]]
+        linear = self._readings(values, data, values)
+        return linear.mean + linear.slope * linear.mounting[0][data["run"]]
 
     def log_likelihood(self, values: Values, data: Data) -> Float[Array, " rows"]:
         """Log likelihood of each reading, given those before it in its run."""
@@ -192,12 +192,12 @@ class DisplacementTerm:
     def residuals(self, values: Values, data: Data) -> Float[Array, " rows_and_runs"]:
         """Standardized residuals of readings in their run, and of runs; weights follow the parameters, undifferentiated."""
         law, weights = noise_law(self.cable.description), jax.lax.stop_gradient(dict(values))
-        found = self._readings(values, data, weights)
-        mounting, variance = found.mounting
-        slope, sd = (jax.lax.stop_gradient(each) for each in (found.slope, jnp.sqrt(found.variance)))
-        inside = (found.deviation - slope * mounting[data["run"]]) / sd
+        linear = self._readings(values, data, weights)
+        mounting, variance = linear.mounting
+        slope, sd = (jax.lax.stop_gradient(array) for array in (linear.slope, jnp.sqrt(linear.variance)))
+        inside = (linear.deviation - slope * mounting[data["run"]]) / sd
         return jnp.concatenate(
-            [law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(found.of_runs + variance))]
+            [law.residual(inside), mounting / jax.lax.stop_gradient(jnp.sqrt(linear.of_runs + variance))]
         )
 
     def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " rows"]:
@@ -207,9 +207,9 @@ class DisplacementTerm:
 
     def mounted(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Friction exponent of each run with what its readings say of its mounting."""
-        found = self._readings(values, data, values)
-        mounting, variance = found.mounting
-        return self.exponents(values, data)[0] + mounting * found.of_runs / (found.of_runs + variance)
+        linear = self._readings(values, data, values)
+        mounting, variance = linear.mounting
+        return self.exponents(values, data)[0] + mounting * linear.of_runs / (linear.of_runs + variance)
 
     def friction_effect(self, values: Mapping[str, float]) -> np.ndarray:
         """What friction makes of each force [N], to first order."""
@@ -242,8 +242,8 @@ class _Readings:
     def mounting(self) -> tuple[Array, Array]:
         """What the readings of each run say of its mounting by themselves [1], and its variance."""
         none = jnp.zeros_like(self.of_runs)
-        told = jnp.maximum(none.at[self.run].add(self.slope**2 / self.variance), 1e-300)
-        return none.at[self.run].add(self.slope * self.deviation / self.variance) / told, 1 / told
+        information = jnp.maximum(none.at[self.run].add(self.slope**2 / self.variance), 1e-300)
+        return none.at[self.run].add(self.slope * self.deviation / self.variance) / information, 1 / information
 
 
 def _rope(values: Values) -> RopeStretch:
@@ -285,15 +285,15 @@ def _level(table: DisplacementTable) -> Scale:
 
 def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     """Where each run has no force."""
-    share, found = at.defaults.displacement_zero_ranges, []
+    share, parameters = at.defaults.displacement_zero_ranges, []
     for run, name in enumerate(zero_names(table)):
         x = table.displacement[table.run == run]
         span = Scale(float(np.ptp(x)) or float(np.ptp(table.displacement)) or 1.0, "range of displacements", "mm")
         of_run = f", run {table.run_names[run]}" if len(table.run_names) > 1 else ""
         prior, symbol = Normal(float(x.min()), share * span.value), f"$x_{{0{run + 1 if of_run else ''}}}$"
         meaning = f"displacement without force{of_run}"
-        found.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.describe_share(share)))
-    return found
+        parameters.append(Parameter(name, symbol, meaning, "elastic", prior, "mm", scaled_by=span.describe_share(share)))
+    return parameters
 
 
 def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:

@@ -82,19 +82,19 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
         table = read_table(path)
         names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
-        found = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
-        column = require_column(table, found, "efficiency", "efficiency (0 to 1) or efficiency_percent")
-        sd, spread = [0.0] * len(table.rows), found.get("efficiency_sd")
+        columns = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
+        column = require_column(table, columns, "efficiency", "efficiency (0 to 1) or efficiency_percent")
+        sd, spread = [0.0] * len(table.rows), columns.get("efficiency_sd")
         if spread is not None:
             beside = {cell.row: cell for cell in column.cells}
             sd = spread.read_cells(lambda c: 0.0 if c.blank else _efficiency_sd(c, spread, beside[c.row], column), 0.0)
         errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
         efficiency = column.read_cells(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
         rows = EfficiencyTable(
-            read_route(table, found, route),
+            read_route(table, columns, route),
             np.array(efficiency),
             np.array(sd),
-            read_own_angles(table, found, contacts),
+            read_own_angles(table, columns, contacts),
             provenance_of(table),
         )
         return TableFromFiles(rows, {path.name: path}, _remark_fractions(column, rows), (table.account,))
@@ -115,16 +115,16 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
 
     @override
     def copied_readings(self, table: EfficiencyTable) -> list[str]:
-        places = np.column_stack([table.route, table.own.angle])
-        return copies(without_runs(table.origin, places, table.efficiency, places_along(table)))
+        settings = np.column_stack([table.route, table.own.angle])
+        return copies(without_runs(table.origin, settings, table.efficiency, places_along(table)))
 
     @override
     def coarse_readings(self, table: EfficiencyTable) -> Coarse | None:
         """Look at tables where no scatter is stated."""
         if np.any(table.sd > 0):
             return None
-        places = np.column_stack([table.route, table.own.angle])
-        return coarse(listed(table.origin.files), places, table.efficiency)
+        settings = np.column_stack([table.route, table.own.angle])
+        return coarse(listed(table.origin.files), settings, table.efficiency)
 
     @override
     def why_implausible(self, measured: EfficiencyTable, simulated: EfficiencyTable) -> str:

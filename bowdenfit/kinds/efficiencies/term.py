@@ -152,19 +152,19 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
 
     @override
     def with_readings(
-        self, description: Description, table: EfficiencyTable, drawn: Mapping[str, np.ndarray]
+        self, description: Description, table: EfficiencyTable, readings: Mapping[str, np.ndarray]
     ) -> EfficiencyTable:
         """Return the table with them; a stated standard deviation is taken to be in proportion to the efficiency."""
-        efficiency = drawn["efficiency"]
+        efficiency = readings["efficiency"]
         return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
 
     @override
     def check(self, table: EfficiencyTable, space: ParameterSpace) -> None:
         """Refuse mountings that are all alike where nothing else makes a row scatter."""
         if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
-            place = table.origin.place(int(np.argmin(table.sd > 0)))
+            row = table.origin.place(int(np.argmin(table.sd > 0)))
             raise DescriptionError(
-                f"cable.toml: {RUN_SCATTER} is fixed at 0, but {place} has no standard deviation of its own, so that "
+                f"cable.toml: {RUN_SCATTER} is fixed at 0, but {row} has no standard deviation of its own, so that "
                 "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "
                 f"{RUN_SCATTER} free."
             )

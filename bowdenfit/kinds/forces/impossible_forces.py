@@ -82,19 +82,19 @@ def beyond_noise(excess: Vector, readings: LogGains, stated: float | None) -> tu
     limit = FALSE_ALARM / (n + len(total) + 1)
     of_cell = np.bincount(cell, weight * excess) / np.sqrt(total)
     if stated is not None:
-        alone = _chance(excess * np.sqrt(weight) / stated, np.full(n, np.inf)) < limit
-        return alone, (_chance(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
+        single = _chance(excess * np.sqrt(weight) / stated, np.full(n, np.inf)) < limit
+        return single, (_chance(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
     if n - len(total) < _FEWEST:
         return _without_repeats(excess, log_gain, limit)
     # Where pulling and returning are not told apart, gains and losses of a run are: each half scatters less.
     halves = np.unique(2 * cell + (log_gain > 0), return_inverse=True)[1].ravel()
-    alone, together = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    single, together = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for group, factor in ((cell, 1.0), (halves, _TRUNCATED)):
         _, noise, freedom = _scatter(replace(readings, cell=group))
         if np.min(freedom) >= _FEWEST - 1:
-            alone |= _chance(excess * np.sqrt(weight) / noise / factor, freedom) < limit
+            single |= _chance(excess * np.sqrt(weight) / noise / factor, freedom) < limit
             together |= _chance(of_cell[cell] / noise / factor, freedom) < limit
-    return alone, together
+    return single, together
 
 
 def _without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Flags, Flags]:
@@ -104,9 +104,9 @@ def _without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Fl
     squares = (log_gain - log_gain.mean()) ** 2
     others = np.sum(squares) - squares * (n / (n - 1.0) if n > 1 else 1.0)
     left = np.full(n, max(freedom - 1, _USUAL_FREEDOM))
-    alone = _chance(excess / np.sqrt((known + np.maximum(others, 0.0)) / left), left) < limit
+    single = _chance(excess / np.sqrt((known + np.maximum(others, 0.0)) / left), left) < limit
     of_table = excess.mean() * np.sqrt(n * freedom / (known + np.sum(squares)))
-    return alone, np.full(n, _chance(np.array([of_table]), np.array([freedom]))[0] < limit)
+    return single, np.full(n, _chance(np.array([of_table]), np.array([freedom]))[0] < limit)
 
 
 def standing_out(readings: LogGains) -> Flags:
@@ -174,8 +174,8 @@ def check_following(table: ForceTable) -> None:
 def _does_not_follow(table: ForceTable, rows: np.ndarray, stroke: int) -> bool:
     """Whether the output of the rows of a stroke hangs on the input by far less than a rope's, run by run."""
     force_in, force_out = table.input_force[rows], table.output_force[rows]
-    place = np.column_stack([table.run[rows], np.nan_to_num(table.route[rows])])
-    cell = np.unique(place, axis=0, return_inverse=True)[1].ravel()
+    settings = np.column_stack([table.run[rows], np.nan_to_num(table.route[rows])])
+    cell = np.unique(settings, axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cell)
     mean_in, mean_out = ((np.bincount(cell, force) / count)[cell] for force in (force_in, force_out))
     x, y = force_in / mean_in - 1, (force_out - mean_out) / (mean_out if stroke > 0 else mean_in)
@@ -183,9 +183,9 @@ def _does_not_follow(table: ForceTable, rows: np.ndarray, stroke: int) -> bool:
     if freedom < _FEWEST or spread < len(rows) * _WIDE**2:
         return False
     slope, whole = float(x @ y) / spread, float(y @ y)
-    rest = max(whole - slope**2 * spread, 0.0)
-    explained = 1 - rest / whole if whole > 0 else 0.0
-    return explained < _EXPLAINED and slope + _SURE * np.sqrt(rest / freedom / spread) < _SLOPE
+    unexplained = max(whole - slope**2 * spread, 0.0)
+    explained = 1 - unexplained / whole if whole > 0 else 0.0
+    return explained < _EXPLAINED and slope + _SURE * np.sqrt(unexplained / freedom / spread) < _SLOPE
 
 
 @dataclass(frozen=True)
@@ -210,8 +210,8 @@ class Gained:
 
     def share(self, stroke: int) -> float:
         """Share of the rows of a stroke that gain force; 0 without any."""
-        mine = self.stroke == stroke
-        return float(np.mean(self.excess[mine] > 0)) if mine.any() else 0.0
+        on_stroke = self.stroke == stroke
+        return float(np.mean(self.excess[on_stroke] > 0)) if on_stroke.any() else 0.0
 
     @property
     def mixed(self) -> bool:
@@ -256,11 +256,11 @@ def gains(table: ForceTable, description: Description) -> Gained | None:
     excess = readings.log_gain - _allowed(table.input_force[rows], table.output_force[rows], description)
     if not np.any(excess > 0):
         return None
-    alone, together = beyond_noise(excess, readings, description.sensors.largest_force_noise)
+    single, together = beyond_noise(excess, readings, description.sensors.largest_force_noise)
     force_in, force_out = table.input_force[rows], table.output_force[rows]
     large = np.abs(force_out - force_in) > _LARGE_GAIN * max(force_in.max(), force_out.max())
-    alone |= (excess > np.log(_ANY_GAIN)) & large
-    return Gained(rows, table.stroke[rows], readings.log_gain, excess, alone & (excess > 0), together & (excess > 0))
+    single |= (excess > np.log(_ANY_GAIN)) & large
+    return Gained(rows, table.stroke[rows], readings.log_gain, excess, single & (excess > 0), together & (excess > 0))
 
 
 def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, LogGains]:
@@ -282,9 +282,9 @@ def _allowed(force_in: Vector, force_out: Vector, description: Description) -> V
 
 
 def _refuse(table: ForceTable, found: Gained) -> NoReturn:
-    alone = found.beyond_noise.any() and not found.wide
-    said = found.beyond_noise if alone else found.beyond_noise | found.together
-    i = int(np.argmax(np.where(said, found.excess, -np.inf)))
+    is_single = found.beyond_noise.any() and not found.wide
+    wrong = found.beyond_noise if is_single else found.beyond_noise | found.together
+    i = int(np.argmax(np.where(wrong, found.excess, -np.inf)))
     row, (how, what) = int(found.rows[i]), _STROKES[int(found.stroke[i])]
     force_in, force_out = table.input_force[row], table.output_force[row]
     many = f"{int(np.sum(found.excess > 0))} of {len(found.rows)}"

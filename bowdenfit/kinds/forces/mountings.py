@@ -53,22 +53,22 @@ def mountings(
     named, sds = np.array(labels), np.nan_to_num(own.sd)
     steps = [np.full(len(route), SAME_LENGTH * np.ptp(limits.range) if limits else np.inf)]
     steps += [np.maximum(SAME_BEND, _SDS * sd) for sd in sds.T]
-    place = np.zeros((len(labels), len(steps)), dtype=int)
+    cluster = np.zeros((len(labels), len(steps)), dtype=int)
     for label in dict.fromkeys(labels):
-        mine = named == label
+        rows = named == label
         for k, (values, step) in enumerate(zip((route, *own.angle.T), steps, strict=True)):
-            place[mine, k] = _apart(values[mine], float(np.max(step[mine])))
+            cluster[rows, k] = _apart(values[rows], float(np.max(step[rows])))
     groups = group or [""] * len(labels)
-    keys = [(label, which, *where) for label, which, where in zip(labels, groups, place.tolist(), strict=True)]
+    keys = [(label, which, *where) for label, which, where in zip(labels, groups, cluster.tolist(), strict=True)]
     distinct = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     run = np.array([distinct[key] for key in keys])
-    places = Counter(key[:2] for key in distinct)
-    in_groups = Counter(label for label, _ in places)
+    mountings_of = Counter(key[:2] for key in distinct)
+    in_groups = Counter(label for label, _ in mountings_of)
     names = []
     for i, (label, which, *_) in enumerate(distinct):
-        told = [which] if in_groups[label] > 1 else []
-        told += [_where(run == i, route, own, limits)] if places[label, which] > 1 else []
-        names.append(f"{label} ({', '.join(told)})" if told else label)
+        details = [which] if in_groups[label] > 1 else []
+        details += [_where(run == i, route, own, limits)] if mountings_of[label, which] > 1 else []
+        names.append(f"{label} ({', '.join(details)})" if details else label)
     return run, names
 
 
@@ -108,31 +108,31 @@ def _apart(values: Vector, step: float) -> Labels:
     return group
 
 
-def _where(mine: np.ndarray, route: Vector, own: OwnAngles, limits: Route | None) -> str:
+def _where(rows: np.ndarray, route: Vector, own: OwnAngles, limits: Route | None) -> str:
     """Length of a mounting, and its bends where there is none."""
     if limits is not None:
-        return f"{np.mean(route[mine]):g} {limits.unit}"
-    angles = [float(np.rad2deg(np.mean(column[mine]))) for column in own.angle.T if np.isfinite(column[mine]).all()]
+        return f"{np.mean(route[rows]):g} {limits.unit}"
+    angles = [float(np.rad2deg(np.mean(column[rows]))) for column in own.angle.T if np.isfinite(column[rows]).all()]
     return f"{listed([f'{angle:.4g}' for angle in angles])} deg"
 
 
 def read_groups(
-    found: Mapping[str, Column], file: str, may_be_numbers: bool, asked: bool
+    columns: Mapping[str, Column], file: str, may_be_numbers: bool, by_group: bool
 ) -> tuple[tuple[str, ...], list[str]]:
     """Group of each row, empty where the table has none, and what is said of them.
 
     Args:
-        found: Columns of the table.
+        columns: Columns of the table.
         file: Its file.
         may_be_numbers: Whether groups may be called by numbers.
-        asked: Whether groups are to have friction coefficients of their own.
+        by_group: Whether groups are to have friction coefficients of their own.
 
     Raises:
         DatasetError: Groups are asked for, and there is no such column, a row is of none, or the column is a number or has
             too many names.
     """
-    column = found.get(GROUP.name)
-    if column is None and asked:
+    column = columns.get(GROUP.name)
+    if column is None and by_group:
         raise DatasetError(
             f'{file} has no column group, but friction_model has "by-group", which gives each group of readings its own '
             'friction coefficients; add the column, or map it in cable.toml: columns = { group = { name = "rope" } }.'
@@ -142,18 +142,18 @@ def read_groups(
     names = tuple(" ".join(cell.text.split()) for cell in column.cells)
     distinct = list(dict.fromkeys(names))
     wrong = _why_no_groups(column, distinct, may_be_numbers)
-    if wrong and asked:
+    if wrong and by_group:
         raise DatasetError(f"{file}: {wrong}")
     if wrong:
         return (), [f"{file}: {wrong} It is not used."]
     why = (
         "the cell is blank, so this row is of no group; write the name of its group "
-        f"({few([shown(each) for each in distinct if each], _NAMED)}), or leave the row out."
+        f"({few([shown(name) for name in distinct if name], _NAMED)}), or leave the row out."
     )
-    if blank := [cell.refuse(why) for cell, name in zip(column.cells, names, strict=True) if asked and not name]:
+    if blank := [cell.refuse(why) for cell, name in zip(column.cells, names, strict=True) if by_group and not name]:
         raise combine_errors(blank)
     names = tuple(name or NO_GROUP for name in names)
-    if asked or len(distinct) == 1:
+    if by_group or len(distinct) == 1:
         return names, []
     return names, [
         f"{file}: its column {shown(column.heading)} names {len(distinct)} groups ({few(distinct, _NAMED)}), which share their "
@@ -177,7 +177,7 @@ def group_numbers(groups: Sequence[str], names: Sequence[str], n_rows: int) -> L
 def _why_no_groups(column: Column, distinct: Sequence[str], may_be_numbers: bool) -> str:
     """Why a column does not name groups; empty where it does."""
     named = [cell for cell in column.cells if cell.text.strip()]
-    heading, values = shown(column.heading), few([shown(each) for each in distinct if each], _NAMED)
+    heading, values = shown(column.heading), few([shown(name) for name in distinct if name], _NAMED)
     if named and not may_be_numbers and all(_is_number(cell) for cell in named):
         return (
             f"the column {heading} holds numbers ({values}), which may be a quantity rather than names of groups. If they are "

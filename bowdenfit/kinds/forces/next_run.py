@@ -69,9 +69,9 @@ def typical_run(measurements: Measurements) -> RunDesign | None:
 def _of_table(table: ForceTable) -> RunDesign:
     sliding = table.stroke != 0
     runs, counts = np.unique(table.run[sliding], return_counts=True)
-    mine = sliding & (table.run == runs[np.argsort(counts, kind="stable")[len(runs) // 2]])
-    worth = np.ones(int(mine.sum()))
-    return _joined(table.input_force[mine], table.stroke[mine], table.velocity[mine], worth, FORCE_NOISE)
+    rows = sliding & (table.run == runs[np.argsort(counts, kind="stable")[len(runs) // 2]])
+    worth = np.ones(int(rows.sum()))
+    return _joined(table.input_force[rows], table.stroke[rows], table.velocity[rows], worth, FORCE_NOISE)
 
 
 def _of_recordings(recordings: Recordings) -> RunDesign | None:
@@ -90,8 +90,8 @@ def _joined(force: Vector, stroke: Any, velocity: Vector, worth: Vector, noise: 
     """Readings of like force joined, stroke by stroke."""
     groups = []
     for way in (1, -1):
-        mine = np.flatnonzero(stroke == way)
-        order = mine[np.argsort(force[mine], kind="stable")]
+        rows = np.flatnonzero(stroke == way)
+        order = rows[np.argsort(force[rows], kind="stable")]
         groups += [part for part in np.array_split(order, _MOST) if len(part)]
     means = [[np.average(v[g], weights=worth[g]) for g in groups] for v in (force, velocity)]
     ways, total = [float(stroke[g[0]]) for g in groups], [worth[g].sum() for g in groups]

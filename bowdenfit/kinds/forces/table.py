@@ -115,7 +115,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         _one_velocity_unit(tables),
         _groups(tables),
     )
-    remarks = dict.fromkeys(remark for _, said, _ in parts for remark in said)
+    remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
     accounts = tuple(account for *_, account in parts)
     return TableFromFiles(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
 
@@ -140,24 +140,24 @@ def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
-    found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     pulleys, nothing = source.description.cable.pulleys, np.full(len(table.rows), np.nan)
-    read = partial(_tensions, table, found, pulleys)
+    read = partial(_tensions, table, columns, pulleys)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
-    own = read_own_angles(table, found, contacts)
-    route_values = read_route(table, found, route)
+    own = read_own_angles(table, columns, contacts)
+    route_values = read_route(table, columns, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
     group, remarks = tuple[str, ...](), list[str]()
     with table.faults.collect():
-        group, remarks = read_groups(found, table.file, *groups)
-    remarks += describe_paired_headings(table, found, source.columns)
-    if "stroke" not in found:
+        group, remarks = read_groups(columns, table.file, *groups)
+    remarks += describe_paired_headings(table, columns, source.columns)
+    if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
-    strokes, origin = read_strokes(found, len(table.rows)), provenance_of(table)
-    velocity, unit = _velocities(found.get("velocity"), len(table.rows))
+    strokes, origin = read_strokes(columns, len(table.rows)), provenance_of(table)
+    velocity, unit = _velocities(columns.get("velocity"), len(table.rows))
     table.faults.refuse()
-    run, run_names, said = _mounted(found.get("run"), source, route_values, own, origin, group)
-    remarks += said
+    run, run_names, run_remarks = _mounted(columns.get("run"), source, route_values, own, origin, group)
+    remarks += run_remarks
     if held := int(np.sum(strokes == 0)):
         remarks.append(
             f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
@@ -196,8 +196,8 @@ def _mounted(
         names = tuple(dict.fromkeys(labels))
         return np.array([names.index(label) for label in labels]), names, []
     run, distinct = mountings(labels, group, route, own, limits)
-    said = numbered_anew(labels, group, len(distinct), file, limits)
-    return run, tuple(distinct), [said] if said else []
+    remark = numbered_anew(labels, group, len(distinct), file, limits)
+    return run, tuple(distinct), [remark] if remark else []
 
 
 def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
@@ -207,10 +207,10 @@ def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
-def _tensions(table: RawTable, found: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
+def _tensions(table: RawTable, columns: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
     """Tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
-    column = end_column(table, found, end)
-    return forces_of(np.array(column.read_cells(partial(_force, column), np.nan)), table, found, end, pulleys)
+    column = end_column(table, columns, end)
+    return forces_of(np.array(column.read_cells(partial(_force, column), np.nan)), table, columns, end, pulleys)
 
 
 def _force(column: Column, cell: Cell) -> float:

@@ -173,27 +173,27 @@ def _expected(
         keys: Of each the run, then what else is the same for readings that are looked at together.
     """
     sensors, runs = description.sensors, table.run[used]
-    alone = np.bincount(runs)[runs] == 1
+    single = np.bincount(runs)[runs] == 1
     named = (
         np.unique(np.array(table.group)[used], return_inverse=True)[1]
         if table.group
         else np.zeros(len(used), dtype=int)
     )
-    keys = np.column_stack([np.where(alone, -1 - named, runs), keys[:, 1:]])
+    keys = np.column_stack([np.where(single, -1 - named, runs), keys[:, 1:]])
     stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
-    found = ExpectedForces(table.input_force[used].copy(), table.output_force[used].copy(), np.zeros(len(used)))
+    expected = ExpectedForces(table.input_force[used].copy(), table.output_force[used].copy(), np.zeros(len(used)))
     weight = np.zeros(len(used))
-    for mine, noise in ((~alone, stated), (alone, stated or 0.0)):
-        if not mine.any():
+    for rows, noise in ((~single, stated), (single, stated or 0.0)):
+        if not rows.any():
             continue
-        together = np.unique(keys[mine], axis=0, return_inverse=True)[1].ravel()
-        forces = table.input_force[used][mine], table.output_force[used][mine]
+        together = np.unique(keys[rows], axis=0, return_inverse=True)[1].ravel()
+        forces = table.input_force[used][rows], table.output_force[used][rows]
         part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets)
-        weight[mine] = 1 / (sensors.noise_ratio**2 / part.input_force**2 + 1 / part.output_force**2)
+        weight[rows] = 1 / (sensors.noise_ratio**2 / part.input_force**2 + 1 / part.output_force**2)
         for name, values in vars(part).items():
-            if not alone[mine].any() or name == "log_ratio_error":
-                getattr(found, name)[mine] = values
-    return found, weight
+            if not single[rows].any() or name == "log_ratio_error":
+                getattr(expected, name)[rows] = values
+    return expected, weight
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
@@ -273,8 +273,8 @@ class ForceTerms(TermKind[ForceTable]):
         return jnp.concatenate([*slipped, jnp.zeros(0, dtype=bool)])
 
     @override
-    def with_readings(self, description: Description, table: ForceTable, drawn: Mapping[str, np.ndarray]) -> ForceTable:
-        return replace(table, input_force=drawn["input_force"], output_force=drawn["output_force"])
+    def with_readings(self, description: Description, table: ForceTable, readings: Mapping[str, np.ndarray]) -> ForceTable:
+        return replace(table, input_force=readings["input_force"], output_force=readings["output_force"])
 
     @override
     def places(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
@@ -282,14 +282,14 @@ class ForceTerms(TermKind[ForceTable]):
         if not isinstance(term, RunsTerm) or term.rows is None:
             return {}
         runs, run = np.unique(term.rows.run, return_inverse=True)
-        load, places = term.rows.input_force, dict[str, np.ndarray]()
+        load, covariates = term.rows.input_force, dict[str, np.ndarray]()
         low, high = np.full(len(runs), np.inf), np.zeros(len(runs))
         np.minimum.at(low, run, load)
         np.maximum.at(high, run, load)
         if np.all(high <= _ONE_LOAD * low) and high.max() > _ONE_LOAD**2 * low.min():
-            places[LOAD] = (low + high) / 2
+            covariates[LOAD] = (low + high) / 2
         if table.group:
             names = term.cable.friction.conditions.groups
             of_run = [table.group[int(np.argmax((table.run == number) & (table.stroke != 0)))] for number in runs]
-            places[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
-        return places
+            covariates[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
+        return covariates

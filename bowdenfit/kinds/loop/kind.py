@@ -106,35 +106,35 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
         table, pulleys = read_table(path), source.description.cable.pulleys
         others = (Quantity("stroke", "text"), Quantity("preload", "force"))
-        found = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
-        check_spelling(table, found, others)
+        columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+        check_spelling(table, columns, others)
         nothing = np.full(len(table.rows), np.nan)
         input_force, output_force = table.faults.read_all(
-            lambda end: _end_forces(table, found, end, pulleys), ("input", "output"), nothing
+            lambda end: _end_forces(table, columns, end, pulleys), ("input", "output"), nothing
         )
-        stroke = read_strokes(found, len(table.rows), held="")
+        stroke = read_strokes(columns, len(table.rows), held="")
         preload = nothing
-        if (column := found.get("preload")) is not None:
+        if (column := columns.get("preload")) is not None:
             preload = np.array(
                 column.read_cells(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan)
             )
-        at, own = read_route(table, found, route), read_own_angles(table, found, contacts)
+        at, own = read_route(table, columns, route), read_own_angles(table, columns, contacts)
         table.faults.refuse()
         if not stroke.all():
             why = (
                 "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row "
                 "out."
             )
-            raise combine_errors([found["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
+            raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
         made = LoopTable(at, input_force, output_force, stroke, preload, own, provenance_of(table))
         _check_loss(table, made)
         remarks = []
-        if "stroke" not in found:
+        if "stroke" not in columns:
             remarks.append(
                 f"{table.file} has no stroke column: every row is taken as moving forward (the motor pulls)."
             )
         angles = [
-            h for h in table.header if _is_plain_angle(h) and h not in {column.heading for column in found.values()}
+            h for h in table.header if _is_plain_angle(h) and h not in {column.heading for column in columns.values()}
         ]
         if angles:
             remarks.append(
@@ -196,10 +196,10 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
 
     @override
     def copied_readings(self, table: LoopTable) -> list[str]:
-        places = np.column_stack([table.route, table.own.angle, table.preload])
-        _, place = np.unique(np.nan_to_num(places, nan=-1.0), axis=0, return_inverse=True)
+        settings = np.column_stack([table.route, table.own.angle, table.preload])
+        _, setting = np.unique(np.nan_to_num(settings, nan=-1.0), axis=0, return_inverse=True)
         forces = np.column_stack([table.input_force, table.output_force])
-        return copies(without_runs(table.origin, places, forces, table.input_force, 3 * place + table.stroke))
+        return copies(without_runs(table.origin, settings, forces, table.input_force, 3 * setting + table.stroke))
 
     @override
     def why_implausible(self, measured: LoopTable, simulated: LoopTable) -> str:
@@ -247,10 +247,10 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)
 
 
-def _end_forces(table: RawTable, found: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def _end_forces(table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Return the forces at one end [N], from its force column or from its torques and the radius of its pulley."""
-    read = np.asarray(end_column(table, found, end, is_loop=True).numbers())
-    return forces_of(read, table, found, end, pulleys)
+    read = np.asarray(end_column(table, columns, end, is_loop=True).numbers())
+    return forces_of(read, table, columns, end, pulleys)
 
 
 def _is_plain_angle(heading: str) -> bool:

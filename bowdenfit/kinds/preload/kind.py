@@ -58,9 +58,9 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
         path = source.file
         table = read_table(path)
         wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
-        found = find_columns(table, wanted, source.columns, _UNUSED)
-        angles = require_column(table, found, "wrap_angle", "wrap_angle_deg")
-        preloads = require_column(table, found, "preload", "preload_N")
+        columns = find_columns(table, wanted, source.columns, _UNUSED)
+        angles = require_column(table, columns, "wrap_angle", "wrap_angle_deg")
+        preloads = require_column(table, columns, "preload", "preload_N")
         rows = PreloadTable(
             np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan)),
             np.array(preloads.read_cells(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
@@ -91,8 +91,8 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
 
     @override
     def warnings(self, table: PreloadTable, description: Description, measurements: Measurements) -> list[str]:
-        alone = measurements.table(StretchTable) is None
-        file, warnings = table.origin.files[0], one_angle_warning(measurements) if alone else []
+        lacks_stretch = measurements.table(StretchTable) is None
+        file, warnings = table.origin.files[0], one_angle_warning(measurements) if lacks_stretch else []
         if not description.preload_follows_stretch:
             return warnings
         if not table.preload.any():
@@ -104,7 +104,7 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
                 f"the preload in {file} falls with the wrap angle, which bending alone cannot do; check the columns, or write "
                 'model = "constant" under [preload] if springs hold it.'
             )
-        if alone:
+        if lacks_stretch:
             warnings.append(
                 "without a table of stretch, preloads tell only how lengthening compares with the give of the rope; stiffness, "
                 "bedding-in and lengthening by themselves will rest on their priors."

@@ -76,8 +76,8 @@ def drift_of(recording: Recording) -> np.ndarray:
 
 def likely_forces(blocks: Blocks) -> tuple[Vector, Vector]:
     """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `smooth_input`."""
-    each = (blocks.input_force, blocks.output_force)
-    likely_in, likely_out = (np.maximum(smooth_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in each)
+    forces = (blocks.input_force, blocks.output_force)
+    likely_in, likely_out = (np.maximum(smooth_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in forces)
     return likely_in, likely_out
 
 
@@ -165,11 +165,11 @@ def sliding_blocks(recording: Recording, description: Description) -> BlocksUsed
     stroke, force_in, force_out = recording.strokes.stroke[used], blocks.input_force[used], blocks.output_force[used]
     noise = noise_of_output(recording, ratio)
     group = np.unique(stroke, return_inverse=True)[1]
-    found = expected_forces(force_in, force_out, group, ratio, noise, description.fits_offsets)
+    expected = expected_forces(force_in, force_out, group, ratio, noise, description.fits_offsets)
     variance = np.zeros(len(used))
-    for share, force in ((ratio, found.input_force), (1.0, found.output_force)):
+    for share, force in ((ratio, expected.input_force), (1.0, expected.output_force)):
         variance += (share / force) ** 2 * (1 + 2.5 * (share * noise / force) ** 2)
-    log_ratio = stroke * (np.log(force_in / force_out) - found.log_ratio_error)
+    log_ratio = stroke * (np.log(force_in / force_out) - expected.log_ratio_error)
     return BlocksUsed(used, stroke, force_in, force_out, log_ratio, worth_of(recording, used), 1 / variance)
 
 
@@ -236,8 +236,8 @@ class Thinned:
     def _worth(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
         """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
         contact = self.recording.strokes.contact
-        each = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
-        return np.add.reduceat(each * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
+        effective = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
+        return np.add.reduceat(effective * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
         """Which end of the range the output lies beyond, and what that says.
@@ -250,8 +250,8 @@ class Thinned:
         low, high = self.recording.account.limits
         end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
         beyond = self.any_of(saturated) & ~lost
-        each = worth_of(self.recording, np.arange(len(saturated)))
-        share = np.add.reduceat(each * saturated, self.starts)
+        effective = worth_of(self.recording, np.arange(len(saturated)))
+        share = np.add.reduceat(effective * saturated, self.starts)
         return {"censored": np.where(beyond, end, 0.0), "share": np.where(beyond, share, 0.0)}
 
 
@@ -305,5 +305,5 @@ def first_of_groups(state: np.ndarray, most: int) -> np.ndarray:
     phase = np.append(0, np.cumsum(np.diff(state) != 0))
     first = np.append(True, np.diff(phase) != 0)
     last = np.append(first[1:], True)
-    place = np.arange(len(state)) - np.maximum.accumulate(np.where(first, np.arange(len(state)), 0))
-    return np.flatnonzero(first | last | (place % factor == 1))
+    position = np.arange(len(state)) - np.maximum.accumulate(np.where(first, np.arange(len(state)), 0))
+    return np.flatnonzero(first | last | (position % factor == 1))

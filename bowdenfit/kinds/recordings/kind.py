@@ -109,14 +109,14 @@ def _or_dash(value: float, digits: str, unit: str = "") -> str:
 
 def _delay(pages: list[dict[str, Any]]) -> list[str]:
     """The delay, once where it is one for all."""
-    said = {}
+    texts = {}
     for page in pages:
         delay, sd = 1000 * page["delay"], 1000 * (page["delay_sd"] if page["delay_sd"] is not None else np.nan)
         if np.isfinite(sd):
-            said[f"{delay:.1f} ms, give or take {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
+            texts[f"{delay:.1f} ms, give or take {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
         elif delay:
-            said[f"{delay:.1f} ms (as stated)"] = page["name"]
-    return [f"The output channel was shifted back by a delay of {text}." for text in said]
+            texts[f"{delay:.1f} ms (as stated)"] = page["name"]
+    return [f"The output channel was shifted back by a delay of {text}." for text in texts]
 
 
 def _tare(pages: list[dict[str, Any]]) -> list[str]:

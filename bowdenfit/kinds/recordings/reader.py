@@ -62,16 +62,16 @@ def entry_from_name(description: Description, pattern: str | None, path: Path, f
 def _check_pattern(description: Description, pattern: str) -> None:
     """Refuse a pattern that names what a recording does not have, or a unit of the wrong kind."""
     known = ["at", "run", "velocity", *description.angle_columns]
-    place = "cable.toml, tables.recordings.pattern"
+    key = "cable.toml, tables.recordings.pattern"
     for name, unit in pattern_fields(pattern):
         if name not in known:
-            raise DescriptionError(f"{place}: {name!r} is unknown{suggest_name(name, known)}")
+            raise DescriptionError(f"{key}: {name!r} is unknown{suggest_name(name, known)}")
         if unit and name != "at" and name != "run":
             dimension = speed_dimension(unit) if name == "velocity" else "angle"
             try:
                 conversion_factor(unit, dimension)
             except DatasetError as error:
-                raise DescriptionError(f"{place}, {{{name}:{unit}}}: {error}.") from None
+                raise DescriptionError(f"{key}, {{{name}:{unit}}}: {error}.") from None
 
 
 def place_names(description: Description) -> tuple[str, ...]:
@@ -107,19 +107,19 @@ def placed_by_channels(
             angles[column] = QuantityValue(value=angle, unit="rad")
     route = description.route
     if route is not None and (route.variable in sources or at is None):
-        found = _length(file, route, sources.get(route.variable))
-        if found is not None and at is not None:
+        length = _length(file, route, sources.get(route.variable))
+        if length is not None and at is not None:
             raise _twice(entry, route.variable)
-        at = found if found is not None else at
+        at = length if length is not None else at
     return entry.model_copy(update={"wrap_angles": angles, "at": at})
 
 
 def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
     """A wrap angle [rad]."""
-    found = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
-    if found is None:
+    steady = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
+    if steady is None:
         return None
-    value, low, high = found
+    value, low, high = steady
     if high - low > _SAME_BEND:
         raise _changes(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
     if value < 0:
@@ -133,10 +133,10 @@ def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float
 def _length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
     """A value of the route variable, in its unit."""
     quantity = Quantity(route.variable, "route", route.unit)
-    found = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
-    if found is None:
+    steady = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
+    if steady is None:
         return None
-    value, low, high = found
+    value, low, high = steady
     if high - low > _SAME_LENGTH * abs(route.range[1] - route.range[0]):
         raise _changes(file, route.variable, low, high, route.unit)
     return float(f"{value:.12g}")
@@ -193,7 +193,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     entries = _entries(source)
     _check_names(entries)
     faults = Faults()
-    read = faults.read_all(lambda each: _to_read(description, *each, channels), entries, None)
+    read = faults.read_all(lambda entry: _to_read(description, *entry, channels), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -203,11 +203,11 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
             "mm/s or both in r/min."
         )
     prepared, delay_sd = _prepared(files)
-    each = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
+    items = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
-    recordings = Recordings(description.angle_columns, each, unit, delay_sd, loop)
+    recordings = Recordings(description.angle_columns, items, unit, delay_sd, loop)
     _check_placed(recordings, description)
-    remarks = [remark for r in each for remark in (*r.account.remarks, *r.strokes.remarks)]
+    remarks = [remark for r in items for remark in (*r.account.remarks, *r.strokes.remarks)]
     accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
     return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
 
@@ -230,21 +230,21 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
     """
-    found = [inspect_recording(f.raw, f.settings) for f in files]
-    told = [i.delay for i in found if i.settings.delay == "estimated" and i.delay.sd > 0]
-    if not told:
-        return [average_recording(i) for i in found], max((f.delay_sd for f in files), default=0.0)
-    delay, sd = _pooled(np.array([d.value for d in told]), np.array([d.sd for d in told]))
-    return [average_recording(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in found], sd
+    inspections = [inspect_recording(f.raw, f.settings) for f in files]
+    delays = [i.delay for i in inspections if i.settings.delay == "estimated" and i.delay.sd > 0]
+    if not delays:
+        return [average_recording(i) for i in inspections], max((f.delay_sd for f in files), default=0.0)
+    delay, sd = _pooled(np.array([d.value for d in delays]), np.array([d.sd for d in delays]))
+    return [average_recording(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in inspections], sd
 
 
 def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
     """What is said of every loop alike, that its delay is not estimated, kept in the first account only."""
-    said = False
+    is_stated = False
     kept = []
     for blocks, account in prepared:
-        remarks = tuple(r for r in account.remarks if r != NO_DELAY_OF_LOOPS or not said)
-        said = said or NO_DELAY_OF_LOOPS in account.remarks
+        remarks = tuple(r for r in account.remarks if r != NO_DELAY_OF_LOOPS or not is_stated)
+        is_stated = is_stated or NO_DELAY_OF_LOOPS in account.remarks
         kept.append((blocks, replace(account, remarks=remarks)))
     return kept
 

@@ -47,11 +47,11 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
-    places = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]).astype(int)
+    error_numbers = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]).astype(int)
     fewer = jnp.asarray(beside([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.items]))
-    shape, noise = (places.max() + 1, len(recordings.items)), scale * values[BLOCK_NOISE] * fewer
+    shape, noise = (error_numbers.max() + 1, len(recordings.items)), scale * values[BLOCK_NOISE] * fewer
     noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
-    errors = [sd * jax.random.normal(k, shape)[places, np.arange(shape[1])] for sd, k in noises]
+    errors = [sd * jax.random.normal(k, shape)[error_numbers, np.arange(shape[1])] for sd, k in noises]
     return {
         "input_force": cells.shown_input(force) + errors[0],
         "output_force": cells.shown_output(output),
@@ -96,7 +96,7 @@ def errors_shared(blocks: int, correlation: float) -> np.ndarray:
     return np.searchsorted(starts, np.arange(blocks), "right") - 1
 
 
-def recorded_again(description: Description, recordings: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:
+def recorded_again(description: Description, recordings: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
     """The recordings with forces drawn by `drawn_recordings`, their strokes found anew.
 
     What the likelihood takes a block to be worth is kept: how long deviations stay alike is not found anew.
@@ -104,20 +104,20 @@ def recorded_again(description: Description, recordings: Recordings, drawn: Mapp
     Args:
         description: The cable.
         recordings: The recordings as measured.
-        drawn: What was drawn.
+        readings: What was drawn.
 
     Raises:
         DatasetError: Strokes cannot be found.
     """
-    each = []
+    items = []
     for i, recording in enumerate(recordings.items):
         n, time = len(recording.blocks.time), recording.blocks.time
-        shown, error = drawn["output_force"][:n, i], drawn["output_error"][:n, i]
-        late = shown - float(drawn["delay_error"]) * np.gradient(shown, time)
-        blocks = replace(recording.blocks, input_force=drawn["input_force"][:n, i], output_force=late + error)
+        shown, error = readings["output_force"][:n, i], readings["output_error"][:n, i]
+        late = shown - float(readings["delay_error"]) * np.gradient(shown, time)
+        blocks = replace(recording.blocks, input_force=readings["input_force"][:n, i], output_force=late + error)
         strokes = _strokes(description, recording, blocks)
-        each.append(replace(recording, blocks=blocks, strokes=strokes))
-    return replace(recordings, items=tuple(each))
+        items.append(replace(recording, blocks=blocks, strokes=strokes))
+    return replace(recordings, items=tuple(items))
 
 
 def _strokes(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
@@ -127,8 +127,8 @@ def _strokes(description: Description, recording: Recording, blocks: Blocks) -> 
         if entry.file == recording.file and recording.strokes.by_hand
         for phase in entry.strokes
     ]
-    found = find_strokes(blocks, recording.file, recording.name, spans, cable_of(description))
-    return replace(found, correlation=recording.strokes.correlation)
+    strokes = find_strokes(blocks, recording.file, recording.name, spans, cable_of(description))
+    return replace(strokes, correlation=recording.strokes.correlation)
 
 
 def refuse_saturated(recordings: Recordings) -> None:

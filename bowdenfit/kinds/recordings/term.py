@@ -93,12 +93,12 @@ def _label(cable: Cable, recordings: Recordings, run: str) -> str:
 def _needs_blocks(recordings: Recordings, parts: list[BlocksUsed]) -> None:
     """Every run must have something that the likelihood can use."""
     for run in recordings.runs:
-        mine = [r for r in recordings.items if r.run == run]
+        members = [r for r in recordings.items if r.run == run]
         if not any(len(p.used) for r, p in zip(recordings.items, parts, strict=True) if r.run == run):
-            under_tension = np.concatenate([positive(r) for r in mine]).mean() > _MOSTLY
+            under_tension = np.concatenate([positive(r) for r in members]).mean() > _MOSTLY
             why = _NO_SLIDING if under_tension else _NO_TENSION
             raise DatasetError(
-                f"{mine[0].file}: nothing of the run {run!r} can be used, because {why}; or leave the recording out."
+                f"{members[0].file}: nothing of the run {run!r} can be used, because {why}; or leave the recording out."
             )
 
 
@@ -212,8 +212,8 @@ class RecordingTerms(TermKind[Recordings]):
         return drawn_recordings(table, truth)
 
     @override
-    def with_readings(self, description: Description, table: Recordings, drawn: Mapping[str, np.ndarray]) -> Recordings:
-        return recorded_again(description, table, drawn)
+    def with_readings(self, description: Description, table: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
+        return recorded_again(description, table, readings)
 
     @override
     def check_drawable(self, description: Description, table: Recordings) -> None:

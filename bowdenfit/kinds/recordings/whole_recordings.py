@@ -162,30 +162,30 @@ class BlocksTerm(ABC):
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
         return Mounted(deviation - loading * effect[data["run"]], effect, sd, total)
 
-    def _beyond(self, data: Data, found: Mounted, noise: Array) -> PerTime:
+    def _beyond(self, data: Data, effects: Mounted, noise: Array) -> PerTime:
         """How far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
-        return data["censored"] * -found.within * data["newtons"] / noise
+        return data["censored"] * -effects.within * data["newtons"] / noise
 
     def log_likelihood(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Log likelihood of each run, all blocks together; these scatter normally about the run."""
-        found, noise, n = self._deviations(values, data, values), values[self.reading_noise], data["n"]
-        squares = self._per_run(data, data["weight"] * found.within**2)
-        constant = (data["log_weights"] - jnp.log(found.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
+        effects, noise, n = self._deviations(values, data, values), values[self.reading_noise], data["n"]
+        squares = self._per_run(data, data["weight"] * effects.within**2)
+        constant = (data["log_weights"] - jnp.log(effects.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
         inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
-        log_probability = log_normal_cdf(self._beyond(data, found, noise)) * data["share"]
+        log_probability = log_normal_cdf(self._beyond(data, effects, noise)) * data["share"]
         censored = self._per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
-        return inside + noise_law(self.cable.description).log_density(found.effect, 0.0, found.sd) + censored
+        return inside + noise_law(self.cable.description).log_density(effects.effect, 0.0, effects.sd) + censored
 
     def residuals(self, values: Values, data: Data) -> Float[Array, " runs_and_blocks"]:
         """Standardized residuals of the same likelihood: between runs, and of the blocks of a run."""
-        found = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
+        effects = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         noise = jax.lax.stop_gradient(values[self.reading_noise])
-        beyond = self._beyond(data, found, noise)
-        inside = jnp.sqrt(data["weight"]) * found.within / noise
+        beyond = self._beyond(data, effects, noise)
+        inside = jnp.sqrt(data["weight"]) * effects.within / noise
         # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
         root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
         censored = jnp.where((data["censored"] != 0) & (beyond < 30.0), root, 0.0)
-        between = noise_law(self.cable.description).residual(found.effect / jax.lax.stop_gradient(found.sd))
+        between = noise_law(self.cable.description).residual(effects.effect / jax.lax.stop_gradient(effects.sd))
         return jnp.concatenate([between, (inside + censored).ravel()])
 
 

@@ -60,8 +60,8 @@ class RingDownTable(Part):
 
     def half_swings(self, run: int) -> tuple[int, float]:
         """How many half swings of a run are seen, and how long one takes [s]."""
-        mine = self.run == run
-        time, reading = self.time[mine], self.reading[mine]
+        rows = self.run == run
+        time, reading = self.time[rows], self.reading[rows]
         away = reading - np.median(reading[-max(len(reading) // 10, 3) :])
         large = np.abs(away) > _STILL * np.max(np.abs(away))
         at, left = time[large], away[large]
@@ -88,53 +88,53 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
     table = read_table(path)
     ends = Quantity("angle", "angle"), Quantity("torque", "torque")
     others = Quantity("run", "text"), Quantity("added_inertia", "inertia")
-    found = find_columns(table, (Quantity("time", "time"), *ends, *others), source.columns, _UNUSED)
-    if ("angle" in found) == ("torque" in found):
+    columns = find_columns(table, (Quantity("time", "time"), *ends, *others), source.columns, _UNUSED)
+    if ("angle" in columns) == ("torque" in columns):
         raise DatasetError(
             f"{table.file} needs the angle of the joint (angle_deg), or the torque in the rope (torque_N_m), and has "
-            f"{'both; leave one of the two columns out' if 'angle' in found else 'neither'}."
+            f"{'both; leave one of the two columns out' if 'angle' in columns else 'neither'}."
         )
-    clock = require_column(table, found, "time", "time_s")
+    clock = require_column(table, columns, "time", "time_s")
     time = np.asarray(clock.numbers())
-    is_torque = "torque" in found
-    reading = np.asarray(found["torque" if is_torque else "angle"].numbers()) / (1000.0 if is_torque else 1.0)
-    run, names = _runs(found, len(table.rows))
-    added = np.asarray(found["added_inertia"].numbers()) if "added_inertia" in found else np.zeros(len(time))
+    is_torque = "torque" in columns
+    reading = np.asarray(columns["torque" if is_torque else "angle"].numbers()) / (1000.0 if is_torque else 1.0)
+    run, names = _runs(columns, len(table.rows))
+    added = np.asarray(columns["added_inertia"].numbers()) if "added_inertia" in columns else np.zeros(len(time))
     table.faults.refuse()
-    each = [_one_run(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
-    since = time - np.array([start for start, _ in each])[run]
+    releases = [_one_run(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
+    since = time - np.array([start for start, _ in releases])[run]
     stated, inertia, sd = source.settings.inertia, np.nan, np.nan
     if stated is not None:
         inertia, sd = stated.to("inertia"), stated.sd_to("inertia") or np.nan
-    more = np.array([more for _, more in each])
+    more = np.array([more for _, more in releases])
     made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, provenance_of(table))
     for i, name in enumerate(names):
         _check_swings(table, name, made, i)
     return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
 
 
-def _runs(found: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
-    if "run" not in found:
+def _runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
+    if "run" not in columns:
         return np.zeros(n, dtype=int), ("",)
-    texts = [cell.text.strip() for cell in found["run"].cells]
+    texts = [cell.text.strip() for cell in columns["run"].cells]
     names = tuple(dict.fromkeys(texts))
     return np.array([names.index(text) for text in texts]), names
 
 
-def _one_run(clock: Column, file: str, name: str, mine: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
+def _one_run(clock: Column, file: str, name: str, in_run: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
     """Time of the release and added inertia of a run."""
-    called, rows = (f"{file}, run {name!r}" if name else file), np.flatnonzero(mine)
+    called, rows = (f"{file}, run {name!r}" if name else file), np.flatnonzero(in_run)
     back = np.flatnonzero(np.diff(time[rows]) <= 0)
     if len(back):
         raise clock.cells[rows[back[0] + 1]].refuse(
             f"time does not grow here, {time[rows[back[0] + 1]]:g} s after {time[rows[back[0]]]:g} s; sort the rows by time, "
             "and give each ring-down a name of its own in a column run."
         )
-    if np.ptp(added[mine]) > 0:
+    if np.ptp(added[in_run]) > 0:
         raise DatasetError(
             f"{called} has several added inertias; give each ring-down a name of its own in a column run."
         )
-    if np.any(added[mine] < 0):
+    if np.any(added[in_run] < 0):
         words = f"the added inertia {added[rows[0]]:g} kg m^2 is negative; write what was added to the joint"
         raise DatasetError(f"{called}: {words}.")
     return float(time[rows[0]]), float(added[rows[0]])

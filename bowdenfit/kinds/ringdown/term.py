@@ -172,7 +172,7 @@ class RingDownTerms(TermKind[RingDownTable]):
         damping, friction = HalfNormal(_TIMES * decay), HalfNormal(_TIMES * 0.45 * stiffness * angle / seen)
         looks = _first_looks(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
         by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
-        found = [
+        parameters = [
             _inertia(table, inertia),
             Parameter(
                 STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
@@ -193,9 +193,9 @@ class RingDownTerms(TermKind[RingDownTable]):
                 HalfCauchy(_NOISE_SHARE * size), unit, scaled_by=f"the first deflection, {size:.3g} {unit}",
             ),
         ]  # fmt: skip
-        for run, begun in enumerate(away):
-            start, called = begun / stiffness if table.is_torque else begun, f"of ring-down {run + 1}"
-            found += [
+        for run, deflection in enumerate(away):
+            start, called = deflection / stiffness if table.is_torque else deflection, f"of ring-down {run + 1}"
+            parameters += [
                 Parameter(
                     of_run("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {called}", "sensor",
                     Normal(start, angle), "rad",
@@ -208,7 +208,7 @@ class RingDownTerms(TermKind[RingDownTable]):
                     of_run("release", run), f"$t_{{{run + 1}}}$", f"time of release {called}", "sensor", Normal(0.0, step), "s"
                 ),
             ]  # fmt: skip
-        return found
+        return parameters
 
     @override
     def draw(self, table: RingDownTable, truth: Truth) -> dict[str, Array]:

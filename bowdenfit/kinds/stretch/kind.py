@@ -60,22 +60,22 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
     table = read_table(path)
     wanted = (Quantity("load", "force"), Quantity("wrap_angle", "angle"), Quantity("stretch", "length"))
     optional = (Quantity("branch", "text"), Quantity("cycle", "text"))
-    found = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)
-    check_spelling(table, found, optional)
+    columns = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)
+    check_spelling(table, columns, optional)
     loads, angles, stretches = (
-        require_column(table, found, name, f"{name}_{unit}")
+        require_column(table, columns, name, f"{name}_{unit}")
         for name, unit in (("load", "N"), ("wrap_angle", "deg"), ("stretch", "mm"))
     )
     load = np.array(loads.read_cells(lambda cell: read_tension(cell, loads, "a load"), np.nan))
     wrap_angle = np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan))
     stretch = stretches.numbers()
-    unloading = _branches(found.get("branch"), len(load))
+    unloading = _branches(columns.get("branch"), len(load))
     table.faults.refuse()
-    cycle, names = _cycles(found.get("cycle"), wrap_angle)
+    cycle, names = _cycles(columns.get("cycle"), wrap_angle)
     peak = np.array([load[cycle == c].max() for c in cycle])
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
     _check_rising(stretches, made)
-    remarks = tuple(_branch_remarks(table, made, "branch" in found))
+    remarks = tuple(_branch_remarks(table, made, "branch" in columns))
     return TableFromFiles(made, {path.name: path}, remarks, (table.account,))
 
 
@@ -250,10 +250,10 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
     @override
     def copied_readings(self, table: StretchTable) -> list[str]:
         names = tuple(f"cycle {name}" for name in table.cycle_names)
-        places = np.column_stack([table.load, table.wrap_angle, table.unloading])
+        settings = np.column_stack([table.load, table.wrap_angle, table.unloading])
         curve = 2 * table.cycle + table.unloading
         read = table.stretch[:, None]
-        return copies(Compared(listed(table.origin.files), table.cycle, names, places, read, table.load, curve))
+        return copies(Compared(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve))
 
     @override
     def why_implausible(self, measured: StretchTable, simulated: StretchTable) -> str:

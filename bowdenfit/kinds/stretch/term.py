@@ -88,12 +88,12 @@ class StretchCandidates(CandidateKind):
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
         load, bend = (np.array(v) for v in ([c.load for c in candidates], [sum(c.angles) for c in candidates]))
-        up, alone, (_, _, origin) = (
+        up, cycle, (_, _, origin) = (
             np.zeros(len(candidates), dtype=bool),
             np.arange(len(candidates)),
             at.rows(candidates),
         )
-        table = StretchTable(load, bend, 0.01 * load, up, load, alone, tuple(str(i) for i in alone), origin)
+        table = StretchTable(load, bend, 0.01 * load, up, load, cycle, tuple(str(i) for i in cycle), origin)
         return one_reading_each(stretch_term(at.cable, table))
 
 

@@ -244,9 +244,9 @@ def init(
 
 
 def _examples() -> list[str]:
-    from bowdenfit.questions.start.folder import examples
+    from bowdenfit.questions.start.folder import find_examples
 
-    return list(examples())
+    return list(find_examples())
 
 
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.

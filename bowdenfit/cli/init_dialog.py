@@ -14,11 +14,11 @@ from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.describe import write_description
 from bowdenfit.questions.start.folder import (
     describe_written_files,
-    examples,
-    measured_files,
+    find_examples,
+    find_measured_files,
+    find_verb,
     refuse_existing,
     refuse_files,
-    verb_of,
     write_data_set,
     write_example,
     write_template,
@@ -121,12 +121,12 @@ def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | 
     if files:
         raise UsageError("--from and --example both say what to write; leave one of them out.")
     if not named:
-        for known in examples():
+        for known in find_examples():
             say(known)
         return
     name, folder = named[0], folder or Path(named[-1])
     write_example(name, folder)
-    say(f"Wrote {folder}. Next: bowdenfit {verb_of(folder)} {shlex.quote(str(folder))}")
+    say(f"Wrote {folder}. Next: bowdenfit {find_verb(folder)} {shlex.quote(str(folder))}")
 
 
 def _ask_folder(ask: Asker) -> Path:
@@ -140,7 +140,7 @@ def _ask_folder(ask: Asker) -> Path:
 
 def _ask_files(ask: Asker) -> list[Path]:
     """Ask for the measured files; none where only a template is to be written."""
-    here = measured_files(Path(), list(FORMATS))
+    here = find_measured_files(Path(), list(FORMATS))
 
     def read(typed: str) -> list[Path]:
         if typed.strip() == "-":

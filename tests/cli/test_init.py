@@ -14,11 +14,9 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.model import build_model
-from bowdenfit.questions.start.describe import write_description
-from bowdenfit.questions.start.folder import examples, new_folder
-from bowdenfit.questions.start.names import ask_coefficient_name
-from bowdenfit.questions.start.page import toml_text
-from bowdenfit.questions.start.question import quantity
+from bowdenfit.questions.start.describe import format_toml, write_description
+from bowdenfit.questions.start.folder import find_examples, new_folder
+from bowdenfit.questions.start.question import coefficient_name_question, quantity_question
 
 CORPUS = Path(__file__).parents[1] / "files" / "corpus"
 ANGLES = """Measured in March;;
@@ -195,13 +193,13 @@ def test_every_example_is_written_whole_and_accepted(run, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path)
     code, listing, _ = run("init", "--example")
     assert code == 0
-    assert listing.split() == list(examples()) and "on-body-exoskeleton" in listing
-    for name in examples():
+    assert listing.split() == list(find_examples()) and "on-body-exoskeleton" in listing
+    for name in find_examples():
         code, out, _ = run("init", "--example", name)
         verb = {"synthetic-fleet": "fleet", "on-body-metabolic": "metabolic"}.get(name, "fit")
         assert (code, out) == (0, f"Wrote {name}. Next: bowdenfit {verb} {name}\n")
         assert run("check", name)[0] == (0 if verb == "fit" else 2)
-    assert {"synthetic-fleet", "on-body-metabolic"} < set(examples())
+    assert {"synthetic-fleet", "on-body-metabolic"} < set(find_examples())
     assert "the folder holds a fleet: `bowdenfit fleet synthetic-fleet`" in run("check", "synthetic-fleet")[2]
     assert "did you mean 'on-body-exoskeleton'" in run("init", "--example", "on-body-exoskelton")[2]
     assert "exists already" in run("init", "--example", "yarn-on-cylinder")[2]
@@ -220,7 +218,7 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path):
 @pytest.mark.parametrize("typed", ["12", "deg", "-3 deg", "12 mm", "0 deg", "1e400 deg", ""])
 def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
     with pytest.raises(UsageError, match=r"\.$"):
-        quantity("Which angle?", "angle", "90 deg").read(typed)
+        quantity_question("Which angle?", "angle", "90 deg").read(typed)
 
 
 @pytest.mark.parametrize(
@@ -238,18 +236,18 @@ def test_an_angle_that_is_none_is_refused_in_a_sentence(typed):
 )
 def test_a_coefficient_is_not_called_what_check_would_refuse(typed, replies):
     with pytest.raises(UsageError, match=replies):
-        ask_coefficient_name("What is it called?", "mu1", ("knie",)).read(typed)
+        coefficient_name_question("What is it called?", "mu1", ("knie",)).read(typed)
 
 
 @pytest.mark.extended
 def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
-    question = ask_coefficient_name("What is it called?", "mu1", ())
+    question = coefficient_name_question("What is it called?", "mu1", ())
     kept = ("mu1", " µ  edge ", "knie_mu", "friction")
     assert [question.read(name) for name in kept] == ["mu1", "µ edge", "knie_mu", "friction"]
-    for name in examples():
+    for name in find_examples():
         if name in {"synthetic-fleet", "on-body-metabolic"}:
             continue
-        space = build_model(bf.read(examples()[name])).space
+        space = build_model(bf.read(find_examples()[name])).space
         others = [parameter.name for parameter in space.parameters if parameter.role not in {"friction", "curve"}]
         assert others, name
         for other in others:
@@ -376,7 +374,7 @@ def test_what_is_written_is_what_is_read(page):
             return {key: close(inside) for key, inside in value.items()}
         return [close(inside) for inside in value] if isinstance(value, list) else value
 
-    assert tomllib.loads(toml_text(page, {"route": "a remark"})) == close(page)
+    assert tomllib.loads(format_toml(page, {"route": "a remark"})) == close(page)
 
 
 def test_a_range_beyond_the_measured_lengths_is_refused(foreign):

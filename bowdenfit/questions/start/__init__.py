@@ -1,1 +1,1 @@
-"""From files that no description names, and answers to what they do not say, to a cable.toml."""
+"""Start a data set: write a cable.toml from measured files, and from answers to what they do not say."""

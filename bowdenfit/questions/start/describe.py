@@ -1,7 +1,11 @@
-"""Write a description from files: take what they say, ask for what they do not say."""
+"""Write a cable.toml for measured files: take what they say, ask for what they do not say.
 
+Keys come in the order in which a person would write them.
+"""
+
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +14,22 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import stated_angle
 from bowdenfit.kinds.kind import Kind
-from bowdenfit.questions.start.columns import name_channels, name_columns
-from bowdenfit.questions.start.names import ask_cable_name
-from bowdenfit.questions.start.page import toml_text
-from bowdenfit.questions.start.places import CableLayout, find_layout
-from bowdenfit.questions.start.question import Asker, choose, number, quantity, text
-from bowdenfit.questions.start.sheet import MeasuredFile, inspect_file, inspect_recording
+from bowdenfit.questions.start.cable_layout import CableLayout, find_layout
+from bowdenfit.questions.start.measured_file import (
+    MeasuredFile,
+    inspect_file,
+    inspect_recording,
+    name_channels,
+    name_columns,
+)
+from bowdenfit.questions.start.question import (
+    Asker,
+    cable_name_question,
+    choice_question,
+    number_question,
+    quantity_question,
+    text_question,
+)
 from bowdenfit.words import listed
 
 _REMARKS = {
@@ -23,58 +37,62 @@ _REMARKS = {
     "route": "What the design question varies, and where the curves of the wrap angles hold.",
     "contact": "One [[contact]] for each place where the rope rubs; contacts may share a coefficient.",
 }
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_MAX_LINE = 100  # characters, beyond which a table gets a heading of its own; a judgement of what reads well
 
 
-def write_description(paths: Sequence[Path], default_name: str, ask: Asker) -> str:
+def write_description(paths: Sequence[Path], default_name: str, asker: Asker) -> str:
     """Write the text of a cable.toml for some files.
 
     Args:
         paths: The files, which are to lie beside it.
         default_name: Name of the cable if nobody states one.
-        ask: Whom to ask what the files do not say.
+        asker: Whom to ask what the files do not say.
 
     Raises:
         DatasetError: A file cannot be read, or holds nothing that can be used.
     """
-    sheets = _inspect_files(paths, ask)
-    name = ask.ask(ask_cable_name("What is the cable called?", default_name))
-    source = ask.ask(text("Who measured it, when, on which bench? (- to leave it out)", "-"))
+    measured_files = _inspect_files(paths, asker)
+    name = asker.ask(cable_name_question("What is the cable called?", default_name))
+    source = asker.ask(text_question("Who measured it, when, on which bench? (- to leave it out)", "-"))
     faults = Faults()
-    for sheet in sheets:
+    for file in measured_files:
         with faults.collect():
-            if sheet.kind and sheet.kind.takes_channels:
-                name_channels(sheet, ask)
+            if file.kind and file.kind.takes_channels:
+                name_channels(file, asker)
             else:
-                name_columns(sheet, ask)
+                name_columns(file, asker)
     faults.refuse()
-    ask.settle()
-    layout = find_layout(sheets, ask)
-    ask.settle()
-    recordings = _recording_entries([each for each in sheets if each.kind and each.kind.takes_channels], layout, ask)
-    ask.settle()
+    asker.settle()
+    layout = find_layout(measured_files, asker)
+    asker.settle()
+    recordings = _recording_entries(
+        [file for file in measured_files if file.kind and file.kind.takes_channels], layout, asker
+    )
+    asker.settle()
     page: dict[str, Any] = {"schema": SCHEMA, "name": name} | ({} if source == "-" else {"source": source})
-    for sheet in sheets:
-        assert sheet.kind is not None and sheet.kind.init_questions is not None  # asked for above
-        page |= sheet.kind.init_questions.description
+    for file in measured_files:
+        assert file.kind is not None and file.kind.init_questions is not None  # asked for above
+        page |= file.kind.init_questions.description
     page |= {"route": layout.route} if layout.route else {}
-    page |= {"contact": layout.contacts, "tables": _table_entries(sheets)}
-    return toml_text(page | ({"recording": recordings} if recordings else {}), _REMARKS)
+    page |= {"contact": layout.contacts, "tables": _table_entries(measured_files)}
+    return format_toml(page | ({"recording": recordings} if recordings else {}), _REMARKS)
 
 
-def _inspect_files(paths: Sequence[Path], ask: Asker) -> list[MeasuredFile]:
-    """What each file is; asked where it does not say."""
-    faults, sheets = Faults(), list[MeasuredFile]()
+def _inspect_files(paths: Sequence[Path], asker: Asker) -> list[MeasuredFile]:
+    """Inspect every file; ask for its kind where it does not say it."""
+    faults, measured_files = Faults(), list[MeasuredFile]()
     for path in paths:
         with faults.collect():
-            sheet = inspect_file(path)
-            if sheet.kind is None:
-                sheet = _ask_kind(sheet, ask)
-            assert sheet.kind is not None and sheet.kind.init_questions is not None
-            ask.say(f"{sheet.file} holds {sheet.kind.init_questions.holds}.")
-            sheets.append(sheet)
-    ask.settle()
-    for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
-        files = [sheet.file for sheet in sheets if sheet.kind is kind]
+            file = inspect_file(path)
+            if file.kind is None:
+                file = _ask_kind(file, asker)
+            assert file.kind is not None and file.kind.init_questions is not None
+            asker.say(f"{file.name} holds {file.kind.init_questions.holds}.")
+            measured_files.append(file)
+    asker.settle()
+    for kind in {file.kind.name: file.kind for file in measured_files if file.kind}.values():
+        files = [file.name for file in measured_files if file.kind is kind]
         with faults.collect():
             questions = kind.init_questions
             if len(files) > 1 and questions is not None and not questions.several:
@@ -82,32 +100,34 @@ def _inspect_files(paths: Sequence[Path], ask: Asker) -> list[MeasuredFile]:
                     f"{listed(files)} both hold {questions.holds}; put them into one file, below one line of headings."
                 )
     faults.refuse()
-    return sheets
+    return measured_files
 
 
-def _ask_kind(sheet: MeasuredFile, ask: Asker) -> MeasuredFile:
-    """Ask what a file holds."""
+def _ask_kind(file: MeasuredFile, asker: Asker) -> MeasuredFile:
+    """Return a file with its kind, as answered."""
     options: list[tuple[str, Kind[Any]]] = [
         (kind.init_questions.holds, kind) for kind in KINDS.values() if kind.init_questions is not None
     ]
-    default = [kind for _, kind in options].index(sheet.likely) + 1 if sheet.likely else None
-    columns = listed([each.words for each in sheet.columns])
+    default = [kind for _, kind in options].index(file.likely) + 1 if file.likely else None
+    columns = listed([column.words for column in file.columns])
     why = (
-        f"{sheet.file} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "
+        f"{file.name} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "
         "efficiency_percent, or cable_length_mm beside wrap angles in deg; or run this in a terminal, which asks."
     )
-    kind = ask.ask(choose(f"{sheet.file} has the columns {columns}. What does it hold?", options, default, why))
+    kind = asker.ask(
+        choice_question(f"{file.name} has the columns {columns}. What does it hold?", options, default, why)
+    )
     if kind.takes_channels:
-        return inspect_recording(sheet.path, "its user says so")
-    sheet.kind = kind
-    return sheet
+        return inspect_recording(file.path, "its user says so")
+    file.kind = kind
+    return file
 
 
-def _table_entries(sheets: Sequence[MeasuredFile]) -> dict[str, Any]:
-    """[tables]: the files of each kind, with the columns that must be named."""
+def _table_entries(measured_files: Sequence[MeasuredFile]) -> dict[str, Any]:
+    """Return [tables]: the files of every kind, with the columns that must be named."""
     tables: dict[str, Any] = {}
-    for kind in {sheet.kind.name: sheet.kind for sheet in sheets if sheet.kind}.values():
-        group = [sheet for sheet in sheets if sheet.kind is kind]
+    for kind in {file.kind.name: file.kind for file in measured_files if file.kind}.values():
+        group = [file for file in measured_files if file.kind is kind]
         if kind.takes_channels:
             tables[kind.name] = {}
             continue
@@ -117,49 +137,117 @@ def _table_entries(sheets: Sequence[MeasuredFile]) -> dict[str, Any]:
             settings |= file.settings
         if any(columns != columns_by_file[0] for columns in columns_by_file):
             raise DatasetError(
-                f"the columns of {listed([file.file for file in group])} are not called alike; give them the same headings, or "
+                f"the columns of {listed([file.name for file in group])} are not called alike; give them the same headings, or "
                 "put them into one file."
             )
-        files = [file.file for file in group]
+        files = [file.name for file in group]
         where: dict[str, Any] = {"files": files} if len(files) > 1 else {"file": files[0]}
         tables[kind.name] = {**where, **settings, **({"columns": columns_by_file[0]} if columns_by_file[0] else {})}
     return tables
 
 
-def _named_sources(sheet: MeasuredFile) -> dict[str, Any]:
-    """The columns or channels that the description must name."""
-    return {name: source.model_dump(exclude_none=True) for name, source in sheet.sources.items()}
+def _named_sources(file: MeasuredFile) -> dict[str, Any]:
+    """Return the columns or channels that the description must name, as plain data."""
+    return {name: source.model_dump(exclude_none=True) for name, source in file.sources.items()}
 
 
-def _recording_entries(sheets: Sequence[MeasuredFile], layout: CableLayout, ask: Asker) -> list[dict[str, Any]]:
-    """Every [[recording]]: its file, where it was made, and what its channels are called."""
+def _recording_entries(
+    measured_files: Sequence[MeasuredFile], layout: CableLayout, asker: Asker
+) -> list[dict[str, Any]]:
+    """Return every [[recording]]: its file, where it was made, and what its channels are called."""
     entries = []
-    angles = [each["wrap_angle"]["column"] for each in layout.contacts if "column" in each["wrap_angle"]]
-    for sheet in sheets:
-        entry: dict[str, Any] = {"file": sheet.file}
+    angles = [contact["wrap_angle"]["column"] for contact in layout.contacts if "column" in contact["wrap_angle"]]
+    for file in measured_files:
+        entry: dict[str, Any] = {"file": file.name}
         if layout.route:
-            entry["at"] = _ask_length(sheet, layout, ask)
+            entry["at"] = _ask_length(file, layout, asker)
         for name in [] if layout.route else angles:
-            stated = stated_angle(sheet.path)
+            stated = stated_angle(file.path)
             why = (
-                f"{sheet.file} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
+                f"{file.name} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
             )
-            words = f"What was the wrap angle of {sheet.file}, with its unit?"
-            value, unit = ask.ask(quantity(words, "angle", "90 deg", why, stated[0] if stated else None))
+            words = f"What was the wrap angle of {file.name}, with its unit?"
+            value, unit = asker.ask(quantity_question(words, "angle", "90 deg", why, stated[0] if stated else None))
             entry.setdefault("wrap_angles", {})[name] = {"value": value, "unit": unit}
-        channels = _named_sources(sheet)
+        channels = _named_sources(file)
         entries.append(entry | ({"channels": channels} if channels else {}))
     return entries
 
 
-def _ask_length(sheet: MeasuredFile, layout: CableLayout, ask: Asker) -> float:
-    """The length at which a recording was made; proposed where the name of its file has it."""
+def _ask_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> float:
+    """Ask for the length at which a recording was made; proposed where the name of its file has it."""
     unit = layout.route["unit"]
-    named = re.findall(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", sheet.path.stem)
+    named = re.findall(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", file.path.stem)
     why = (
-        f"{sheet.file} does not say at which length it was recorded; write it into the name of the file, such as "
+        f"{file.name} does not say at which length it was recorded; write it into the name of the file, such as "
         f"run1_470{unit}.csv."
     )
-    words = f"At which length, in {unit}, was {sheet.file} recorded?"
+    words = f"At which length, in {unit}, was {file.name} recorded?"
     proposed = named[0].replace(",", ".") if len(named) == 1 else None
-    return ask.ask(number(words, proposed, "" if proposed else why, "470"))
+    return asker.ask(number_question(words, proposed, "" if proposed else why, "470"))
+
+
+def format_toml(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:
+    """Return a description as TOML: plain values, then tables, then lists of tables.
+
+    Args:
+        page: Plain data.
+        remarks: Comment above a key, by key.
+    """
+    lines = list[str]()
+    for key, value in page.items():
+        is_list = isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
+        if lines and (is_list or isinstance(value, Mapping)):
+            lines.append("")
+        lines += [f"# {line}" for line in remarks.get(key, "").splitlines()]
+        if is_list:
+            for i, entry in enumerate(value):
+                lines += [""] * (i > 0) + [f"[[{_format_key(key)}]]", *map(_format_line, entry, entry.values())]
+        elif isinstance(value, Mapping):
+            lines += _format_section([key], value)
+        else:
+            lines.append(_format_line(key, value))
+    return "\n".join(lines) + "\n"
+
+
+def _format_section(path: Sequence[str], page: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of a table under its heading; long tables in it follow under headings of their own."""
+    long = {
+        key: value
+        for key, value in page.items()
+        if isinstance(value, Mapping) and len(_format_line(key, value)) > _MAX_LINE
+    }
+    short = {key: value for key, value in page.items() if key not in long}
+    if short:
+        yield f"[{'.'.join(map(_format_key, path))}]"
+        yield from map(_format_line, short, short.values())
+    for i, (key, value) in enumerate(long.items()):
+        if short or i:
+            yield ""
+        yield from _format_section([*path, key], value)
+
+
+def _format_line(key: str, value: Any) -> str:
+    """Format a key with its value."""
+    return f"{_format_key(key)} = {_format_value(value)}"
+
+
+def _format_key(name: str) -> str:
+    """Format a key, quoted where TOML needs that."""
+    return name if _BARE.fullmatch(name) else _format_value(name)
+
+
+def _format_value(value: Any) -> str:
+    """Format a value on one line, or a long list over several."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float | int):
+        return f"{value:.12g}"
+    if isinstance(value, Mapping):
+        inside = ", ".join(map(_format_line, value, value.values()))
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, list):
+        parts = [_format_value(entry) for entry in value]
+        line = f"[{', '.join(parts)}]"
+        return line if len(line) <= _MAX_LINE else "[\n" + "".join(f"    {part},\n" for part in parts) + "]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -14,12 +14,12 @@ from bowdenfit.results.folder import fill_folder_atomically, is_empty
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
-_VERB_BY_FILE = {
+_VERB_BY_FILE = {  # the verb that reads a folder with such a description
     DESCRIPTION_FILE: "fit",
     FLEET_DESCRIPTION: "fleet",
     "metabolic.toml": "metabolic",
-}  # that read such a description
-_PACKAGE, _CHECKOUT = "examples", "datasets"  # where the shipped data sets are, in a wheel and beside the package
+}
+_PACKAGE, _CHECKOUT = "examples", "datasets"  # folders of the shipped data sets, in a wheel and beside the package
 
 
 def refuse_existing(folder: Path) -> None:
@@ -36,7 +36,7 @@ def refuse_existing(folder: Path) -> None:
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write into, which takes its name when all is written, and is gone if that fails or is interrupted.
+    """Yield a folder to write into, which takes its name when all is written, and is gone if that fails or is interrupted.
 
     Args:
         folder: What it will be called.
@@ -98,17 +98,17 @@ def refuse_files(files: Sequence[Path]) -> None:
         raise DatasetError(f"a data set cannot hold {shown(twice[0])} twice; rename one of the files.")
 
 
-def examples() -> Mapping[str, Path]:
-    """The shipped data sets by their names: of the wheel, or those beside the package in a checkout."""
+def find_examples() -> Mapping[str, Path]:
+    """Return the shipped data sets by their names: those of the wheel, or those beside the package in a checkout."""
     package = Path(str(resources.files("bowdenfit")))
     for place in (package / _PACKAGE, package.parent / _CHECKOUT):
         if place.is_dir():
-            return {path.name: path for path in sorted(place.iterdir()) if verb_of(path)}
+            return {path.name: path for path in sorted(place.iterdir()) if find_verb(path)}
     return {}
 
 
-def verb_of(folder: Path) -> str:
-    """The verb that reads a folder, by the description that stands in it; empty where none does."""
+def find_verb(folder: Path) -> str:
+    """Return the verb that reads a folder, by its description; empty without one."""
     return next((verb for file, verb in _VERB_BY_FILE.items() if (folder / file).is_file()), "")
 
 
@@ -118,7 +118,7 @@ def write_example(name: str, folder: Path) -> None:
     Raises:
         UsageError, StoreError: There is none of that name; or see `new_folder`.
     """
-    known = examples()
+    known = find_examples()
     if name not in known:
         hint = suggest_name(name, list(known)) if known else "; none was installed."
         raise UsageError(f"there is no example {shown(name)}{hint}")
@@ -128,8 +128,8 @@ def write_example(name: str, folder: Path) -> None:
             copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
 
 
-def measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:
-    """The files in a folder that may hold measurements, by their endings."""
+def find_measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:
+    """Return the files in a folder that may hold measurements, by their endings."""
     return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in endings and path.is_file()]
 
 

@@ -1,10 +1,17 @@
-"""A question to a person: with a default, or with the reason why there is none."""
+"""Questions to a person: the question, its default or the reason why there is none, and how an answer is read.
+
+Names are refused at once where `check` would refuse them later, in the same words.
+"""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
+from pydantic import TypeAdapter, ValidationError
+
+from bowdenfit.description import RESERVED_NAMES, Contact, Name
+from bowdenfit.description.placeholders import PLACEHOLDERS
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, suggest_name
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
@@ -12,15 +19,26 @@ from bowdenfit.words import shown
 Answer = TypeVar("Answer")
 _YES, _NO = ["yes", "y", "ja", "j", "oui", "o", "si", "s", "true", "1"], ["no", "n", "nein", "non", "false", "0"]
 _QUANTITY = re.compile(r"(?P<value>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\D.*)", re.ASCII)
+PARAMETER_NAMES = {
+    "bedding_load", "bedding_stretch", "delay_error", "drag", "end_spring", "gain_error", "input_offset", "lengthening",
+    "load_exponent", "loop_mounting", "mu_stretch", "output_offset", "preload", "ring_friction", "ring_inertia",
+    "ring_stiffness", "rope_damping", "rope_give", "rope_stiffness", "sigma_F", "sigma_L", "sigma_P", "sigma_block",
+    "sigma_ringdown", "sigma_theta", "sigma_x", "stiffness", "stretch_zero", "stribeck", "stribeck_speed", "stroke_difference",
+    "tau", "viscous",
+}  # fmt: skip
+"""Names of all parameters that belong neither to a contact, a column nor a run: coefficients may not use them."""
+_RUN_PARAMETER = re.compile(r"(amplitude|displacement_zero|release|rest)_\d+")
+_CURVE_PARAMETERS = ("a", "b", "c", "A", "B", "C", "middle", "slope")  # endings, behind the name of the column
+_NAME = TypeAdapter[str](Name)
 
 
 @dataclass(frozen=True)
 class Question(Generic[Answer]):
-    """A question, how its answer is read, and its default.
+    """A question to a person, with its default.
 
     Args:
         words: The question.
-        read: The answer in what was typed; refuses what is none with a sentence.
+        read: Return the answer that was typed; refuses what is none with a sentence.
         default: What Enter alone says; None where nothing may be proposed.
         why: What the files do not say, and what would say it, in a sentence; with a default beside it, that is only proposed.
         example: An answer where there is no default, to show how it is written.
@@ -40,11 +58,11 @@ class Asker(Protocol):
     """Whoever answers questions: a person at a terminal, or `Unattended`."""
 
     def ask(self, question: Question[Answer]) -> Answer:
-        """The answer."""
+        """Return the answer to a question."""
         ...
 
     def say(self, sentence: str) -> None:
-        """What was understood without asking."""
+        """Say what was understood without asking."""
         ...
 
     def settle(self) -> None:
@@ -65,7 +83,7 @@ class Unattended:
         return question.read(question.example if question.default is None else question.default)
 
     def say(self, sentence: str) -> None:
-        """Nothing."""
+        """Say nothing."""
 
     def settle(self) -> None:
         """Refuse what is not said.
@@ -76,12 +94,12 @@ class Unattended:
         self.faults.refuse()
 
 
-def text(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
+def text_question(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
     """Ask for a line of text."""
     return Question(words, lambda typed: " ".join(typed.split()), default, why, example)
 
 
-def yes_or_no(words: str, default: bool, why: str = "") -> Question[bool]:
+def yes_no_question(words: str, default: bool, why: str = "") -> Question[bool]:
     """Ask yes or no; `why` where the default is only proposed."""
 
     def read(typed: str) -> bool:
@@ -93,7 +111,7 @@ def yes_or_no(words: str, default: bool, why: str = "") -> Question[bool]:
     return Question(f"{words} (y or n)", read, "y" if default else "n", why)
 
 
-def choose(
+def choice_question(
     words: str, options: Sequence[tuple[str, Answer]], default: int | None = None, why: str = ""
 ) -> Question[Answer]:
     """Ask for one of several options, numbered from 1.
@@ -121,7 +139,7 @@ def choose(
     )
 
 
-def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
+def word_question(words: str, known: Sequence[str], default: str) -> Question[str]:
     """Ask for one of several known words."""
 
     def read(typed: str) -> str:
@@ -132,7 +150,7 @@ def one_of(words: str, known: Sequence[str], default: str) -> Question[str]:
     return Question(words, read, default)
 
 
-def unit(words: str, dimension: str, why: str, default: str | None = None) -> Question[str]:
+def unit_question(words: str, dimension: str, why: str, default: str | None = None) -> Question[str]:
     """Ask for a unit.
 
     Args:
@@ -153,7 +171,7 @@ def unit(words: str, dimension: str, why: str, default: str | None = None) -> Qu
     return Question(words, read, default, why, usual.get(dimension, "mm"))
 
 
-def quantity(
+def quantity_question(
     words: str, dimension: str, example: str, why: str = "", default: str | None = None
 ) -> Question[tuple[float, str]]:
     """Ask for a number with its unit.
@@ -184,7 +202,7 @@ def quantity(
     return Question(words, read, default, why, example)
 
 
-def number(words: str, default: str | None, why: str = "", example: str = "") -> Question[float]:
+def number_question(words: str, default: str | None, why: str = "", example: str = "") -> Question[float]:
     """Ask for a positive number."""
 
     def read(typed: str) -> float:
@@ -201,7 +219,9 @@ def number(words: str, default: str | None, why: str = "", example: str = "") ->
     return Question(words, read, default, why, example)
 
 
-def numbers(words: str, default: str, least: int = 0, exactly: int | None = None) -> Question[tuple[float, ...]]:
+def numbers_question(
+    words: str, default: str, least: int = 0, exactly: int | None = None
+) -> Question[tuple[float, ...]]:
     """Ask for numbers separated by blanks, in rising order."""
 
     def read(typed: str) -> tuple[float, ...]:
@@ -220,3 +240,66 @@ def numbers(words: str, default: str, least: int = 0, exactly: int | None = None
         return values
 
     return Question(words, read, default)
+
+
+def cable_name_question(words: str, default: str | None, why: str = "", example: str = "") -> Question[str]:
+    """Ask for the name of a cable."""
+    return Question(words, _read_name, default, why, example)
+
+
+def contact_name_question(words: str, default: str | None, taken: Collection[str]) -> Question[str]:
+    """Ask for the name of a contact.
+
+    Args:
+        words: The question.
+        default: What Enter says; not proposed where another contact is called so.
+        taken: The names of the other contacts.
+    """
+
+    def read(typed: str) -> str:
+        name = _read_name(typed)
+        if name in taken:
+            raise UsageError(f"{shown(name)} is another place already; write another one.")
+        return name
+
+    proposed = None if default in taken else default
+    return Question(words, read, proposed, "" if proposed else "two places would have the same name.", "edge")
+
+
+def coefficient_name_question(words: str, default: str, columns: Collection[str]) -> Question[str]:
+    """Ask for the name of a coefficient of friction.
+
+    Args:
+        words: The question.
+        default: What Enter says.
+        columns: Columns of wrap angles, after which the parameters of their curves are called.
+    """
+
+    def read(typed: str) -> str:
+        name = _read_name(typed)
+        _refuse_invalid(lambda: Contact.model_validate({"name": "x", "friction": name, "wrap_angle": {"column": "x"}}))
+        of_curves = {f"{column}_{ending}" for column in columns for ending in _CURVE_PARAMETERS}
+        if name in PARAMETER_NAMES or name in RESERVED_NAMES or name in of_curves or _RUN_PARAMETER.fullmatch(name):
+            raise UsageError(
+                f"{shown(name)} is what results call another number; write another name, such as {default}."
+            )
+        return name
+
+    return Question(words, read, default)
+
+
+def _read_name(typed: str) -> str:
+    """Return a name as typed, without needless blanks; refuse placeholders and invalid names."""
+    name = " ".join(typed.split())
+    if name in PLACEHOLDERS:
+        raise UsageError(f"{shown(name)} is left from the template; write {PLACEHOLDERS[name]}.")
+    _refuse_invalid(lambda: _NAME.validate_python(name))
+    return name
+
+
+def _refuse_invalid(validate: Callable[[], object]) -> None:
+    """Refuse what a description would refuse."""
+    try:
+        validate()
+    except ValidationError as error:
+        raise UsageError(f"{error.errors()[0]['msg'].removeprefix('Value error, ')}.") from None

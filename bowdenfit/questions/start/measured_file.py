@@ -1,0 +1,367 @@
+"""A measured file without a description: its columns, its kind, and the quantities that its columns are assigned to.
+
+Headings and units say most of that; `name_columns` asks for the rest.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bowdenfit.errors import DatasetError
+from bowdenfit.files import read_channels
+from bowdenfit.files.clocks import is_clock, names_time
+from bowdenfit.files.headings import heading_of, split_brackets
+from bowdenfit.files.matching import Quantity, find_candidates, plain_name
+from bowdenfit.files.spellings import parse_heading
+from bowdenfit.files.tables import read_table
+from bowdenfit.kinds import KINDS
+from bowdenfit.kinds.file_kind import FORCES, FileKind, file_kind
+from bowdenfit.kinds.fit_command import columns_of
+from bowdenfit.kinds.kind import Kind
+from bowdenfit.kinds.table_files import WantedColumn
+from bowdenfit.questions.start.question import Asker, choice_question, number_question, unit_question, yes_no_question
+from bowdenfit.units import ColumnSource, dimension_of, is_unit
+from bowdenfit.words import quoted, shown
+
+_MAX_LABEL_SHARE = (
+    0.8  # most labels per row of a column of runs or strokes; a judgement: most labels stand in several rows
+)
+
+
+@dataclass(frozen=True)
+class FileColumn:
+    """A column, or a channel of a recording.
+
+    Args:
+        name: Its heading.
+        below: The unit that stands elsewhere than in the heading; empty without one.
+        unit: Its unit; empty where the file does not say it.
+        numbers: Whether it holds numbers.
+        low, high: Lowest and highest of these.
+        values: Number of different values in it.
+        blanks: Number of blank cells.
+    """
+
+    name: str
+    below: str
+    unit: str
+    numbers: bool
+    low: float = 0.0
+    high: float = 0.0
+    values: int = 0
+    blanks: int = 0
+
+    @property
+    def dimension(self) -> str:
+        """What its unit measures; empty without one."""
+        return dimension_of(self.unit) if self.unit else ""
+
+    @property
+    def words(self) -> str:
+        """Its heading and what it holds."""
+        unit = f" {self.unit}" if self.unit else ", no unit"
+        holds = f"{self.low:.5g} to {self.high:.5g}{unit}" if self.numbers else "words"
+        return f"{shown(self.name)} ({holds})"
+
+    @property
+    def plain_name(self) -> str:
+        """Its name as tables have it, without its unit: "Sheath angle (deg)" is sheath_angle."""
+        name = split_brackets(self.name)[0]
+        name = re.sub(rf"[\s_]+{re.escape(self.unit)}$", "", name) if self.unit else name
+        return plain_name(name) or plain_name(self.name) or "column"
+
+    @property
+    def source(self) -> ColumnSource:
+        """The column as a description names it."""
+        return ColumnSource(name=self.name, unit=self.unit or None)
+
+
+@dataclass
+class MeasuredFile:
+    """A file, and what is known of it so far.
+
+    Args:
+        path: Where it is.
+        columns: Its columns or channels, without those of time.
+        kind: The kind of measurement that it holds; None where it does not say.
+        why: Why it is taken for that, as a clause.
+        likely: The kind that it may be where it does not say.
+        sources: Columns that the description must name, by quantity.
+        assigned: Headings of the columns that are known.
+        settings: What else stands beside the file in the description.
+        has_clock: Whether a recording says when its samples were taken.
+    """
+
+    path: Path
+    columns: tuple[FileColumn, ...]
+    kind: Kind[Any] | None
+    why: str
+    likely: Kind[Any] | None = None
+    sources: dict[str, ColumnSource] = field(default_factory=dict)
+    assigned: dict[str, str] = field(default_factory=dict)
+    settings: dict[str, object] = field(default_factory=dict)
+    has_clock: bool = True
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.path.name
+
+    @property
+    def unknown_columns(self) -> list[FileColumn]:
+        """Columns that are not assigned yet."""
+        return [column for column in self.columns if column.name not in self.assigned.values()]
+
+    def columns_for(self, quantity: Quantity) -> list[FileColumn]:
+        """Return the columns whose headings name a quantity; the heading of one end may identify the other."""
+        headings = [(column.name, column.below) for column in self.columns]
+        wanted = FORCES if quantity in FORCES else (quantity,)
+        matches = [
+            (self.columns[match.position], match.unit or "")
+            for match in find_candidates(headings, wanted)[quantity.name]
+        ]
+        return [column if column.unit else self.set_unit(column, unit) for column, unit in matches]
+
+    def assign(self, quantity: Quantity, column: FileColumn) -> None:
+        """Assign a column to a quantity; the description names it where its heading does not say all of it."""
+        self.assigned[quantity.name] = column.name
+        in_heading = [column.name for column in self.columns_for(quantity)] == [column.name]
+        may_have_none = quantity.dimension == "text" or (quantity.dimension == "ratio" and not column.unit)
+        if not in_heading or not (may_have_none or self._says_unit(quantity, column)):
+            self.sources[quantity.name] = column.source
+
+    def _says_unit(self, quantity: Quantity, column: FileColumn) -> bool:
+        """Return whether its unit stands where readers of tables find it."""
+        wanted = FORCES if quantity in FORCES else (quantity,)
+        (match,) = find_candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
+        return match is not None and match.unit == column.unit and bool(column.unit)
+
+    def set_unit(self, column: FileColumn, unit: str) -> FileColumn:
+        """Set the unit of a column, and return the column with it."""
+        known = replace(column, unit=unit)
+        self.columns = tuple(known if other.name == column.name else other for other in self.columns)
+        return known
+
+
+def inspect_file(path: Path) -> MeasuredFile:
+    """Inspect a file: its kind and columns.
+
+    Args:
+        path: The file.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    detected = file_kind(path)
+    if not detected.other and KINDS[detected.kind].takes_channels:
+        return inspect_recording(path, detected.why)
+    return _inspect_table(path, detected)
+
+
+def inspect_recording(path: Path, why: str) -> MeasuredFile:
+    """Inspect a recording: its channels.
+
+    Raises:
+        DatasetError: It cannot be read.
+    """
+    file = read_channels(path)
+    signals = [channel for channel in file.channels if not is_clock(channel)]
+    columns = tuple(
+        FileColumn(
+            channel.name,
+            channel.unit,
+            channel.unit or heading_of(channel.name).unit,
+            True,
+            *_range(channel.values),
+            len(channel.values),
+        )
+        for channel in signals
+    )
+    kind = next(kind for kind in KINDS.values() if kind.takes_channels)
+    return MeasuredFile(path, columns, kind, why, has_clock=any(channel.time is not None for channel in signals))
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    """Return the lowest and highest finite value; zeros where there is none."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+
+
+def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
+    """Inspect a table: its columns, and the kind that their headings and units say."""
+    table = read_table(path)
+    number_columns = {column.name: column for column in columns_of(table)}
+    columns = []
+    for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
+        if not heading or (names_time(heading) and not parse_heading(heading, below)):
+            continue
+        cells = [row[i] for row in table.rows]
+        numbers, other = number_columns.get(heading), parse_heading(heading, below)
+        unit = (other.unit if other else "") or heading_of(heading, below).unit
+        spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
+        different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
+        unit = unit if unit and is_unit(unit) else ""
+        columns.append(FileColumn(heading, below, unit, numbers is not None, *spread, different, blanks))
+    file = MeasuredFile(path, tuple(columns), None, detected.why)
+    fitting = _fitting_kinds(file)
+    matching = [kind for kind in fitting if kind.name == detected.kind] or fitting
+    file.kind = matching[0] if len(matching) == 1 and not detected.other else None
+    file.likely = matching[0] if matching else _likely_kind(file)
+    return file
+
+
+def _fitting_kinds(file: MeasuredFile) -> list[Kind[Any]]:
+    """Return the kinds whose columns a table has by its headings; of these those with most columns."""
+    fits: dict[int, list[Kind[Any]]] = {}
+    for kind in KINDS.values():
+        questions = kind.init_questions
+        if questions is None or not questions.is_guessed:
+            continue
+        if questions.by_length:
+            if (
+                _columns_of_dimension(file, "angle")
+                and _columns_of_dimension(file, "length")
+                and not _columns_of_dimension(file, "force")
+                and not _columns_of_dimension(file, "ratio")
+            ):
+                fits.setdefault(1, []).append(kind)
+            continue
+        if _has_columns(file, questions.required):
+            fits.setdefault(len(questions.required), []).append(kind)
+    return fits[max(fits)] if fits else []
+
+
+def _has_columns(file: MeasuredFile, wanted: Sequence[WantedColumn]) -> bool:
+    """Return whether headings identify every wanted column."""
+    ways = [(column.quantity, *column.also) for column in wanted]
+    return bool(wanted) and all(any(len(file.columns_for(one)) == 1 for one in way) for way in ways)
+
+
+def _columns_of_dimension(file: MeasuredFile, dimension: str) -> list[FileColumn]:
+    """Return the columns whose unit measures a dimension."""
+    return [column for column in file.columns if column.dimension == dimension]
+
+
+def _likely_kind(file: MeasuredFile) -> Kind[Any] | None:
+    """Return the kind with most required columns that the units alone allow; None without any."""
+    dimensions = [column.dimension for column in file.columns]
+    best: Mapping[int, Kind[Any]] = {}
+    for kind in KINDS.values():
+        questions = kind.init_questions
+        if questions is not None and questions.is_guessed and questions.required:
+            needed = [column.quantity.dimension for column in questions.required]
+            if all(dimensions.count(dimension) >= needed.count(dimension) for dimension in needed):
+                best = {len(needed): kind, **best}
+    return best[max(best)] if best else None
+
+
+def name_columns(file: MeasuredFile, asker: Asker) -> None:
+    """Name the columns that a file of its kind needs, and those that it may have.
+
+    Args:
+        file: The file; its columns are assigned to quantities.
+        asker: Whom to ask.
+
+    Raises:
+        DatasetError: It has no column that could be one of those needed.
+    """
+    assert file.kind is not None and file.kind.init_questions is not None  # only files whose kind is known come here
+    for wanted in file.kind.init_questions.columns:
+        quantity = next((one for one in (wanted.quantity, *wanted.also) if file.columns_for(one)), wanted.quantity)
+        options = file.columns_for(quantity)
+        if len(options) == 1:
+            column = options[0]
+        elif wanted.optional:
+            optional = _ask_optional_column(file, wanted, asker)
+            if optional is None:
+                continue
+            column = optional
+        else:
+            column = _ask_required_column(file, wanted, options, asker)
+        assign_column(file, quantity, column, asker)
+    for question in file.kind.init_questions.yes_no:
+        if question.unless not in file.assigned and asker.ask(yes_no_question(question.words.format(file.name), False)):
+            file.settings[question.key] = question.value
+
+
+def assign_column(file: MeasuredFile, quantity: Quantity, column: FileColumn, asker: Asker) -> None:
+    """Assign a column to a quantity; ask for its unit where the file does not say it."""
+    file.assign(quantity, ask_unit(file, quantity.dimension, column, asker))
+
+
+def ask_unit(file: MeasuredFile, dimension: str, column: FileColumn, asker: Asker) -> FileColumn:
+    """Return a column with its unit, asked for where the file does not say it."""
+    if column.unit or dimension == "text" or (dimension == "ratio" and column.high <= 1):
+        return column
+    what = f"the column {shown(column.name)} of {file.name}, which holds {column.low:.5g} to {column.high:.5g}"
+    example = "%" if dimension == "ratio" else "N" if dimension == "force" else "deg" if dimension == "angle" else "mm"
+    why = (
+        f"{file.name} does not say the unit of its column {shown(column.name)}; write it into the heading, such as "
+        + (f"{shown(f'{column.name} ({example})')}.")
+    )
+    dimension_in_file = "length" if dimension == "route" else dimension
+    return file.set_unit(column, asker.ask(unit_question(f"In which unit is {what}?", dimension_in_file, why)))
+
+
+def _ask_required_column(
+    file: MeasuredFile, wanted: WantedColumn, options: Sequence[FileColumn], asker: Asker
+) -> FileColumn:
+    """Return a column that must be there, asked for where headings do not identify it."""
+    dimension = wanted.quantity.dimension
+    options = options or unknown_columns_of(file, dimension)
+    if not options:
+        raise DatasetError(
+            f"{file.name} has no column that could be {wanted.words}; it has {quoted(tuple(c.name for c in file.columns))}. "
+            "Add that column, or leave the file out."
+        )
+    options_in_words = [(column.words, column) for column in options]
+    why = (
+        f"{file.name} does not say which of its columns is {wanted.words}; name that column {wanted.quantity.name}, with its "
+        "unit."
+    )
+    proposed = 1 if len(options) == 1 else None
+    return asker.ask(
+        choice_question(f"Which column of {file.name} is {wanted.words}?", options_in_words, proposed, why)
+    )
+
+
+def _ask_optional_column(file: MeasuredFile, wanted: WantedColumn, asker: Asker) -> FileColumn | None:
+    """Return a column of labels that may be there, as answered; None without one."""
+    rows = max((column.values for column in file.columns), default=0)
+    options = [
+        column
+        for column in file.unknown_columns
+        if not column.unit and 1 < column.values <= max(_MAX_LABEL_SHARE * rows, 2) and _holds_labels(column, wanted)
+    ]
+    if not options:
+        return None
+    options_in_words: list[tuple[str, FileColumn | None]] = [(column.words, column) for column in options]
+    question = f"Which column of {file.name} says {wanted.words}?"
+    return asker.ask(choice_question(question, [*options_in_words, ("none of them", None)], len(options_in_words) + 1))
+
+
+def _holds_labels(column: FileColumn, wanted: WantedColumn) -> bool:
+    """Return whether a column holds words, or whole numbers where these can be labels."""
+    low, high = wanted.numbers
+    return not column.numbers or (low <= column.low == int(column.low) and column.high <= high)
+
+
+def unknown_columns_of(file: MeasuredFile, dimension: str) -> list[FileColumn]:
+    """Return the unassigned columns of numbers whose unit measures a dimension; without any, those without a unit."""
+    numbers = [column for column in file.unknown_columns if column.numbers]
+    return [column for column in numbers if column.dimension == dimension] or [
+        column for column in numbers if not column.unit
+    ]
+
+
+def name_channels(file: MeasuredFile, asker: Asker) -> None:
+    """Name the channels that a recording needs, and its sample rate where it has no clock."""
+    name_columns(file, asker)
+    if not file.has_clock:
+        why = f"{file.name} does not say when its samples were taken; add a column of time."
+        rate = asker.ask(number_question(f"How many samples a second has {file.name}?", None, why, "1000"))
+        file.sources["time"] = ColumnSource(name=f"{rate:g} Hz")

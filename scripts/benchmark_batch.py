@@ -37,7 +37,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.acceptable_tables import why_implausible
+from bowdenfit.questions.calibrate.replicator import why_implausible
 from bowdenfit.questions.fleet.fitting import SETTINGS
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate

@@ -31,12 +31,10 @@ from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import design_of, parse_description
-from bowdenfit.questions.calibrate.findings import summarize_replications
-from bowdenfit.questions.calibrate.quantities import list_quantities
-from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, BatchFitter
-from bowdenfit.questions.calibrate.replication import RankedTruth
-from bowdenfit.questions.calibrate.truths import StatedTruth, parse_truths
-from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
+from bowdenfit.questions.calibrate.plan import StatedTruth, list_quantities, parse_truths
+from bowdenfit.questions.calibrate.rank_tests import summarize_replications
+from bowdenfit.questions.calibrate.replications import RankedTruth
+from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, BatchFitter, CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH

@@ -20,7 +20,7 @@ from snippets import FIRST, PAGES, PUBLISHED, as_shown, blocks, masked
 import bowdenfit as bf
 from bowdenfit.cli import bowdenfit as program
 from bowdenfit.kinds.descriptions import parse_description
-from bowdenfit.questions.calibrate.truths import read_truths
+from bowdenfit.questions.calibrate.plan import read_truths
 from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.questions.metabolic.study import read_study
 from bowdenfit.reading import Reading

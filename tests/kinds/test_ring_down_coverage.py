@@ -14,7 +14,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.calibrate.refit import RANK_SETTINGS
+from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS
 
 pytestmark = pytest.mark.extended
 

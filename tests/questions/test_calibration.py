@@ -33,18 +33,12 @@ from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
-from bowdenfit.questions.calibrate.acceptable_tables import why_implausible
 from bowdenfit.questions.calibrate.answer import Calibration, QuantityLabel
-from bowdenfit.questions.calibrate.figures import draw_calibration
-from bowdenfit.questions.calibrate.findings import summarize_replications
-from bowdenfit.questions.calibrate.pieces import CalibrationJob, run_piece, split_into_pieces
-from bowdenfit.questions.calibrate.refit import BatchFitter
-from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
-from bowdenfit.questions.calibrate.sections import calibration_page
-from bowdenfit.questions.calibrate.store import append_replication, open_replications
-from bowdenfit.questions.calibrate.uniformity import UniformRanks
-from bowdenfit.questions.calibrate.words import calibration_text, details_text
-from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
+from bowdenfit.questions.calibrate.calibration import CalibrationJob, run_piece, split_into_pieces
+from bowdenfit.questions.calibrate.rank_tests import UniformRanks, summarize_replications
+from bowdenfit.questions.calibrate.replications import RankedTruth, Replication, append_replication, open_replications
+from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator, why_implausible
+from bowdenfit.questions.calibrate.words import calibration_page, calibration_text, details_text, draw_calibration
 from bowdenfit.questions.simulate.simulation import empty_tables, replace_readings, resimulate
 from bowdenfit.questions.writing import write_page
 from bowdenfit.recordings.recording import Recordings
@@ -506,7 +500,7 @@ def test_an_interrupted_calibration_says_how_to_go_on(run, tmp_path, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bowdenfit.questions.calibrate.workbench.Replicator.replicate", interrupted)
+    monkeypatch.setattr("bowdenfit.questions.calibrate.replicator.Replicator.replicate", interrupted)
     code, _, err = run("calibrate", ROOT / "datasets" / "yarn-on-cylinder", "-o", tmp_path / "c")
     assert code == 130
     assert "run the same command with --resume" in err

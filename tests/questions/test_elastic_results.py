@@ -23,7 +23,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import replace_data
+from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, replace_readings
 from bowdenfit.questions.simulate.tables import read_bench

@@ -14,8 +14,8 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.questions.calibrate.answer import QuantityLabel
-from bowdenfit.questions.calibrate.findings import summarize_replications
-from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
+from bowdenfit.questions.calibrate.rank_tests import summarize_replications
+from bowdenfit.questions.calibrate.replications import RankedTruth, Replication
 from bowdenfit.questions.check import prior_figure
 from bowdenfit.questions.check.prior_predictive import prior_predictive
 from bowdenfit.questions.compare.answer import ComparedParameter, Comparison

@@ -8,15 +8,13 @@ from conftest import ROOT
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate import power
+from bowdenfit.questions.calibrate import rank_tests
 from bowdenfit.questions.calibrate.answer import QuantityLabel
-from bowdenfit.questions.calibrate.findings import summarize_replications
-from bowdenfit.questions.calibrate.power import estimate_power
-from bowdenfit.questions.calibrate.refit import BatchFitter
-from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
-from bowdenfit.questions.calibrate.truths import StatedTruth, parse_truths, read_truths
+from bowdenfit.questions.calibrate.plan import StatedTruth, parse_truths, read_truths
+from bowdenfit.questions.calibrate.rank_tests import estimate_power, summarize_replications
+from bowdenfit.questions.calibrate.replications import RankedTruth, Replication
+from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator
 from bowdenfit.questions.calibrate.words import calibration_text
-from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 pytestmark = pytest.mark.extended
@@ -144,7 +142,7 @@ def test_power_grows_with_the_number_of_replications_and_with_what_is_wrong():
 
 def test_right_intervals_are_caught_no_more_often_than_the_level(monkeypatch):
     """In 500 simulated calibrations at 0.01: 17 or fewer, but once in a thousand seeds; the seed is fixed."""
-    monkeypatch.setattr(power, "TOO_SMALL", (0.0,))
+    monkeypatch.setattr(rank_tests, "TOO_SMALL", (0.0,))
     (right,) = estimate_power(200, 0.01, {}, by_ranks=True)
     assert 0 < right.caught < 0.034
 

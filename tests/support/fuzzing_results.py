@@ -22,8 +22,13 @@ from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.engines import versions
 from bowdenfit.inference.ensemble import CheckpointedBackend
-from bowdenfit.questions.calibrate.replication import RankedTruth, Replication
-from bowdenfit.questions.calibrate.store import append_replication, open_replications, read_seed
+from bowdenfit.questions.calibrate.replications import (
+    RankedTruth,
+    Replication,
+    append_replication,
+    open_replications,
+    read_seed,
+)
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.results import folder as names
 from bowdenfit.results.answer_cache import file_checksum, read_answers
@@ -170,7 +175,7 @@ def begun_calibration(place: Path) -> Path:
 
 def resume_calibration(folder: Path) -> None:
     """What `calibrate --resume` reads, and makes of it."""
-    from bowdenfit.questions.calibrate.findings import summarize_replications
+    from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 
     read_seed(folder)
     found = open_replications(folder, FINGERPRINT, resume=True, force=False)

@@ -10,8 +10,8 @@ import bowdenfit as bf
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.calibrate.refit import BatchFitter as Fits
-from bowdenfit.questions.calibrate.refit import replace_data
+from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
+from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.results.along_route import make_optimizer
 
 HELD = 0.9

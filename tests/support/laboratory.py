@@ -19,8 +19,8 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import BatchFitter as Fits
-from bowdenfit.questions.calibrate.workbench import CalibrationPlan, Replicator
+from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
+from bowdenfit.questions.calibrate.replicator import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.simulation import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)

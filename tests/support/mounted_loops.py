@@ -7,7 +7,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import build_model
-from bowdenfit.questions.calibrate.refit import RANK_SETTINGS, replace_data
+from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, replace_data
 from bowdenfit.results.record import Draws, Provenance, Record
 
 MOUNTINGS, LOADS = 6, np.array([2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 120.0, 160.0])  # N

@@ -1,4 +1,4 @@
-"""What many replications say: which intervals hold the truth as often as they claim, and which way others are wrong."""
+"""The answer of a calibration: which intervals hold the truth as often as they claim, and which way others are wrong."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -6,19 +6,18 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.questions.calibrate.power import Power
 from bowdenfit.words import percent
 
-LEVEL = 0.01  # at which a quantity is rejected, corrected for the number of quantities
+LEVEL = 0.01  # at which a quantity is rejected, Holm-corrected: 1 calibration in 100 of a right tool fails by chance
 INTERVALS = (0.5, 0.9)
-MAX_UNCONVERGED = 0.1  # of all replications, beyond which the rest says little
-MIN_REPLICATIONS = 20  # replications to judge by
-_BIAS_ERRORS = 3.0  # standard errors beyond which a bias is named
+MAX_UNCONVERGED = 0.1  # share of all replications, beyond which the others say little; a judgement
+MIN_REPLICATIONS = 20  # to judge by; a judgement, see `Power` for what so few can see
+_BIAS_ERRORS = 3.0  # standard errors beyond which a bias is named: 1 unbiased quantity in 370
 
 
 @dataclass(frozen=True)
 class QuantityLabel:
-    """What may be ranked.
+    """A quantity that may be ranked.
 
     Args:
         symbol: Its symbol in figures.
@@ -33,7 +32,7 @@ class QuantityLabel:
 
 @dataclass(frozen=True)
 class Coverage:
-    """How often intervals held the truth.
+    """Share of intervals that held the truth.
 
     Args:
         probability: What they claim.
@@ -113,9 +112,22 @@ class CheckedQuantity:
         return " and ".join(faults) or "ranks are not uniform"
 
 
+@dataclass(frozen=True)
+class Power:
+    """How often a calibration rejects one quantity whose intervals are too narrow, all others being right.
+
+    Args:
+        too_small: Share by which its posterior standard deviation is too small.
+        caught: Probability, to 0.02 or so.
+    """
+
+    too_small: float
+    caught: float
+
+
 @dataclass(frozen=True, repr=False)
 class Calibration(Display):
-    """What a calibration found.
+    """Result of a calibration.
 
     Args:
         name: Name of the cable.

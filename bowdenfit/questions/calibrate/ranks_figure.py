@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.plots.layout import LEFT, RIGHT, TITLE, drop_unused, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import label_outer
 from bowdenfit.plots.style import BLUE, GRAY, LIGHT, TITLE_SIZE, VERMILLION, WIDE, in_paper_style
-from bowdenfit.questions.calibrate.uniformity import UniformRanks
+from bowdenfit.questions.calibrate.rank_tests import UniformRanks
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:

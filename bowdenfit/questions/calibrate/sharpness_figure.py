@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
-from bowdenfit.questions.calibrate.quantity_rows import quantity_panels
+from bowdenfit.questions.calibrate.coverage_figure import quantity_panels
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:

@@ -1,8 +1,6 @@
-"""Many replications of one data set, each kept as soon as it is done, and what they say together."""
+"""Asking whether the intervals of a description hold the truth as often as they say."""
 
-import json
 import secrets
-import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -11,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, HIDDEN, LARGEST_SEED, PATH, TEXTS, Output, Seed, read_first, whole_number
+from bowdenfit.errors import UsageError
 from bowdenfit.inference.resources import refuse_low_memory
+from bowdenfit.questions import calibrate as room
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
 from bowdenfit.verb import Reply, Verb, Watch, show_progress_bar
@@ -19,8 +19,6 @@ from bowdenfit.verb import Reply, Verb, Watch, show_progress_bar
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.questions.calibrate.answer import Calibration
-    from bowdenfit.questions.calibrate.replication import Replication
-    from bowdenfit.questions.calibrate.workbench import CalibrationPlan
 
 NOT_CALIBRATED = 3
 Report = Callable[[int, int], None]
@@ -72,156 +70,40 @@ def calibrate(
         BowdenfitError: What is wrong, in a sentence; a data set that cannot be replicated is refused.
     """
     refuse_low_memory()
-    folder = _folder(output, resume)
-    plan = _plan(_stated_and_assumed(dataset, reading, assume), _seed(folder, seed, resume), truth)
-
-    import bowdenfit.questions.calibrate.words  # noqa: F401  (what the answer says of itself)
-    from bowdenfit.questions.calibrate.findings import summarize_replications
-    from bowdenfit.questions.calibrate.store import open_replications
-    from bowdenfit.results.folder import reserve_folder
-
-    quantities = _list_quantities(plan)
-    with reserve_folder(folder):
-        done = {} if folder is None else open_replications(folder, _fingerprint(plan, assume), resume, force)
+    if resume and output is None:
+        raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
+    folder = Path(output) if output is not None else None
+    stated, assumed = _read_stated_and_assumed(dataset, reading, assume)
+    if seed is None:
+        seed = room.read_seed(folder) if folder is not None and resume else secrets.randbelow(LARGEST_SEED)
+    plan = room.make_plan(stated, assumed, seed, truth)
+    quantities = room.list_quantities(plan)
+    with room.open_calibration(folder, plan, assume, resume, force) as done:
         with show_progress_bar(WATCH, progress) as show:
-            _replicate(engine, workers, plan, done, replications, folder, show)
-        calibration = summarize_replications(tuple(done.values()), quantities, assumed=tuple(assume), **_labels(plan))
-        _write(calibration, folder)
+            room.replicate_missing(plan, done, replications, engine, workers, folder, show)
+        calibration = room.summarize_calibration(plan, done.values(), quantities, assume)
+        if folder is not None:
+            room.write_calibration(calibration, folder)
     return calibration
 
 
-def _list_quantities(plan: "CalibrationPlan") -> Any:
-    import jax
-
-    from bowdenfit.questions.calibrate.quantities import list_quantities
-
-    with jax.enable_x64(True):
-        return list_quantities(plan)
-
-
-def _labels(plan: "CalibrationPlan") -> dict[str, Any]:
-    """What the answer says of a plan."""
-    truths = tuple(truth.text for truth in plan.truths)
-    return {"name": plan.stated.description.name, "seed": plan.seed, "truths": truths}
-
-
-def _folder(output: str | Path | None, resume: bool) -> Path | None:
-    from bowdenfit.errors import UsageError
-
-    if resume and output is None:
-        raise UsageError("--resume needs the results folder of a calibration; name it with --output.")
-    return Path(output) if output is not None else None
-
-
-def _plan(sets: "tuple[Dataset, Dataset]", seed: int, truth: str | Path | None) -> "CalibrationPlan":
-    """What is replicated, with the truths of a file."""
-    import jax
-
-    from bowdenfit.model import build_model
-    from bowdenfit.questions.calibrate.truths import parse_truths, read_truths
-    from bowdenfit.questions.calibrate.workbench import CalibrationPlan
-
-    if truth is None:
-        return CalibrationPlan(*sets, seed)
-    page = read_truths(Path(truth))
-    with jax.enable_x64(True):
-        return CalibrationPlan(*sets, seed, parse_truths(page, build_model(sets[0]).space, str(truth)))
-
-
-def _stated_and_assumed(
+def _read_stated_and_assumed(
     dataset: "str | Path | Dataset", reading: Reading, assume: Sequence[str]
 ) -> "tuple[Dataset, Dataset]":
     """The data set as it is described, which is simulated, and as the fits take it to be."""
-    from bowdenfit.dataset import Dataset
-    from bowdenfit.errors import UsageError
-
     stated = read(dataset, **reading)
     if not assume:
         return stated, stated
-    if isinstance(dataset, Dataset):
+    if not isinstance(dataset, str | Path):
         raise UsageError("settings can be assumed of a data set in a folder only; name the folder.")
     changes: Reading = {**reading, "settings": [*reading.get("settings", ()), *assume]}
     return stated, read(dataset, **changes)
 
 
-def _replicate(
-    engine: "str | Executor",
-    workers: int | None,
-    plan: "CalibrationPlan",
-    done: "dict[int, Replication]",
-    replications: int,
-    folder: Path | None,
-    progress: Report | None,
-) -> None:
-    """Do what is not done yet, and keep each as it ends."""
-    from bowdenfit.inference.engines import JOBS_FOLDER, open_engine
-    from bowdenfit.questions.calibrate.pieces import CalibrationJob, run_piece, split_into_pieces
-    from bowdenfit.questions.calibrate.store import append_replication
-
-    job = CalibrationJob(plan, (workers or 0) if engine == "local" else 0)
-    missing = [number for number in range(replications) if number not in done]
-    with open_engine(engine, workers, folder and folder / JOBS_FOLDER) as opened:
-        for piece in opened.results(run_piece, split_into_pieces(job, missing, opened.workers)):
-            for replication in piece:
-                done[replication.number] = replication
-                if folder is not None:
-                    append_replication(folder, replication)
-                if progress is not None:
-                    progress(len(done), max(replications, len(done)))
-    if folder is not None:
-        shutil.rmtree(folder / JOBS_FOLDER, ignore_errors=True)
-
-
-def _seed(folder: Path | None, seed: int | None, resume: bool) -> int:
-    """The seed: as stated, else that of the calibration to go on with, else a new one."""
-    if seed is not None:
-        return seed
-    if folder is None or not resume:
-        return secrets.randbelow(LARGEST_SEED)
-    from bowdenfit.questions.calibrate.store import read_seed
-
-    return read_seed(folder)
-
-
-def _fingerprint(plan: "CalibrationPlan", assumptions: Sequence[str]) -> dict[str, Any]:
-    """What must not change between an interrupted calibration and its continuation."""
-    page = {
-        "description": plan.stated.description.to_json(),
-        "sha256": plan.stated.sha256,
-        "seed": plan.seed,
-        "assumed": list(assumptions),
-        "truths": {truth.parameter.name: [truth.low, truth.high] for truth in plan.truths},
-    }
-    return dict(json.loads(json.dumps(page)))
-
-
-def _write(calibration: "Calibration", folder: Path | None) -> None:
-    """Summary, details, figures, report, and calibration.json last; nothing without a folder."""
-    if folder is None:
-        return
-    from bowdenfit.questions.calibrate.figures import draw_calibration
-    from bowdenfit.questions.calibrate.sections import calibration_page
-    from bowdenfit.questions.calibrate.store import CALIBRATION
-    from bowdenfit.questions.calibrate.words import calibration_text, details_text
-    from bowdenfit.questions.writing import write_page
-    from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, write_text
-    from bowdenfit.results.serialization import plain_data
-
-    with folder_to_write(folder):
-        (folder / CALIBRATION).unlink(missing_ok=True)  # of fewer replications
-        write_text(folder / SUMMARY_TEXT, calibration_text(calibration))
-        write_text(folder / DETAILS_TEXT, details_text(calibration))
-        draw_calibration(calibration, folder / FIGURES)
-        write_page(calibration_page(calibration), folder / FIGURES, folder / REPORT)
-        write_text(folder / CALIBRATION, json.dumps(plain_data(calibration), indent=1, allow_nan=False) + "\n")
-
-
 def _reply(calibration: "Calibration", options: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.calibrate.words import calibration_text
-
     exit_code = 0 if calibration.is_calibrated else NOT_CALIBRATED
     return Reply(
-        calibration_text(calibration),
+        room.calibration_text(calibration),
         lambda: calibration,
         (f"Wrote {options['output']}.",),
         exit_code,

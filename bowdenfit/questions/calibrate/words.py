@@ -1,19 +1,24 @@
-"""What `bowdenfit calibrate` prints."""
+"""A calibration for people: as text, as a page, and the figures that go with it."""
 
 import math
+from pathlib import Path
 
 from bowdenfit.display import text_of
+from bowdenfit.pages.section import HtmlPage, PageTable, Picture, make_meanings_table, prose_section
+from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
 from bowdenfit.questions.calibrate.answer import LEVEL, MAX_UNCONVERGED, MIN_REPLICATIONS, Calibration, CheckedQuantity
+from bowdenfit.questions.figure_files import AnswerFigure, write_figure
 from bowdenfit.words import counted, filled, legend, listed, percent, significant, table
 
 HEADS = ("quantity", "50 % held", "90 % held", "bias", "")
 EVIDENCE_HEADS = ("quantity", "p of ranks", "corrected", "shrinkage")
-_MAX_NAMED = 8  # unconverged replications that are named
+FOLDED = ("ranks", "sharpness")  # figures for statisticians
+_MAX_NAMED = 8  # unconverged replications that are named; a judgement
 
 
 @text_of.register(Calibration)
 def calibration_text(calibration: Calibration) -> str:
-    """A calibration for people: the verdict, a table of all quantities, and what was left out."""
+    """Return a calibration for people: the verdict, a table of all quantities, and what was left out."""
     blocks = [
         "\n".join(filled(line) for line in verdict_sentences(calibration)),
         filled(describe_procedure(calibration)),
@@ -27,15 +32,68 @@ def calibration_text(calibration: Calibration) -> str:
 
 
 def details_text(calibration: Calibration) -> str:
-    """All of a calibration (`details.txt`): what is printed, then what the verdict on each quantity rests on."""
+    """Return all of a calibration (`details.txt`): what is printed, then what the verdict on each quantity rests on."""
     if not calibration.quantities:
         return calibration_text(calibration)
     evidence = f"{table(EVIDENCE_HEADS, evidence_rows(calibration))}\n\n{filled(evidence_note(calibration))}"
     return f"{calibration_text(calibration)}\n{evidence}\n"
 
 
+def calibration_page(calibration: Calibration) -> HtmlPage:
+    """Return a calibration as a page: whether intervals keep their word, quantity by quantity, and what was left out.
+
+    Args:
+        calibration: The calibration.
+    """
+    first, *others = verdict_sentences(calibration)
+    table = [PageTable(HEADS, tuple(quantity_rows(calibration)))] if calibration.quantities else []
+    evidence = PageTable(EVIDENCE_HEADS, tuple(evidence_rows(calibration)), evidence_note(calibration))
+    names = make_meanings_table({quantity.name: quantity.meaning for quantity in calibration.quantities})
+    sections = (
+        prose_section("The answer", [*others, describe_procedure(calibration)], headline=first),
+        prose_section(
+            "Quantity by quantity", [quantity_note(calibration)] if table else [], table,
+            folded=[("What the names stand for", names), ("What the verdict on each rests on", evidence)],
+            pictures=_pictures(calibration),
+        ),
+        prose_section("What was left out", omission_sentences(calibration)),
+    )  # fmt: skip
+    return HtmlPage(calibration.name, "Calibration by bowdenfit", sections)
+
+
+def _pictures(calibration: Calibration) -> tuple[Picture, ...]:
+    """Return the figures with their captions, those for statisticians folded."""
+    figures = select_figures(calibration).items()
+    return tuple(
+        Picture(name, figure.HEADING, figure.caption(calibration), folded=name in FOLDED) for name, figure in figures
+    )
+
+
+def select_figures(calibration: Calibration) -> dict[str, AnswerFigure]:
+    """Return the figures that a calibration has something to show in, by their names, in the order in which they are read."""
+    if not calibration.quantities:
+        return {}
+    always: dict[str, AnswerFigure] = {"coverage": coverage_figure}
+    if calibration.truths:  # ranks need not be uniform then, and there is no prior variance to compare with
+        return always
+    return always | {"ranks": ranks_figure, "sharpness": sharpness_figure}
+
+
+def draw_calibration(calibration: Calibration, folder: Path) -> list[Path]:
+    """Draw and write all figures of a calibration, and what each shows in words.
+
+    Args:
+        calibration: The calibration.
+        folder: Where the files go; made if it is missing.
+    """
+    figures = select_figures(calibration).items()
+    return [
+        path for name, figure in figures for path in write_figure(figure, calibration, folder, name, calibration.name)
+    ]
+
+
 def describe_procedure(calibration: Calibration) -> str:
-    """What was done."""
+    """Say what was done."""
     stated = (
         f"were stated ({listed(calibration.truths)}), the others drawn from the priors" if calibration.truths else ""
     )
@@ -50,7 +108,7 @@ def describe_procedure(calibration: Calibration) -> str:
 
 
 def verdict_sentences(calibration: Calibration) -> list[str]:
-    """Whether intervals hold the truth as often as they claim, and which do not."""
+    """Say whether intervals hold the truth as often as they claim, and which do not."""
     if not calibration.is_conclusive:
         few = f"at least {MIN_REPLICATIONS} replications must converge, and at most {percent(MAX_UNCONVERGED, 0)} may fail to"
         return [f"NOT JUDGED: {calibration.ranked} of {calibration.replications} replications converged; {few}."]
@@ -78,12 +136,12 @@ def _power_sentence(calibration: Calibration) -> str:
 
 
 def quantity_rows(calibration: Calibration) -> list[tuple[str, ...]]:
-    """Every quantity, under `HEADS`."""
+    """Return a row for every quantity, under `HEADS`."""
     return [_quantity_row(q) for q in calibration.quantities]
 
 
 def quantity_note(calibration: Calibration) -> str:
-    """What stands under `HEADS`."""
+    """Return what stands under the table of `HEADS`."""
     first = calibration.quantities[0].coverage
     bands = listed(
         [f"{percent(c.low, 0)} and {percent(c.high, 0)} of the {percent(c.probability, 0)} intervals" for c in first]
@@ -101,7 +159,7 @@ def quantity_note(calibration: Calibration) -> str:
 
 
 def evidence_rows(calibration: Calibration) -> list[tuple[str, ...]]:
-    """Every quantity, under `EVIDENCE_HEADS`."""
+    """Return a row for every quantity, under `EVIDENCE_HEADS`."""
     return [
         (
             q.name, f"{q.p_value:.3f}", f"{q.corrected:.3f}" if q.judged_by else "",
@@ -112,7 +170,7 @@ def evidence_rows(calibration: Calibration) -> list[tuple[str, ...]]:
 
 
 def evidence_note(calibration: Calibration) -> str:
-    """What stands under `EVIDENCE_HEADS`."""
+    """Return what stands under the table of `EVIDENCE_HEADS`."""
     criterion = (
         "not judged, because truths are not of the prior" if calibration.truths else f"below {LEVEL} counts as wrong"
     )
@@ -132,7 +190,7 @@ def _quantity_row(q: CheckedQuantity) -> tuple[str, ...]:
 
 
 def _describe_with_unconverged(calibration: Calibration) -> str:
-    """What would be said if those that did not converge were ranked too."""
+    """Say what would be wrong if replications that did not converge were ranked too."""
     if calibration.faults_with_all == calibration.faults:
         return "Ranked as far as they came, they would change nothing."
     wrong = [f"{name} ({fault})" for name, fault in calibration.faults_with_all.items()]
@@ -141,7 +199,7 @@ def _describe_with_unconverged(calibration: Calibration) -> str:
 
 
 def _describe_unconverged(numbers: list[int]) -> str:
-    """Which replications are not ranked, up to the reason of the first."""
+    """Say which replications are not ranked, up to the reason of the first."""
     if len(numbers) == 1:
         return f"1 replication did not converge and is not ranked, number {numbers[0]}"
     named = ", ".join(str(n) for n in numbers[:_MAX_NAMED]) + (" ..." if len(numbers) > _MAX_NAMED else "")
@@ -149,7 +207,7 @@ def _describe_unconverged(numbers: list[int]) -> str:
 
 
 def omission_sentences(calibration: Calibration) -> list[str]:
-    """How long it took, what was left out, and why."""
+    """Say how long it took, what was left out, and why."""
     lines = [f"A replication took {significant(calibration.seconds, 2)} s (median)."]
     if calibration.engines:
         words = {

@@ -1,14 +1,16 @@
-"""The results folder of a calibration: one line a replication, written as it ends, so that nothing is lost."""
+"""Replications and their file: one line a replication, written as it ends, so that nothing is lost."""
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import damage_as
-from bowdenfit.questions.calibrate.replication import Replication
 from bowdenfit.results.folder import (
     DETAILS_TEXT,
     FIGURES,
@@ -32,14 +34,60 @@ _FINGERPRINT_WORDS = {
     "sha256": "an input file",
     "seed": "the seed",
     "assumed": "what is assumed",
+    "truths": "what is stated of the truth",
 }
-_FINGERPRINT_WORDS |= {"truths": "what is stated of the truth"}
+
+
+@dataclass(frozen=True)
+class RankedTruth:
+    """Truth and posterior of one quantity; of a parameter in z, where its prior is a standard normal.
+
+    Args:
+        truth: What the readings were simulated with.
+        mean: Posterior mean.
+        sd: Posterior standard deviation.
+        rank: Share of the posterior below the truth; uniform between 0 and 1 if all is right.
+    """
+
+    truth: float
+    mean: float
+    sd: float
+    rank: float
+
+
+@dataclass(frozen=True)
+class Replication:
+    """What came of one replication.
+
+    Args:
+        number: Its number.
+        redrawn: Why tables were drawn again, with how many were.
+        reasons: Why its draws should not be trusted; empty if they may.
+        ranked: By quantity; empty where the fit failed.
+        seconds: What it took, of those that were fitted together on average.
+        steps: Steps of each walker.
+        engine: What fitted it: weighted draws ("laplace"), "ensembles" or "nuts".
+    """
+
+    number: int
+    redrawn: dict[str, int]
+    reasons: tuple[str, ...]
+    ranked: dict[str, RankedTruth]
+    seconds: float
+    steps: int = 0
+    engine: str = ""
+
+
+def rank_truth(truth: float, draws: np.ndarray, tie: float = 0.0) -> RankedTruth:
+    """Rank the truth among the draws; of draws equal to it the share `tie` counts as below."""
+    rank = float(np.mean(draws < truth) + tie * np.mean(draws == truth))
+    return RankedTruth(truth, float(np.mean(draws)), float(np.std(draws)), rank)
 
 
 def open_replications(
     folder: Path, fingerprint: Mapping[str, Any], resume: bool, force: bool
 ) -> dict[int, Replication]:
-    """The replications that a folder holds already, in a folder that is ready for more.
+    """Read the replications that a folder holds already, and make it ready for more.
 
     Args:
         folder: The results folder.
@@ -80,7 +128,7 @@ def _is_unused(folder: Path) -> bool:
 
 
 def read_seed(folder: Path) -> int:
-    """The seed of the calibration in a folder.
+    """Read the seed of the calibration in a folder.
 
     Raises:
         StoreError: There is none.
@@ -91,6 +139,12 @@ def read_seed(folder: Path) -> int:
         return int(seed)
     except (KeyError, TypeError, ValueError):
         raise _damaged_error(folder / REPLICATIONS) from None
+
+
+def append_replication(folder: Path, replication: Replication) -> None:
+    """Add a finished replication to the file of a folder."""
+    with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(serialize(replication)) + "\n")
 
 
 def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, Replication]:
@@ -142,9 +196,3 @@ def _read_lines(path: Path) -> list[dict[str, Any]]:
 
 def _damaged_error(path: Path) -> StoreError:
     return StoreError(f"{path} is damaged and cannot be resumed; start over with --force.")
-
-
-def append_replication(folder: Path, replication: Replication) -> None:
-    """Add a finished replication."""
-    with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(serialize(replication)) + "\n")

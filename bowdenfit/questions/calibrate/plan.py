@@ -1,4 +1,4 @@
-"""True values that are stated instead of drawn from the priors: a file of values and ranges.
+"""What is calibrated: data set, quantities, and true values that a file states in place of the priors.
 
     mu1 = 0.1
     tau = [0.002, 0.3]
@@ -16,15 +16,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
+from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError, UsageError, suggest_name
 from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.inputs import read_toml_file
+from bowdenfit.kinds import each_table
+from bowdenfit.kinds.terms import measured_kinds
+from bowdenfit.model import build_model
 from bowdenfit.parameters.space import Parameter, ParameterSpace
+from bowdenfit.questions.calibrate.answer import QuantityLabel
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 from bowdenfit.words import shown
 
-_UNBOUNDED = 1e60  # beyond which a range has no end: half-Cauchy priors stay at 1e88 of their scale
+_UNBOUNDED = (
+    1e60  # a range that reaches beyond has no end: the largest quantile of a half-Cauchy prior is 1e88 of its scale
+)
 
 
 @dataclass(frozen=True)
@@ -44,7 +53,7 @@ class StatedTruth:
 
     @property
     def text(self) -> str:
-        """As people read it."""
+        """The truth as people read it."""
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
         if self.low == self.high:
             return f"{self.parameter.name} {self.low:g}{unit}"
@@ -52,7 +61,7 @@ class StatedTruth:
         return f"{self.parameter.name} {way} from {self.low:g} to {self.high:g}{unit}"
 
     def draw_z(self, generator: np.random.Generator) -> float:
-        """A true value, where the parameter's prior is a standard normal."""
+        """Draw a true value, where the parameter's prior is a standard normal."""
         share = generator.uniform()
         value = self.low + share * (self.high - self.low)
         if self.log_uniform:
@@ -60,8 +69,78 @@ class StatedTruth:
         return z_at(self.parameter.prior, value / self.parameter.shown_scale)
 
 
+@dataclass(frozen=True)
+class CalibrationPlan:
+    """What is replicated.
+
+    Args:
+        stated: The data set whose description and design are replicated; its readings give way to simulated ones.
+        assumed: The data set with the description that is fitted; the same for a calibration proper.
+        seed: Seed; replication i is the same whatever else is run.
+        truths: True values that do not come from the priors.
+    """
+
+    stated: Dataset
+    assumed: Dataset
+    seed: int
+    truths: tuple[StatedTruth, ...] = ()
+
+
+def make_plan(stated: Dataset, assumed: Dataset, seed: int, truth: str | Path | None) -> CalibrationPlan:
+    """Return what is replicated, with the truths of a file.
+
+    Args:
+        stated: The data set as it is described, which is simulated.
+        assumed: The data set as the fits take it to be.
+        seed: Seed of the replications.
+        truth: File of true values; None if all come from the priors.
+
+    Raises:
+        UsageError: The file states no true value that this cable can have.
+    """
+    if truth is None:
+        return CalibrationPlan(stated, assumed, seed)
+    page = read_truths(Path(truth))
+    with jax.enable_x64(True):
+        return CalibrationPlan(stated, assumed, seed, parse_truths(page, build_model(stated).space, str(truth)))
+
+
+def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
+    """Return what will be ranked, once it is clear that the data set can be replicated.
+
+    Args:
+        plan: What is replicated.
+
+    Raises:
+        DescriptionError, DatasetError, UsageError: It cannot; says why.
+    """
+    stated, assumed = plan.stated.description, plan.assumed.description
+    for kind, table in measured_kinds(plan.stated.measurements):
+        kind.check_drawable(stated, table)
+    if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
+        raise DescriptionError(
+            "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "
+            "only how it is modeled."
+        )
+    with jax.enable_x64(True):
+        space = build_model(plan.assumed).space
+    if not space.size:
+        raise UsageError(
+            "every parameter of the description is fixed, so there is nothing to calibrate; leave one free."
+        )
+    quantities = {p.name: QuantityLabel(p.symbol, p.role == "friction", p.meaning) for p in space.free}
+    return quantities | {
+        OPTIMAL_LENGTH: QuantityLabel(r"$l^*$", meaning="best length"),
+        OPTIMAL_EFFICIENCY: QuantityLabel(r"$\eta^*$", meaning="efficiency at the best length"),
+    }
+
+
+def _kinds(dataset: Dataset) -> list[str]:
+    return [kind.name for kind, _ in each_table(dataset.measurements)]
+
+
 def read_truths(path: Path) -> dict[str, Any]:
-    """Values and ranges by name, as a TOML file has them.
+    """Read values and ranges by name, as a TOML file has them.
 
     Raises:
         UsageError: There is no such file, or it is none.
@@ -76,7 +155,7 @@ def read_truths(path: Path) -> dict[str, Any]:
 
 
 def parse_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> tuple[StatedTruth, ...]:
-    """What a file says of the parameters of a model.
+    """Return what a file says of the parameters of a model.
 
     Args:
         page: Its values and ranges by name.

@@ -44,8 +44,7 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import Model, build_model
-from bowdenfit.questions.next.simulated_readings import simulate_readings
-from bowdenfit.questions.next.variance_reduction import explained_share
+from bowdenfit.questions.next.variance_reduction import explained_share, simulate_readings
 from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
 from bowdenfit.results.along_route import make_optimizer
 

@@ -15,7 +15,7 @@ from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
-from bowdenfit.questions.next.target import choose_target
+from bowdenfit.questions.next.answer import choose_target
 from bowdenfit.questions.simulate.simulation import draw_true_values
 from bowdenfit.questions.summary import coefficients_figure, pairs_figure
 

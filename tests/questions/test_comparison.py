@@ -27,10 +27,9 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison
-from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, find_common_readings
-from bowdenfit.questions.compare.sections import comparison_page
+from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, match_events
 from bowdenfit.questions.compare.verb import VERB
-from bowdenfit.questions.compare.words import comparison_text
+from bowdenfit.questions.compare.words import comparison_page, comparison_text
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, NOT_DESCRIBED
 from bowdenfit.questions.writing import write_answer
 
@@ -421,7 +420,7 @@ def test_fits_of_other_files_or_with_nothing_in_common_are_refused(geometries, b
     with pytest.raises(UsageError, match="not fitted to the same readings"):
         bf.compare({"a": fit, "b": strange})
     nothing = CommonReadings((), {}, (OmittedReadings("wrap_angle", 0, 26, "they are taken differently"),))
-    monkeypatch.setattr("bowdenfit.questions.compare.answer.find_common_readings", lambda *_: nothing)
+    monkeypatch.setattr("bowdenfit.questions.compare.common_readings.match_events", lambda *_: nothing)
     with pytest.raises(
         UsageError, match=r"no reading in common .* left out of the comparison: they are taken differently"
     ):
@@ -432,7 +431,7 @@ def test_whole_recordings_and_runs_are_not_the_same_readings(on_body, by_run_eff
     folder = on_body.parent / "synthetic-recordings"
     data = {name: bf.read(folder, settings=(f"tables.recordings.likelihood={name}",)) for name in ("runs", "whole")}
     fits = {name: replace(by_run_effect["with"], dataset=dataset) for name, dataset in data.items()}
-    common = find_common_readings(fits, {name: {} for name in fits})
+    common = match_events(fits, {name: {} for name in fits})
     assert {table for table, _ in common.readings} == {"wrap_angle"}
     (omitted,) = common.omitted
     assert omitted.sentence().startswith("All readings of recorded efficiency are left out of the comparison")

@@ -6,8 +6,7 @@ from hand_bench import pull, write
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.next.candidate_names import parse_candidates
-from bowdenfit.questions.next.candidates import describe_candidate, format_candidate
+from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, parse_candidates
 from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import next_measurement_text
 

@@ -30,11 +30,14 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next import verb
-from bowdenfit.questions.next.candidate_names import parse_candidates
-from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, list_candidates
+from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, list_candidates, parse_candidates
 from bowdenfit.questions.next.ranking import rank_measurements
-from bowdenfit.questions.next.simulated_readings import simulate_readings
-from bowdenfit.questions.next.variance_reduction import error_of_difference, explained_share, mean_and_spread
+from bowdenfit.questions.next.variance_reduction import (
+    error_of_difference,
+    explained_share,
+    mean_and_spread,
+    simulate_readings,
+)
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.simulation import empty_tables
 from bowdenfit.results.along_route import make_optimizer

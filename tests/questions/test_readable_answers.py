@@ -22,9 +22,8 @@ from bowdenfit.questions.compare.answer import ComparedParameter, Comparison
 from bowdenfit.questions.figure_files import write_figure
 from bowdenfit.questions.figures import FIGURES
 from bowdenfit.questions.identify.answer import Identifiability
-from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate
+from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate, TargetQuantity
 from bowdenfit.questions.next.candidates import has_candidates
-from bowdenfit.questions.next.target import TargetQuantity
 from bowdenfit.results.figures_folder import CAPTIONS
 
 pytestmark = pytest.mark.extended

@@ -1,1 +1,5 @@
-"""Which of several models predicts the measurements best?"""
+"""Which of several models predicts the measurements best; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

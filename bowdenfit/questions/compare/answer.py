@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+import jax
 import numpy as np
 
 from bowdenfit.cable.load_cells import RUN_SCATTER
@@ -15,15 +16,19 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import LooDensity, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
-from bowdenfit.kinds.terms import measured_kinds, term_kind
-from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, find_common_readings
+from bowdenfit.kinds.run_parts import LeaveOut, RunParts
+from bowdenfit.kinds.terms import measured_kinds
+from bowdenfit.questions.compare.common_readings import (
+    CommonReadings,
+    OmittedReadings,
+    choose_parts,
+    find_common_readings,
+)
 from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
 
-_FEW_RUNS = 5  # below which they are left out in parts, because little predicts a whole one
 _COMPARED_ROLES = {"friction", "friction_model", "sensor"}
 Report = Callable[[str], None]
 
@@ -47,7 +52,7 @@ class ComparedParameter:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Display):
-    """What sets several fits apart.
+    """Result of a comparison of several fits.
 
     Args:
         differences: How well each predicts readings left out, the best first.
@@ -94,7 +99,9 @@ class Comparison(Display):
     @property
     def trusted(self) -> bool:
         """Whether the fit that predicts best is to be trusted, and the draws of all have settled, which scores rest on."""
-        return not self.troubles.get(self.best) and not any(NOT_CONVERGED in troubles for troubles in self.troubles.values())
+        return not self.troubles.get(self.best) and not any(
+            NOT_CONVERGED in troubles for troubles in self.troubles.values()
+        )
 
     @property
     def readings(self) -> tuple[tuple[str, str], ...]:
@@ -107,11 +114,11 @@ class Comparison(Display):
         return self.left_out == "run" and any(readings_called(table).are_runs for table, _ in self.readings)
 
     def pointwise(self, name: str) -> np.ndarray:
-        """How much worse a fit predicts each reading than the best one does."""
+        """Return how much worse a fit predicts each reading than the best one does."""
         return self.predictions[self.best].elpd - self.predictions[name].elpd
 
     def verdict(self, name: str) -> str:
-        """Whether the data can tell a fit from the best: "clear", "leaning" or "open"."""
+        """Say whether the data can tell a fit from the best: "clear", "leaning" or "open"."""
         return self.differences[name].verdict(len(self.readings))
 
     @property
@@ -140,7 +147,11 @@ class Comparison(Display):
     def predicted_readings(self) -> Several[dict[str, Any]]:
         """What each fit says of each reading."""
         return Several(
-            {"table": table, "label": label, "fits": {name: p.describe_reading(i) for name, p in self.predictions.items()}}
+            {
+                "table": table,
+                "label": label,
+                "fits": {name: p.describe_reading(i) for name, p in self.predictions.items()},
+            }
             for i, (table, label) in enumerate(self.readings)
         )
 
@@ -170,11 +181,16 @@ def compare_fits(
         UsageError: There are fewer than two, one has no posterior, they are not of the same readings, or nothing is left
             once a reading is left out.
     """
+    with jax.enable_x64(True):
+        return _compare_fits(fits, report, leave_out)
+
+
+def _compare_fits(fits: Mapping[str, Record], report: Report | None, leave_out: LeaveOut | None) -> Comparison:
     if len(fits) < 2:
         raise UsageError("a comparison needs at least two fits; name their results folders, two different ones.")
     draws = {name: _require_draws(name, fit) for name, fit in fits.items()}
-    unit, few, parts = _choose_parts(fits, leave_out)
-    common = _find_common_readings(fits, parts)
+    unit, few, parts = choose_parts(fits, leave_out)
+    common = find_common_readings(fits, parts)
     predictions = {
         name: _predict_left_out(name, fit, draws[name], common, parts[name], report) for name, fit in fits.items()
     }
@@ -196,25 +212,12 @@ def compare_fits(
         {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
         unit,
         few,
-        {name: tuple(fit_verdict.troubles) for name, fit in ordered.items() if (fit_verdict := assess_fit(fit)).troubles},
+        {
+            name: tuple(fit_verdict.troubles)
+            for name, fit in ordered.items()
+            if (fit_verdict := assess_fit(fit)).troubles
+        },
     )
-
-
-def _choose_parts(
-    fits: Mapping[str, Record], leave_out: LeaveOut | None
-) -> tuple[LeaveOut, int, dict[str, dict[str, RunParts]]]:
-    """What is left out of runs at a time; how few runs there are, if that decided it; the parts by fit and table."""
-    runs = [len(t.labels) for fit in fits.values() for t in fit.model.terms if has_rows(t)]
-    few = min(runs, default=_FEW_RUNS) if leave_out is None else 0
-    unit: LeaveOut = leave_out or ("load" if few < _FEW_RUNS else "run")
-    parts = {name: _run_parts(fit, unit) for name, fit in fits.items()}
-    return (unit, few if unit == "load" else 0, parts) if leave_out or any(parts.values()) else ("run", 0, parts)
-
-
-def _run_parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
-    """Parts of the runs of every table that has some."""
-    parts = {term.name: run_parts(term, unit) for term in fit.model.terms}
-    return {name: parts for name, parts in parts.items() if parts is not None}
 
 
 def _require_draws(name: str, fit: Record) -> Draws:
@@ -223,40 +226,10 @@ def _require_draws(name: str, fit: Record) -> Draws:
     return fit.posterior
 
 
-def _find_common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
-    """The readings that all fits share; refuses fits of other measurements."""
-    first, *others = fits
-    for name in others:
-        if _input_files(fits[name]) != _input_files(fits[first]):
-            raise UsageError(
-                f"{first} and {name} were not fitted to the same readings, so how well they predict them cannot be "
-                "compared; fit the same data set twice, such as with and without --friction rate-dependent."
-            )
-    common = find_common_readings(fits, parts)
-    if not common.readings:
-        raise UsageError(
-            f"{', '.join(fits)} have no reading in common that they take for the same, so they cannot be compared. "
-            + " ".join(part.sentence() for part in common.omitted)
-        )
-    if len(common.readings) < 2:
-        table, label = common.readings[0]
-        raise UsageError(
-            f"{', '.join(fits)} have one reading in common, {label} of {readings_called(table).words}, and nothing predicts it "
-            "once it is left out; read the same run at several loads, or mount the cable a second time."
-        )
-    return common
-
-
-def _input_files(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
-    """Files that were read, description aside, with their checksums; and the readings that they leave no choice of."""
-    files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
-    return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).chooses_rows]
-
-
 def _predict_left_out(
     name: str, fit: Record, draws: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
 ) -> LooPrediction:
-    """Expected log density of every reading, had it been left out."""
+    """Return the expected log density of every reading, had it been left out."""
     return leave_one_out(
         LooDensity(Density(fit.model), parts=parts),
         draws.z,
@@ -269,20 +242,20 @@ def _predict_left_out(
 
 
 def _describe_fits(fits: Mapping[str, Record]) -> dict[str, str]:
-    """What sets each fit apart; the families of its curves where the fits do not agree on them."""
-    families = {name: _curve_families(fit.dataset.description) for name, fit in fits.items()}
+    """Say what sets each fit apart; the families of its curves where the fits do not agree on them."""
+    families = {name: _list_curve_families(fit.dataset.description) for name, fit in fits.items()}
     differ = len(set(families.values())) > 1
-    return {name: _describe(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
+    return {name: _describe_fit(fit) + (f", {families[name]}" if differ else "") for name, fit in fits.items()}
 
 
-def _curve_families(description: Description) -> str:
-    """Families of its curves, one word where all are of one, else in the order of the contacts."""
+def _list_curve_families(description: Description) -> str:
+    """Return the families of its curves, one word where all are of one, else in the order of the contacts."""
     curves = [c.wrap_angle.curve or "" for c in description.curved]
     return f"{listed(curves if len(set(curves)) > 1 else curves[:1])} curves"
 
 
-def _describe(fit: Record) -> str:
-    """What sets a fit apart from others of the same data."""
+def _describe_fit(fit: Record) -> str:
+    """Say what sets a fit apart from others of the same data."""
     description = fit.dataset.description
     parts = [description.friction_model, *([description.laws_in_words] if description.laws_in_words else [])]
     if description.curved:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import FITS, HIDDEN, Output, read_first
+from bowdenfit.questions import compare as room
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison
@@ -46,18 +47,10 @@ def compare(
         UsageError: There are fewer than two, one has no posterior, or they are not of the same readings.
         StoreError: `output` holds something already.
     """
-    import jax
-
-    from bowdenfit.questions.compare import comparison_figure
-    from bowdenfit.questions.compare.answer import compare_fits as compared
-    from bowdenfit.questions.compare.sections import comparison_page
-    from bowdenfit.questions.compare.words import comparison_text
-    from bowdenfit.verb import show_progress_bar
-
     if output is not None:
         refuse_to_replace(Path(output), NAME, "comparison", force)
-    with jax.enable_x64(True), show_progress_bar(WATCH, progress) as show:
-        comparison = compared(fits, show, leave_out)
+    with show_progress_bar(WATCH, progress) as show:
+        comparison = room.compare_fits(fits, show, leave_out)
     if output is not None:
         names = {fit.name for fit in fits.values()}
         cable = names.pop() if len(names) == 1 else ""
@@ -65,20 +58,18 @@ def compare(
             output,
             NAME,
             comparison,
-            comparison_text(comparison),
-            {NAME: comparison_figure},
+            room.comparison_text(comparison),
+            {NAME: room.comparison_figure},
             cable,
-            comparison_page(comparison),
+            room.comparison_page(comparison),
         )
     return comparison
 
 
 def _reply(comparison: "Comparison", options: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.compare.words import comparison_text
-
     notes = (f"Wrote {options['output']}.",) if options["output"] else ()
     exit_code = 0 if comparison.trusted else NOT_TRUSTED
-    return Reply(comparison_text(comparison), lambda: comparison, notes, exit_code, csv=comparison.to_csv)
+    return Reply(room.comparison_text(comparison), lambda: comparison, notes, exit_code, csv=comparison.to_csv)
 
 
 def _show(bar: Any, sentence: str) -> None:

@@ -1,4 +1,4 @@
-"""What `bowdenfit compare` prints."""
+"""A comparison for people: as text, and as a page."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -8,13 +8,15 @@ import numpy as np
 from bowdenfit.display import text_of
 from bowdenfit.inference.comparison import FEW_READINGS
 from bowdenfit.inference.interval import Interval
+from bowdenfit.pages.section import HtmlPage, PageTable, Picture, make_meanings_table, prose_section
 from bowdenfit.questions.compare.answer import Comparison
+from bowdenfit.questions.compare.comparison_figure import HEADING, caption
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED
 from bowdenfit.words import counted, filled, give_or_take, legend, listed, narrow_table
 
-_DOMINANT_SHARE = 0.5  # share of a difference from which one reading is named
-_MAX_LISTED = 20  # readings treated one by one that are named
-_MAX_HEAD_LENGTH = 30  # characters of the name of a fit over a column
+_DOMINANT_SHARE = 0.5  # share of a difference from which one reading is named; a judgement
+_MAX_LISTED = 20  # readings treated one by one that are named; a judgement
+_MAX_HEAD_LENGTH = 30  # characters of the name of a fit over a column; a judgement
 Cells = tuple[tuple[str, ...], list[tuple[str, ...]]]  # heads and rows
 HOW_WELL, WHAT_CHANGES = "How well each predicts a reading left out", "What changes, mean ± sd"
 _SHORT_METHODS = {"importance sampling": "-", "moment matching": "moved", "refit": "fitted again", "rough": "rough"}
@@ -22,7 +24,7 @@ _SHORT_METHODS = {"importance sampling": "-", "moment matching": "moved", "refit
 
 @text_of.register(Comparison)
 def comparison_text(comparison: Comparison) -> str:
-    """A comparison for people: which fit predicts best, what changes between them, and what speed does."""
+    """Return a comparison for people: which fit predicts best, what changes between them, and what speed does."""
     blocks = [
         "\n".join(filled(line) for line in verdict_sentences(comparison)),
         f"{HOW_WELL}\n" + narrow_table(*score_table(comparison), left=("model",)),
@@ -35,8 +37,37 @@ def comparison_text(comparison: Comparison) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
+def comparison_page(comparison: Comparison) -> HtmlPage:
+    """Return a comparison as a page: which fit predicts best, how well each does, and what changes between them.
+
+    Args:
+        comparison: The comparison.
+    """
+    heads, rows = score_table(comparison)
+    first, *others = verdict_sentences(comparison)
+    names, values = parameter_table(comparison)
+    meanings = {name: parameter.meaning for name, parameter in comparison.parameters.items()}
+    sections = (
+        prose_section("The answer", others, headline=first),
+        prose_section(
+            "How well each predicts",
+            basis_sentences(comparison),
+            [PageTable(heads, tuple(rows), HOW_WELL, left=(0, 1))],
+            folded=[("Influential readings", influential_text(comparison))],
+            pictures=(Picture("comparison", HEADING, caption(comparison)),),
+        ),
+        prose_section(
+            "What changes",
+            speed_sentences(comparison),
+            [PageTable(names, tuple(values), WHAT_CHANGES)],
+            folded=[("What the names stand for", make_meanings_table(meanings))],
+        ),
+    )
+    return HtmlPage(listed(list(comparison.differences)), "Comparison by bowdenfit", sections)
+
+
 def score_table(comparison: Comparison) -> Cells:
-    """How well each fit predicts."""
+    """Return heads and rows of how well each fit predicts."""
     heads = ("fit", "model", "score less by", "±", "weight")
     rows: list[tuple[str, ...]] = [
         (
@@ -52,7 +83,7 @@ def score_table(comparison: Comparison) -> Cells:
 
 
 def verdict_sentences(comparison: Comparison) -> list[str]:
-    """What the data prefer, and whether they can tell."""
+    """Say what the data prefer, and whether they can tell."""
     best, *others = comparison.differences
     lines = [_preference_sentence(comparison, name) for name in others if comparison.verdict(name) == "clear"]
     lines += [_leaning_sentence(comparison, name) for name in others if comparison.verdict(name) == "leaning"]
@@ -72,16 +103,18 @@ def verdict_sentences(comparison: Comparison) -> list[str]:
 
 
 def _trust_sentence(comparison: Comparison, name: str) -> str:
-    """That a fit is not to be trusted, and what this makes of the comparison."""
+    """Say that a fit is not to be trusted, and what this makes of the comparison."""
     sentence = f"{name} is not to be trusted: it is {listed(comparison.troubles[name])}."
     if NOT_CONVERGED in comparison.troubles[name]:
         return f"{sentence} Scores rest on its draws; fit it again with --resume before you compare."
-    return f"{sentence} Predicting best among these fits does not make it right." if name == comparison.best else sentence
+    return (
+        f"{sentence} Predicting best among these fits does not make it right." if name == comparison.best else sentence
+    )
 
 
 def _preference_sentence(comparison: Comparison, name: str) -> str:
     difference = _describe_difference(comparison, name)
-    return f"The data prefer {comparison.best} over {name} ({difference}).{_dominating_reading(comparison, name)}"
+    return f"The data prefer {comparison.best} over {name} ({difference}).{_name_dominating_reading(comparison, name)}"
 
 
 def _leaning_sentence(comparison: Comparison, name: str) -> str:
@@ -89,7 +122,7 @@ def _leaning_sentence(comparison: Comparison, name: str) -> str:
     return (
         f"The data lean towards {comparison.best} over {name} ({_describe_difference(comparison, name)}), but with {n} "
         "readings the "
-        f"standard error is itself uncertain and tends to be too small: not proof.{_dominating_reading(comparison, name)}"
+        f"standard error is itself uncertain and tends to be too small: not proof.{_name_dominating_reading(comparison, name)}"
     )
 
 
@@ -102,25 +135,25 @@ def _describe_difference(comparison: Comparison, name: str) -> str:
 
 
 def _format_elpd(value: float) -> str:
-    """A difference of log densities; one that no number holds in words."""
+    """Return a difference of log densities; one that no number holds in words."""
     return f"{value:.1f}" if np.isfinite(value) else "beyond numbers"
 
 
-def _dominating_reading(comparison: Comparison, name: str) -> str:
-    """The reading that alone makes most of a difference, if one does."""
+def _name_dominating_reading(comparison: Comparison, name: str) -> str:
+    """Name the reading that alone makes most of a difference, if one does."""
     differences = comparison.pointwise(name)
     largest = int(np.argmax(differences))
     if len(differences) < 2 or differences[largest] < _DOMINANT_SHARE * differences.sum():
         return ""
-    return f" Most of it comes from one reading, {_reading_name(comparison.readings[largest])} ({differences[largest]:+.1f})."
+    return f" Most of it comes from one reading, {_format_reading(comparison.readings[largest])} ({differences[largest]:+.1f})."
 
 
-def _reading_name(reading: tuple[str, str]) -> str:
+def _format_reading(reading: tuple[str, str]) -> str:
     return f"{reading[0].replace('_', ' ')} {reading[1]}"
 
 
 def basis_sentences(comparison: Comparison) -> list[str]:
-    """What is compared, and what is not."""
+    """Say what is compared, and what is not."""
     counts = Counter(name for name, _ in comparison.readings)
     parts = "" if comparison.left_out == "run" else "parts "
     what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
@@ -154,7 +187,7 @@ def basis_sentences(comparison: Comparison) -> list[str]:
 
 
 def influential_text(comparison: Comparison) -> str:
-    """Which readings importance sampling could not leave out, and what was done instead."""
+    """Say which readings importance sampling could not leave out, and what was done instead."""
     names = list(comparison.differences)
     ways = {name: comparison.predictions[name].how for name in names}
     which = [
@@ -174,15 +207,17 @@ def influential_text(comparison: Comparison) -> str:
     if len(which) > _MAX_LISTED:
         lines.append(f"That concerns {len(which)} of {len(comparison.readings)} readings.")
         return "\n".join(filled(line) for line in lines)
-    rows = [(_reading_name(comparison.readings[i]), *(_SHORT_METHODS[ways[name][i]] for name in names)) for i in which]
+    rows = [
+        (_format_reading(comparison.readings[i]), *(_SHORT_METHODS[ways[name][i]] for name in names)) for i in which
+    ]
     return "\n".join([*(filled(line) for line in lines), narrow_table(("reading", *short_names(names)), rows)])
 
 
 def parameter_table(comparison: Comparison) -> Cells:
-    """Parameters and the best length in each fit."""
+    """Return heads and rows of parameters and the best length in each fit."""
     names = list(comparison.differences)
     rows = [
-        (_head(p, row.unit), *(_format_interval(row.by_fit.get(name)) for name in names))
+        (_format_head(p, row.unit), *(_format_interval(row.by_fit.get(name)) for name in names))
         for p, row in comparison.parameters.items()
     ]
     rows += (
@@ -199,14 +234,14 @@ def parameter_table(comparison: Comparison) -> Cells:
 
 
 def short_names(names: Sequence[str]) -> list[str]:
-    """Names of fits that find room as headings: of long ones the end, or their number where that is not theirs alone."""
+    """Return names of fits that find room as headings: of long ones the end, or their number where that is not theirs alone."""
     short = [name if len(name) <= _MAX_HEAD_LENGTH else f"...{name[3 - _MAX_HEAD_LENGTH :]}" for name in names]
     if len(set(short)) == len(names):
         return short
     return [name if len(name) <= _MAX_HEAD_LENGTH else f"fit {i + 1} above" for i, name in enumerate(names)]
 
 
-def _head(name: str, unit: str) -> str:
+def _format_head(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} ({unit})"
 
 
@@ -217,7 +252,7 @@ def _format_interval(interval: Interval | None, unit: str = "") -> str:
 
 
 def speed_sentences(comparison: Comparison) -> list[str]:
-    """The answer on speed, from every fit that allows it."""
+    """Say what speed does, from every fit that allows it."""
     lines = [f"{name}: {effect.sentence()}" for name, effect in comparison.rate_effects.items()]
     without = [name for name in comparison.differences if name not in comparison.rate_effects]
     for name in comparison.rate_effects:

@@ -1,1 +1,5 @@
-"""What is worth measuring next?"""
+"""What to measure next; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

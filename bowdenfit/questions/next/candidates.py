@@ -1,24 +1,32 @@
-"""Which readings could be taken next of a cable, whether they make sense, and what they are called."""
+"""Candidates for the next reading of a cable: which there are, whether they make sense, and as users write them."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.kinds import each_table
 from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Situation
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.model import Model
 from bowdenfit.results.record import Record
+from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 from bowdenfit.words import listed, significant
+
+_STROKES = {"pull": 1, "return": -1}
+_NUMBER = re.compile(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 def build_situation(model: Model, measurements: Measurements) -> Situation:
-    """What is known of a cable before the next measurement."""
+    """Return what is known of a cable before the next measurement."""
     return Situation(model.cable, measurements, frozenset(p.name for p in model.space.parameters))
 
 
 def list_candidates(fit: Record) -> tuple[Candidate, ...]:
-    """Everything the tables of the description can hold, at the lengths and wrap angles that suggest themselves.
+    """Return everything the tables of the description can hold, at the lengths and wrap angles that suggest themselves.
 
     Raises:
         UsageError: There is nothing that could be simulated.
@@ -33,7 +41,7 @@ def list_candidates(fit: Record) -> tuple[Candidate, ...]:
 
 
 def _suggest_alternative(fit: Record) -> str:
-    """What to ask where the tables offer nothing: readings of other kinds that this fit can simulate, or another verb."""
+    """Say what to ask where the tables offer nothing: readings of other kinds that this fit can simulate, or another verb."""
     can = [
         example_name(fit, kind)
         for kind in candidate_kinds().values()
@@ -45,7 +53,7 @@ def _suggest_alternative(fit: Record) -> str:
 
 
 def example_name(fit: Record, kind: CandidateKind) -> str:
-    """How readings of a kind are named of this cable, such as "efficiency@470" or "stretch@90deg,20N"."""
+    """Return the name of an example of a kind, such as "efficiency@470" or "stretch@90deg,20N"."""
     return format_candidate(_example_candidate(fit, kind))
 
 
@@ -66,7 +74,7 @@ def _suitable_candidates(fit: Record) -> tuple[Candidate, ...]:
 
 
 def why_unsuitable(fit: Record, candidate: Candidate) -> str:
-    """Why a candidate makes no sense for this cable; empty where it does."""
+    """Return why a candidate makes no sense for this cable; empty where it does."""
     situation, kind = build_situation(fit.model, fit.dataset.measurements), candidate_kinds()[candidate.kind]
     route = fit.dataset.description.route
     reason = kind.why_unknown(situation)
@@ -90,13 +98,13 @@ def why_unsuitable(fit: Record, candidate: Candidate) -> str:
 
 
 def route_variable(fit: Record) -> str:
-    """What the route varies, in words."""
+    """Return what the route varies, in words."""
     route = fit.dataset.description.route
     return route.variable.replace("_", " ") if route else "length"
 
 
 def describe_candidate(fit: Record, candidate: Candidate) -> str:
-    """A candidate in words, such as "the wrap angles at 450 mm"."""
+    """Return a candidate in words, such as "the wrap angles at 450 mm"."""
     route = fit.dataset.description.route
     what = candidate_kinds()[candidate.kind].measured(fit.model.cable)
     if route is not None and np.isfinite(candidate.route):
@@ -109,9 +117,84 @@ def describe_candidate(fit: Record, candidate: Candidate) -> str:
 
 
 def format_candidate(candidate: Candidate) -> str:
-    """A candidate as `parse_candidates` reads it."""
+    """Return a candidate as `parse_candidates` reads it."""
     parts = [f"{candidate.route:.12g}"] if np.isfinite(candidate.route) else []
     parts += [f"{angle:.6g}deg" for angle in np.rad2deg(candidate.angles)]
     parts += [f"{candidate.load:.6g}N"] if np.isfinite(candidate.load) else []
     parts += [{1: "pull", -1: "return"}[candidate.stroke]] if candidate.stroke else []
     return candidate.kind + ("@" + ",".join(parts) if parts else "")
+
+
+def parse_candidates(fit: Record, texts: Iterable[str]) -> tuple[Candidate, ...]:
+    """Read candidates as users write them, such as "angle@450" or "stretch@90deg,50N".
+
+    Raises:
+        UsageError: One is not understood, or makes no sense for this cable.
+    """
+    return tuple(dict.fromkeys(_parse_candidate(fit, text) for text in texts))
+
+
+def _parse_candidate(fit: Record, text: str) -> Candidate:
+    name, _, where = text.partition("@")
+    kind = candidate_kinds().get(name)
+    if kind is None:
+        suggestion = suggest_name(name, list(candidate_kinds()))
+        raise UsageError(f"--candidate {text!r} is of no kind that can be measured{suggestion}")
+    candidate = Candidate(name)
+    for part in filter(None, (part.strip() for part in where.split(","))):
+        candidate = _add_part(fit, kind, candidate, text, part)
+    _check_complete(fit, kind, candidate, text)
+    reason = why_unsuitable(fit, candidate)
+    if reason:
+        raise UsageError(f"--candidate {text!r}: {reason}")
+    return candidate
+
+
+def _add_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str, part: str) -> Candidate:
+    """Return the candidate with one more number of its place."""
+    match = _NUMBER.fullmatch(part)
+    route = fit.dataset.description.route
+    has_designs = bool(kind.designs(build_situation(fit.model, fit.dataset.measurements)))
+    if part in _STROKES and has_designs:
+        return replace(candidate, stroke=_STROKES[part])
+    try:
+        value, unit = float(match[1]) if match else float("nan"), match[2] if match else ""
+        if np.isnan(value):
+            strokes = f", nor a stroke, {' or '.join(_STROKES)}" if has_designs else ""
+            raise ValueError(f"{part!r} is no number with its unit{strokes}")
+        along = route is not None and kind.along_route and np.isnan(candidate.route)
+        kind_of_unit = dimension_of(unit) if unit else ""
+        if along and route is not None and (not unit or kind_of_unit == dimension_of(route.unit)):
+            return replace(candidate, route=value * (route_conversion_factor(unit, route.unit) if unit else 1.0))
+        if kind_of_unit == "force" and (kind.loaded or has_designs):
+            return replace(candidate, load=value * conversion_factor(unit, "force"))
+        if kind_of_unit == "angle" and kind.angles != "none":
+            return replace(candidate, angles=(*candidate.angles, value * conversion_factor(unit, "angle")))
+    except (ValueError, DatasetError) as error:
+        raise UsageError(f"--candidate {text!r}: {error}.") from None
+    units = f", with units where it is no {route_variable(fit)}" if route is not None and kind.along_route else ""
+    raise UsageError(
+        f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example_name(fit, kind)}{units}."
+    )
+
+
+def _check_complete(fit: Record, kind: CandidateKind, candidate: Candidate, text: str) -> None:
+    """Refuse a candidate that lacks a number that its kind needs."""
+    columns = build_situation(fit.model, fit.dataset.measurements).columns_without_curve
+    if kind.along_route and fit.dataset.description.route is not None:
+        missing = "" if np.isfinite(candidate.route) else f"the {route_variable(fit)}"
+    else:
+        n = {"none": 0, "columns": len(columns), "total": 1}[kind.angles]
+        wanted = "a wrap angle" if n == 1 else f"the wrap angles in the columns {', '.join(columns)}"
+        missing = "" if len(candidate.angles) == n else wanted
+        if missing and n == 0:
+            raise UsageError(
+                f"--candidate {text!r}: this cable's wrap angles are constant, so there is no place to name; write "
+                f"{kind.name} alone."
+            )
+    if not missing and (kind.loaded or not np.isnan(candidate.load)) and not candidate.load > 0:
+        missing = "a load greater than zero"
+    if not missing and any(not angle >= 0 for angle in candidate.angles):
+        missing = "wrap angles without a sign"
+    if missing:
+        raise UsageError(f"--candidate {text!r} needs {missing}; write it as, for example, {example_name(fit, kind)}.")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import jax
 import numpy as np
@@ -19,19 +20,43 @@ from bowdenfit.questions.next.answer import (
     PlannedMeasurement,
     RankedCandidate,
     Repeats,
+    TargetQuantity,
+    choose_target,
     is_noticeable,
 )
-from bowdenfit.questions.next.candidate_names import parse_candidates
-from bowdenfit.questions.next.candidates import build_situation, describe_candidate, format_candidate, list_candidates
-from bowdenfit.questions.next.simulated_readings import simulate_readings
-from bowdenfit.questions.next.target import TargetQuantity, choose_target
-from bowdenfit.questions.next.variance_reduction import Explained, error_of_difference, explained_share, mean_and_spread
+from bowdenfit.questions.next.candidates import (
+    build_situation,
+    describe_candidate,
+    format_candidate,
+    list_candidates,
+    parse_candidates,
+)
+from bowdenfit.questions.next.variance_reduction import (
+    Explained,
+    error_of_difference,
+    explained_share,
+    mean_and_spread,
+    simulate_readings,
+)
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
+from bowdenfit.results.store import load
 from bowdenfit.words import significant
 
-REPEATS = (1, 2, 4, 8, 16, 32)
-PLAN_LENGTH, MAX_PLAN_CANDIDATES = 3, 24  # measurements in a plan, and candidates that it chooses from
+REPEATS = (1, 2, 4, 8, 16, 32)  # how often the best candidate is measured; a judgement
+PLAN_LENGTH, MAX_PLAN_CANDIDATES = 3, 24  # measurements in a plan, and candidates that it chooses from; judgements
 _SEED = 7  # beside the fit's own
+
+
+def open_fit(fit: Record | str | Path) -> Record:
+    """Return a fit, read from its results folder where that is named.
+
+    Args:
+        fit: The fit, or its results folder.
+
+    Raises:
+        StoreError: The results folder is missing or damaged.
+    """
+    return load(Path(fit)) if isinstance(fit, str | Path) else fit
 
 
 def rank_measurements(
@@ -44,7 +69,7 @@ def rank_measurements(
 
     Args:
         fit: The fit, with a posterior.
-        target_name: The answer; see `answer_of`.
+        target_name: The answer; see `choose_target`.
         candidates: Such as "angle@450"; whatever the tables can hold if none is named.
         costs: Cost of a measurement of each kind; then candidates are ranked by what they do for their cost.
 
@@ -69,13 +94,13 @@ def rank_measurements(
 
 
 def _load_range(fit: Record) -> tuple[float, float] | None:
-    """Lowest and highest input force of the runs made so far, of which a next one would be like."""
+    """Return the lowest and highest input force of the runs made so far, of which a next one would be like."""
     run = typical_run(fit.dataset.measurements)
     return (float(run.input_force.min()), float(run.input_force.max())) if run is not None else None
 
 
 def _stopping_advice(fit: Record, target: TargetQuantity) -> str:
-    """Whether more needs to be measured at all."""
+    """Say whether more needs to be measured at all."""
     if target.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
         best = fit.optimal_length()
         return (
@@ -101,7 +126,7 @@ def _rank(
     explained: Sequence[Explained],
     costs: Mapping[str, float] | None,
 ) -> tuple[RankedCandidate, ...]:
-    """Candidates by what they are worth, best first."""
+    """Return candidates by what they are worth, best first."""
     price = [costs[c.kind] if costs else 1.0 for c in chosen]
     worth = [e.share / p for e, p in zip(explained, price, strict=True)]
     # What does next to nothing comes last, however little it costs.
@@ -126,7 +151,7 @@ def _rank(
 
 
 def _vary_load_and_stroke(fit: Record, target: TargetQuantity, best: Candidate) -> LoadAndStroke | None:
-    """The best candidate with its readings at other loads or of one stroke; None where it names these, or has none."""
+    """Rank the best candidate with its readings at other loads or of one stroke; None where it names these, or has none."""
     kind, situation = candidate_kinds()[best.kind], build_situation(fit.model, fit.dataset.measurements)
     if np.isfinite(best.load) or best.stroke or not (designs := kind.designs(situation)):
         return None
@@ -136,7 +161,7 @@ def _vary_load_and_stroke(fit: Record, target: TargetQuantity, best: Candidate) 
 
 
 def _repeat_measurement(fit: Record, target: TargetQuantity, candidate: Candidate) -> Repeats:
-    """The candidate measured several times."""
+    """Return what the candidate would do if it were measured several times."""
     (readings,) = _simulate(fit, [candidate], max(REPEATS))
     shares = [explained_share(mean_and_spread(readings[:, :n]), target.draws).share for n in REPEATS]
     return Repeats(REPEATS, tuple(target.sd_after(share) for share in np.maximum.accumulate(shares)))
@@ -145,7 +170,7 @@ def _repeat_measurement(fit: Record, target: TargetQuantity, candidate: Candidat
 def _plan_measurements(
     target: TargetQuantity, ranked: Sequence[RankedCandidate], readings: Mapping[Candidate, np.ndarray]
 ) -> tuple[PlannedMeasurement, ...]:
-    """The best candidate, then the one that does most beside it, and so on; one may come again, mounted anew."""
+    """Return the best candidate, then the one that does most beside it, and so on; one may come again, mounted anew."""
     noticeable = [r for r in ranked if r.is_noticeable][:MAX_PLAN_CANDIDATES] or list(ranked[:1])
     chosen: list[RankedCandidate] = [ranked[0]]
     steps = [PlannedMeasurement(ranked[0].words, ranked[0].name, ranked[0].sd)]

@@ -1,4 +1,4 @@
-"""How much a reading that has not been taken yet would tell of an answer, from draws of the posterior alone.
+"""How much of an answer's variance a reading that has not been taken yet would take away, from draws of the posterior alone.
 
 Every draw gives the answer and, with noise, the reading that a cable of these parameters would give. How far the answer can
 be told from the reading is then a regression over the draws: by the law of total variance the variance of the answer that
@@ -7,22 +7,38 @@ is left once the reading is known is, on average over all that the reading may t
     E[Var(answer | reading)] = Var(answer) - Var(E[answer | reading]) = (1 - share) Var(answer).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from jaxtyping import Float
+from scipy.special import ndtri
+from scipy.stats import rankdata
 
-GROUPS = 64  # of draws: what is learned on all but one is judged on that one
-_DEGREES = {1: 5, 2: 4, 3: 3}  # of the polynomials, by the number of columns of a reading
+from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.kinds.candidate import Candidate
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.model import Model
+from bowdenfit.questions.next.candidates import build_situation
+
+GROUPS = 64  # of draws: what is learned on all but one is judged on that one; a judgement
+# Degrees of the polynomials, by the number of columns of a reading. Judgements, so that there are few terms beside the draws;
+# `scripts/check_next_measurement.py` compares the ranking with refits.
+_DEGREES = {1: 5, 2: 4, 3: 3}
 _DEFAULT_DEGREE = 2
-_MIN_REPEATS = 3  # readings whose scatter says something
+_MIN_REPEATS = 3  # readings whose scatter says something; a judgement
 _NEGLIGIBLE_SPREAD = 1e-9  # relative spread below which readings are all the same
 
 
 @dataclass(frozen=True)
 class Explained:
-    """How much of an answer's variance a reading would take away, on average.
+    """Share of an answer's variance that a reading would take away, on average.
 
     Args:
         share: Share of the variance, at least 0 [1].
@@ -38,7 +54,7 @@ class Explained:
 def explained_share(
     reading: Float[np.ndarray, "draws columns"], answer: Float[np.ndarray, " draws"], groups: int = GROUPS
 ) -> Explained:
-    """Share of the variance of an answer that a reading explains.
+    """Return the share of the variance of an answer that a reading explains.
 
     The answer is regressed on polynomials of the reading, so that dependence may be curved. The polynomials are fitted
     without one group of draws and judged on that group, in turn, so that noise does not look like information. Draws that
@@ -59,18 +75,18 @@ def explained_share(
 
 
 def error_of_difference(one: Explained, other: Explained) -> float:
-    """Standard error of the difference of two shares from the same draws, which err together."""
+    """Return the standard error of the difference of two shares from the same draws, which err together."""
     return _jackknife_error(one.without - other.without)
 
 
 def _jackknife_error(without: np.ndarray) -> float:
-    """Standard error from values with one group left out in turn."""
+    """Return the standard error from values with one group left out in turn."""
     n = len(without)
     return float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
 
 
 def _residual_squares(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of each group: squared deviations from the regression, and from the mean, that the other groups give."""
+    """Return of each group the squared deviations from the regression, and from the mean, that the other groups give."""
     scale = answer.std()
     y = (answer - answer.mean()) / (scale if scale > 0 else 1.0)
     parts = [(x[part], y[part]) for part in np.array_split(np.arange(len(y)), min(groups, len(y)))]
@@ -83,7 +99,7 @@ def _residual_squares(x: np.ndarray, answer: np.ndarray, groups: int) -> tuple[n
 
 
 def _cross_validated_squares(products: np.ndarray, with_answer: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """Squared deviations of each group from what least squares of the others predicts."""
+    """Return the squared deviations of each group from what least squares of the others predicts."""
     squares_left = np.empty(len(squares))
     for g in range(len(squares)):
         remaining = products.sum(axis=0) - products[g], with_answer.sum(axis=0) - with_answer[g]
@@ -93,7 +109,7 @@ def _cross_validated_squares(products: np.ndarray, with_answer: np.ndarray, squa
 
 
 def _polynomials(reading: np.ndarray) -> np.ndarray:
-    """Products of powers of the columns, the constant first; columns that say nothing are left out."""
+    """Return products of powers of the columns, the constant first; columns that say nothing are left out."""
     columns = [
         _normal_scores(column) for column in reading.T if np.ptp(column) > _NEGLIGIBLE_SPREAD * np.abs(column).max()
     ]
@@ -106,15 +122,12 @@ def _polynomials(reading: np.ndarray) -> np.ndarray:
 
 
 def _normal_scores(column: np.ndarray) -> np.ndarray:
-    """The column brought to a normal distribution by its ranks, so that no far value rules a polynomial."""
-    from scipy.special import ndtri
-    from scipy.stats import rankdata
-
+    """Return the column brought to a normal distribution by its ranks, so that no far value rules a polynomial."""
     return np.asarray(ndtri((rankdata(column) - 0.5) / len(column)))
 
 
 def mean_and_spread(readings: Float[np.ndarray, "draws repeats columns"]) -> Float[np.ndarray, "draws statistics"]:
-    """What several readings of one kind say together: mean and, from three on, the logarithm of their scatter.
+    """Summarize several readings of one kind: mean and, from three on, the logarithm of their scatter.
 
     Args:
         readings: Readings of each draw.
@@ -123,3 +136,42 @@ def mean_and_spread(readings: Float[np.ndarray, "draws repeats columns"]) -> Flo
     if readings.shape[1] < _MIN_REPEATS:
         return mean
     return np.column_stack([mean, np.log(readings.std(axis=1) + 1e-12)])
+
+
+def simulate_readings(
+    model: Model,
+    measurements: Measurements,
+    candidates: Sequence[Candidate],
+    z: np.ndarray,
+    seed: int,
+    repeats: int = 1,
+) -> list[np.ndarray]:
+    """Return the reading of each candidate as each draw would give it: arrays over draws, repeats and columns.
+
+    Args:
+        model: The fitted model; its parameters stay as they are.
+        measurements: What was measured so far, whose angles hold outside the range of the curves.
+        candidates: The candidates.
+        z: Draws of the posterior, one a row.
+        seed: Seed of the noise.
+        repeats: How often each reading is taken, each time with a new mounting where it has one.
+    """
+    by_kind: dict[str, list[Candidate]] = {}
+    for candidate in candidates:
+        by_kind.setdefault(candidate.kind, []).append(candidate)
+    situation, kinds = build_situation(model, measurements), candidate_kinds()
+    parts = {name: kinds[name].simulation(situation, of_kind) for name, of_kind in by_kind.items()}
+    data, key = {name: part.data for name, part in parts.items()}, jax.random.key(seed)
+
+    def readings(z_and_number: Array, data: Any, key: Array) -> dict[str, Array]:
+        values, number = model.space.constrain(z_and_number[:-1]), z_and_number[-1].astype(jnp.uint32)
+        keys = jax.random.split(jax.random.fold_in(key, number), (len(parts), repeats))
+        return {
+            name: jax.vmap(lambda k, part=part, name=name: part.simulate(values, data[name], k))(keys[i])
+            for i, (name, part) in enumerate(parts.items())
+        }
+
+    program = for_each_draw(readings, model.space.size + 1, data, key, run_once=True)
+    simulated = program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+    columns = {name: iter(part.columns) for name, part in parts.items()}
+    return [np.maximum(simulated[c.kind][:, :, list(next(columns[c.kind]))], parts[c.kind].lowest) for c in candidates]

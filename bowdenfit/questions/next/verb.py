@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
+from bowdenfit.questions import next as room
 from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
 
@@ -52,24 +53,17 @@ def next_measurement(
         UsageError: The fit has no posterior, or the answer, a candidate or a cost makes no sense.
         StoreError: The results folder is missing or damaged, or `output` cannot be written.
     """
-    from bowdenfit.questions.next import next_figure
-    from bowdenfit.questions.next.ranking import rank_measurements as ranked
-    from bowdenfit.questions.next.words import next_measurement_text
-    from bowdenfit.results.store import load
-
-    record = load(Path(fit)) if isinstance(fit, str | Path) else fit
-    ranking = ranked(record, answer, candidates, costs)
+    record = room.open_fit(fit)
+    ranking = room.rank_measurements(record, answer, candidates, costs)
     if output is not None:
-        text = next_measurement_text(ranking, top)
-        write_answer(output, NAME, ranking, text, {NAME: next_figure}, record.name)
+        text = room.next_measurement_text(ranking, top)
+        write_answer(output, NAME, ranking, text, {NAME: room.next_figure}, record.name)
     return ranking
 
 
 def _reply(ranking: "NextMeasurement", options: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.next.words import next_measurement_text
-
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
-    return Reply(next_measurement_text(ranking, options["top"]), lambda: ranking, notes, csv=ranking.to_csv)
+    return Reply(room.next_measurement_text(ranking, options["top"]), lambda: ranking, notes, csv=ranking.to_csv)
 
 
 VERB = Verb(

@@ -1,23 +1,26 @@
-"""What `bowdenfit next` prints."""
+"""What to measure next, for people: as text, and as a section of the report."""
 
 import math
 
 from bowdenfit.display import text_of
 from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate
 from bowdenfit.words import decimals, few, filled, percent, significant, table
 
+TITLE = "What to measure next"
 HOW_TO_READ = (
     "± is one standard deviation, averaged over what the reading may turn out to be; candidates that differ only in the "
     "last digit are equally good."
 )
-_MAX_NAMED = 3  # candidates as good as the best that are named in the sentence
+_MAX_NAMED = 3  # candidates as good as the best that are named in the sentence; a judgement
+_MAX_ROWS = 10  # of the table in the report; a judgement
 
 
 @text_of.register(NextMeasurement)
 def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
-    """What to measure next and when to stop, in sentences and a table of the best candidates.
+    """Say what to measure next and when to stop, in sentences and a table of the best candidates.
 
     Args:
         ranking: The ranking.
@@ -33,8 +36,16 @@ def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
     return "\n\n".join(lines) + "\n"
 
 
+def ranking_section(ranking: NextMeasurement) -> PageSection:
+    """Return the advice, and the best candidates in a table."""
+    heads, rows = ranking_table(ranking, _MAX_ROWS)
+    return prose_section(
+        TITLE, ranking_sentences(ranking), [PageTable(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)]
+    )
+
+
 def ranking_sentences(ranking: NextMeasurement) -> list[str]:
-    """What to measure next, at which load, when to stop, and what would come after it."""
+    """Say what to measure next, at which load, when to stop, and what would come after it."""
     sentences = [
         *_advice_sentences(ranking),
         *_load_and_stroke_sentences(ranking),
@@ -46,19 +57,19 @@ def ranking_sentences(ranking: NextMeasurement) -> list[str]:
 
 
 def _format_sd(ranking: NextMeasurement, sd: float) -> str:
-    """A standard deviation with the answer's unit."""
+    """Return a standard deviation with the answer's unit."""
     unit = f" {ranking.answer.unit}" if ranking.answer.unit else ""
     return f"± {sd:.{_digits(ranking)}f}{unit}"
 
 
 def _digits(ranking: NextMeasurement) -> int:
-    """Decimals of standard deviations: two significant digits, or three where the best candidate changes little."""
+    """Return the decimals of standard deviations: two significant digits, or three where the best candidate changes little."""
     usual, change = decimals(ranking.answer.sd), ranking.answer.sd - ranking.ranked[0].sd
     return min(max(usual, decimals(change) - 1), usual + 1) if change > 0 else usual
 
 
 def _advice_sentences(ranking: NextMeasurement) -> list[str]:
-    """What to measure, at which load, and what would do equally well."""
+    """Say what to measure, at which load, and what would do equally well."""
     best, answer = ranking.best, ranking.answer
     if best is None:
         first = ranking.ranked[0]
@@ -82,7 +93,7 @@ def _advice_sentences(ranking: NextMeasurement) -> list[str]:
 
 
 def _mounting_and_loads(ranking: NextMeasurement, best: RankedCandidate) -> str:
-    """That the cable is to be mounted anew, and at which loads, where neither is said already."""
+    """Say that the cable is to be mounted anew, and at which loads, where neither is said already."""
     if not candidate_kinds()[best.candidate.kind].mounted_anew:
         return ""
     if ranking.loads is None or math.isfinite(best.candidate.load):
@@ -92,7 +103,7 @@ def _mounting_and_loads(ranking: NextMeasurement, best: RankedCandidate) -> str:
 
 
 def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:
-    """At which load and of which stroke its readings tell most, against the same number of them as usual."""
+    """Say at which load and of which stroke its readings tell most, against the same number of them as usual."""
     within = ranking.within
     if within is None:
         return []
@@ -118,14 +129,14 @@ def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:
 
 
 def _describe_design(ranked: RankedCandidate) -> str:
-    """'at 64 N while pulling'"""
+    """Return load and stroke in words, as 'at 64 N while pulling'."""
     load, stroke = ranked.candidate.load, ranked.candidate.stroke
     way = f"while {STROKE_WORDS[stroke]}" if stroke else "of both strokes"
     return f"all at {significant(load)} N {way}"
 
 
 def _plan_sentences(ranking: NextMeasurement) -> list[str]:
-    """What would be best after it."""
+    """Say what would be best after the best candidate."""
     after = [
         f"{step.words}{' again' if step.name in [s.name for s in ranking.plan[:i]] else ''} ({_format_sd(ranking, step.sd)})"
         for i, step in enumerate(ranking.plan)
@@ -134,7 +145,7 @@ def _plan_sentences(ranking: NextMeasurement) -> list[str]:
 
 
 def _repeat_sentences(ranking: NextMeasurement) -> list[str]:
-    """How often the best candidate would have to be measured to halve the uncertainty."""
+    """Say how often the best candidate would have to be measured to halve the uncertainty."""
     best, repeats = ranking.best, ranking.repeats
     if best is None or repeats is None:
         return []
@@ -148,7 +159,7 @@ def _repeat_sentences(ranking: NextMeasurement) -> list[str]:
 
 
 def ranking_table(ranking: NextMeasurement, top: int) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of so many of the best candidates."""
+    """Return heads and rows of so many of the best candidates."""
     best = ranking.ranked[:top]
     unit = f" ({ranking.answer.unit})" if ranking.answer.unit else ""
     digits = _digits(ranking)

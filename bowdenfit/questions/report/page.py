@@ -20,8 +20,8 @@ from bowdenfit.questions.figures import (
 from bowdenfit.questions.length.efficiency_chart import efficiency_chart
 from bowdenfit.questions.loss.answer import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
-from bowdenfit.questions.next.next_section import ranking_section
 from bowdenfit.questions.next.ranking import rank_measurements
+from bowdenfit.questions.next.words import ranking_section
 from bowdenfit.questions.recorded.recordings_chart import recordings_charts
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.sections import (

@@ -7,7 +7,7 @@ from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.groups import groups_text
-from bowdenfit.questions.next.next_section import TITLE
+from bowdenfit.questions.next.words import TITLE
 from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
 from bowdenfit.questions.summary.brief import READING_HEADS, format_reading, say_no_outliers
 from bowdenfit.questions.summary.details import details_text, parameters_text

@@ -1,0 +1,4 @@
+from . import comparison_figure as comparison_figure
+from .answer import compare_fits as compare_fits
+from .words import comparison_page as comparison_page
+from .words import comparison_text as comparison_text

@@ -40,7 +40,7 @@ from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.replicator import why_implausible
 from bowdenfit.questions.fleet.fitting import SETTINGS
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 from bowdenfit.results.fleet_folder import FLEET_PAGE
 
 CONTACTS = ("sheath", "clamp", "edge")
@@ -149,7 +149,7 @@ def cables(number: int) -> list[LogDensity]:
         seed = next(seeds)
         of_truth, of_readings = jax.random.split(jax.random.key(seed))
         values = draw_true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
-        made = simulate(description, design, values, of_readings)
+        made = simulate_design(description, design, values, of_readings)
         if not why_implausible(made, made):
             found.append(LogDensity(build_model(made)))
     return found

@@ -45,7 +45,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.next.variance_reduction import explained_share, simulate_readings
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 from bowdenfit.results.along_route import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
@@ -130,7 +130,7 @@ class Bench:
         """One cable."""
         of_truth, of_readings, of_refits = jax.random.split(jax.random.key(seed), 3)
         truth = draw_true_values(self.description, empty_tables(self.description, DESIGN), {}, of_truth)
-        dataset = simulate(self.description, DESIGN, truth, of_readings)
+        dataset = simulate_design(self.description, DESIGN, truth, of_readings)
         posterior = LogDensity(build_model(dataset))
         z = self._draws(posterior, seed)
         length = self._program(posterior, "optimum", self._optimum)(z)[0]

@@ -35,7 +35,7 @@ from bowdenfit.questions.calibrate.plan import StatedTruth, list_quantities, par
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 from bowdenfit.questions.calibrate.replications import RankedTruth
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, BatchFitter, CalibrationPlan, Replicator
-from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH
 from bowdenfit.words import table

@@ -13,9 +13,8 @@ import numpy as np
 from benchmark_tables import say
 from processes import ROOT, byte_code, search_path
 
-from bowdenfit.questions.simulate.recordings.making import make_recordings
-from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan
-from bowdenfit.questions.simulate.recordings.writing import write_recordings
+from bowdenfit.questions.simulate.recordings import make_recordings, write_recordings
+from bowdenfit.questions.simulate.recordings_plan import parse_recordings_plan
 
 PLAN = ROOT / "datasets" / "synthetic-recordings" / "bench.toml"
 LENGTHS = list(range(430, 530, 10))  # mm

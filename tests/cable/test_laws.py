@@ -16,7 +16,7 @@ from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.next.answer import choose_target
-from bowdenfit.questions.simulate.simulation import draw_true_values
+from bowdenfit.questions.simulate.tables import draw_true_values
 from bowdenfit.questions.summary import coefficients_figure, pairs_figure
 
 MU, WOBBLE = 0.13, np.deg2rad(35.0)

@@ -28,7 +28,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.kinds.tables import AngleTable, Measurements, StretchTable
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 pytestmark = pytest.mark.extended
 
@@ -216,7 +216,7 @@ def stretched_on_body(on_body):
         truth = {name: TRUTH[name] for name in ROPE} | ({friction: 0.085} if friction else {})
         design = design_of(angles=(450.0, 500.0), efficiencies=(470.0,), **ELASTIC)
         values = draw_true_values(description, empty_tables(description, design), truth, jax.random.key(1), run_once=True)
-        rows = simulate(description, design, values, jax.random.key(2), run_once=True).measurements.table(StretchTable)
+        rows = simulate_design(description, design, values, jax.random.key(2), run_once=True).measurements.table(StretchTable)
         return Dataset(description, alone.measurements.with_tables(rows), {})
 
     return alone, joined
@@ -269,7 +269,7 @@ def mixture(tables: tuple[str, ...]) -> Dataset:
     names = {p.name for p in build_model(Dataset(description, empty, {})).space.parameters}
     truth = {name: value for name, value in (TRUTH | CABLE_TRUTH).items() if name in names}
     values = draw_true_values(description, empty, truth, jax.random.key(len(tables)), run_once=True)
-    return simulate(description, design, values, jax.random.key(7), run_once=True)
+    return simulate_design(description, design, values, jax.random.key(7), run_once=True)
 
 
 @pytest.mark.parametrize(

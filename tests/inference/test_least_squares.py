@@ -22,7 +22,7 @@ from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import replace_readings
+from bowdenfit.questions.simulate.tables import replace_readings
 
 
 def fitted(dataset: Dataset) -> tuple[LogDensity, LeastSquares]:

@@ -9,7 +9,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.descriptions import design_of, read_design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.tables import StretchTable
-from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.questions.simulate.tables import empty_tables
 
 CLAMPED = cable(1, ("forces",), contact=[CONTACTS[4]])
 

@@ -13,7 +13,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import rounded_up
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import resimulate
+from bowdenfit.questions.simulate.tables import resimulate
 
 pytestmark = pytest.mark.extended
 

@@ -18,9 +18,8 @@ from bowdenfit.questions.simulate.bench import (
     MotorProfile,
     simulate_recording,
 )
-from bowdenfit.questions.simulate.recordings.making import make_recordings
-from bowdenfit.questions.simulate.recordings.plan import parse_recordings_plan, read_recordings_plan
-from bowdenfit.questions.simulate.recordings.writing import write_recordings
+from bowdenfit.questions.simulate.recordings import make_recordings, write_recordings
+from bowdenfit.questions.simulate.recordings_plan import parse_recordings_plan, read_recordings_plan
 
 pytestmark = pytest.mark.extended
 

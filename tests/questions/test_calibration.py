@@ -39,7 +39,7 @@ from bowdenfit.questions.calibrate.rank_tests import UniformRanks, summarize_rep
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication, append_replication, open_replications
 from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator, why_implausible
 from bowdenfit.questions.calibrate.words import calibration_page, calibration_text, details_text, draw_calibration
-from bowdenfit.questions.simulate.simulation import empty_tables, replace_readings, resimulate
+from bowdenfit.questions.simulate.tables import empty_tables, replace_readings, resimulate
 from bowdenfit.questions.writing import write_page
 from bowdenfit.recordings.recording import Recordings
 

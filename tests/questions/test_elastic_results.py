@@ -25,8 +25,7 @@ from bowdenfit.kinds.terms import drawn_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.questions.figures import collect_figure_data
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, replace_readings
-from bowdenfit.questions.simulate.tables import read_bench
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, read_bench, replace_readings
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.results.along_route import make_optimizer

@@ -8,20 +8,21 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.questions.metabolic.answer import analyze_study
-from bowdenfit.questions.metabolic.contradictions import find_contradictions, rounding_range
-from bowdenfit.questions.metabolic.paired import (
+from bowdenfit.questions.metabolic.answer import analyze_study, find_contradictions, rounding_range
+from bowdenfit.questions.metabolic.study import (
+    MetabolicCosts,
+    Study,
     brockway,
     half_width,
     mean_and_error,
     persons_needed,
     power,
     probability_below,
+    read_study,
     smallest_detectable,
     t_from_p,
     two_sided_p,
 )
-from bowdenfit.questions.metabolic.study import MetabolicCosts, Study, read_study
 
 PRINTED = Path(__file__).parents[2] / "datasets" / "on-body-metabolic"
 

@@ -39,7 +39,7 @@ from bowdenfit.questions.next.variance_reduction import (
     simulate_readings,
 )
 from bowdenfit.questions.next.words import next_measurement_text
-from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import Draws
 from bowdenfit.results.record import Provenance as Origin

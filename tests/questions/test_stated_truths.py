@@ -15,7 +15,7 @@ from bowdenfit.questions.calibrate.rank_tests import estimate_power, summarize_r
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication
 from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator
 from bowdenfit.questions.calibrate.words import calibration_text
-from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.questions.simulate.tables import empty_tables
 
 pytestmark = pytest.mark.extended
 

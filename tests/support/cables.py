@@ -10,7 +10,7 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 ROUTE = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}
 CONTACTS: tuple[dict[str, Any], ...] = (
@@ -68,4 +68,4 @@ def measured(
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
     wanted = {name: value for name, value in (TRUTH | truth).items() if name in names}
     values = draw_true_values(description, tables, wanted, of_truth, once)
-    return simulate(description, design, values, of_readings, noise, once), values
+    return simulate_design(description, design, values, of_readings, noise, once), values

@@ -8,7 +8,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.kinds.descriptions import design_of, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 HOUSING: dict[str, Any] = {
     "name": "housing",
@@ -75,4 +75,4 @@ def bench(
     free = {p.name for p in build_model(Dataset(description, empty, {})).space.free}
     wanted = {name: value for name, value in truth.items() if name in free}
     values = draw_true_values(description, empty, wanted, of_truth, once)
-    return simulate(description, measured, values, of_readings, noise, once), values
+    return simulate_design(description, measured, values, of_readings, noise, once), values

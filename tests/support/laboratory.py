@@ -21,7 +21,7 @@ from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
 from bowdenfit.questions.calibrate.replicator import CalibrationPlan, Replicator
-from bowdenfit.questions.simulate.simulation import empty_tables
+from bowdenfit.questions.simulate.tables import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
 PROBABILITY = 0.9

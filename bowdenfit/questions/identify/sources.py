@@ -19,8 +19,7 @@ from bowdenfit.inputs import read_toml_file
 from bowdenfit.model import build_model
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import assess_identifiability, identifiability_at_maximum
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables, simulate
-from bowdenfit.questions.simulate.tables import read_bench
+from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, read_bench, simulate_design
 from bowdenfit.reading import Reading, read, refuse_named
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load
@@ -93,7 +92,7 @@ def _identify_plan(path: Path) -> Identifiability:
     space = build_model(Dataset(plan.description, tables, {})).space
     medians = {p.name: value_at(p.prior, 0.0) * p.shown_scale for p in space.free}
     values = draw_true_values(plan.description, tables, medians | dict(plan.truth), jax.random.key(0), run_once=True)
-    data = simulate(plan.description, plan.design, values, jax.random.key(0), noise=False, run_once=True)
+    data = simulate_design(plan.description, plan.design, values, jax.random.key(0), noise=False, run_once=True)
     posterior = LogDensity(build_model(data))
     assumed = "[truth]" if plan.truth else "the medians of the priors"
     basis = f"the plan, for a cable with the values of {assumed}; nothing has been measured"

@@ -1,18 +1,21 @@
-"""What a study of metabolic cost shows, and what it does not."""
+"""What a study of metabolic cost shows: paired differences, numbers that cannot all be right, and both in words."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows
+from bowdenfit.display import Display, Part, Rows, text_of
 from bowdenfit.errors import DatasetError
 from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.questions.metabolic.contradictions import find_contradictions
-from bowdenfit.questions.metabolic.paired import (
+from bowdenfit.questions.metabolic.study import (
     LEVEL,
+    MetabolicCosts,
+    PrintedDifference,
+    Study,
     half_width,
     mean_and_error,
     persons_needed,
@@ -22,9 +25,11 @@ from bowdenfit.questions.metabolic.paired import (
     t_from_p,
     two_sided_p,
 )
-from bowdenfit.questions.metabolic.study import MetabolicCosts, Study
+from bowdenfit.words import counted, filled, narrow_table, percent
 
-EXPECTED = 0.03  # of the cost: standard deviation of differences that one who doubts expects
+EXPECTED = 0.03  # of the cost: standard deviation of differences that one who doubts expects; a judgement
+_ROUNDING_SLACK = 0.02  # of correlations and their eigenvalues, for what rounding of printed numbers may do; a judgement
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +74,7 @@ class ConditionDifference(Part):
 
 @dataclass(frozen=True, repr=False)
 class Metabolic(Display):
-    """What a study shows.
+    """Result of a study.
 
     Args:
         name, source: Of the study.
@@ -95,7 +100,7 @@ class Metabolic(Display):
 
 
 def analyze_study(study: Study, costs: MetabolicCosts | None) -> Metabolic:
-    """What a study shows.
+    """Return what a study shows.
 
     Args:
         study: What it says of itself.
@@ -151,3 +156,148 @@ def _compare(
         probability_below(mean, error, persons), probability_below(mean, error, persons, EXPECTED * abs(baseline)),
         power(mean / spread, persons), persons_needed(mean / spread), smallest_detectable(persons) * spread,
     )  # fmt: skip
+
+
+def find_contradictions(study: Study) -> Iterator[str]:
+    """Yield what of a study cannot all be right, a sentence each.
+
+    Args:
+        study: What was printed.
+    """
+    means = {difference.name: difference.mean for difference in study.condition if difference.mean is not None}
+    baselines: dict[str, list[tuple[PrintedDifference, Range]]] = {}
+    for difference in study.difference:
+        if difference.percent is None or difference.condition not in means or difference.less not in means:
+            continue
+        mean, less = means[difference.condition], means[difference.less]
+        follows = 100 * (float(mean) / float(less) - 1)
+        if not _overlaps(
+            _percent_change(rounding_range(mean), (float(less), float(less))), rounding_range(difference.percent)
+        ):
+            yield (
+                f"{difference.percent} % for {difference.condition} does not follow from the means as printed, which "
+                f"give {follows:+.2f} % "
+                f"({mean} and {less} W/kg)."
+            )
+        low, high = rounding_range(mean)
+        change = rounding_range(difference.percent)
+        baselines.setdefault(difference.less, []).append(
+            (difference, (low / (1 + change[1] / 100), high / (1 + change[0] / 100)))
+        )
+    for less, implied in baselines.items():
+        for (one, first), (other, second) in combinations(implied, 2):
+            if not _overlaps(first, second):
+                yield (
+                    f"No mean of {less} gives both {one.percent} % for {one.condition} and {other.percent} % for "
+                    f"{other.condition}: that takes {_format_range(first)} W/kg for the one and {_format_range(second)} "
+                    "for the other."
+                )
+    yield from _check_scatter(study)
+
+
+def rounding_range(text: str) -> Range:
+    """Return the range of numbers that are written so when they are rounded."""
+    _, _, decimals = text.partition(".")
+    half = 0.5 * 10.0 ** -len(decimals)
+    return float(text) - half, float(text) + half
+
+
+def _check_scatter(study: Study) -> Iterator[str]:
+    """Yield standard errors and probabilities that no persons could have."""
+    errors = {difference.name: float(difference.sem) for difference in study.condition if difference.sem is not None}
+    means = {difference.name: float(difference.mean) for difference in study.condition if difference.mean is not None}
+    names, persons = list(errors), study.persons or 2
+    matrix = np.eye(len(names))
+    for difference in study.difference:
+        if difference.p is None or not {difference.condition, difference.less} <= set(errors) & set(means):
+            continue
+        i, j = names.index(difference.condition), names.index(difference.less)
+        error = abs(means[difference.condition] - means[difference.less]) / t_from_p(float(difference.p), persons)
+        one, other = errors[difference.condition], errors[difference.less]
+        matrix[i, j] = matrix[j, i] = (one**2 + other**2 - error**2) / (2 * one * other)
+        if abs(matrix[i, j]) > 1 + _ROUNDING_SLACK:
+            yield (
+                f"p = {difference.p} for {difference.condition} less {difference.less} does not go with their standard "
+                "errors: persons would "
+                f"have to agree with a correlation of {matrix[i, j]:.2f}."
+            )
+            return
+    if (
+        len(names) > 2
+        and len(study.difference) == math.comb(len(names), 2)
+        and np.linalg.eigvalsh(matrix).min() < -_ROUNDING_SLACK
+    ):
+        yield "The probabilities do not go with the standard errors: no persons have such correlations between conditions."
+
+
+def _percent_change(mean: Range, less: Range) -> Range:
+    """Return the lowest and highest change in percent."""
+    return 100 * (mean[0] / less[1] - 1), 100 * (mean[1] / less[0] - 1)
+
+
+def _overlaps(one: Range, other: Range) -> bool:
+    return one[0] <= other[1] and other[0] <= one[1]
+
+
+def _format_range(span: Range) -> str:
+    return f"{span[0]:.2f} to {span[1]:.2f}"
+
+
+@text_of.register(Metabolic)
+def metabolic_text(result: Metabolic) -> str:
+    """Return a study for people: what it shows, what it does not, and what of it cannot be right."""
+    heads = ("condition", "less", "W/kg", "95 % from", "to", "change", "p", "p (Holm)", "lower with prob.")
+    rows = [
+        (c.condition, c.less, f"{c.difference:+.3f}", f"{c.low:+.3f}", f"{c.high:+.3f}", percent(c.share, sign="+"),
+         f"{c.p:.2g}", f"{c.p_holm:.2g}", f"{c.lower_doubted:.2f} to {c.lower:.2f}")
+        for c in result.comparisons
+    ]  # fmt: skip
+    blocks = [
+        "\n".join(filled(line) for line in (f"{result.name}:", *map(_difference_sentence, result.comparisons))),
+        narrow_table(heads, rows, left=("less",)),
+        "\n".join(filled(f"- {line}") for line in result.contradictions),
+        "\n".join(filled(line) for line in _remark_sentences(result)),
+    ]
+    if result.contradictions:
+        blocks[2] = f"Numbers that cannot all be right\n{blocks[2]}"
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _difference_sentence(comparison: ConditionDifference) -> str:
+    """Say whether a difference is shown."""
+    way = "lower" if comparison.difference < 0 else "higher"
+    size = f"{abs(comparison.difference):.2f} W/kg ({percent(abs(comparison.share))})"
+    if comparison.is_significant:
+        return (
+            f"{comparison.condition} is {way} than {comparison.less} by {size}; the difference is significant "
+            f"(p = {comparison.p_holm:.2g}, adjusted for all pairs)."
+        )
+    needed = f"{comparison.needed} persons would" if comparison.needed else "no realistic number of persons would"
+    return (
+        f"{comparison.condition} is not shown to be {way} than {comparison.less}: {size} with {comparison.persons} "
+        f"persons, p = {comparison.p:.2g}; "
+        f"{needed} show a difference as large in four of five studies."
+    )
+
+
+def _remark_sentences(result: Metabolic) -> list[str]:
+    """Say what the numbers hold for."""
+    lines = []
+    if result.order:
+        lines.append(
+            f"All walked in the same order ({', '.join(result.order)}), so what changes with time, such as getting used to the "
+            "device or tiring, cannot be separated from the effect of the conditions."
+        )
+    persons = counted(max(comparison.persons for comparison in result.comparisons), "person")
+    least = max(result.comparisons, key=lambda comparison: comparison.least)
+    lines.append(
+        f"With {persons} the least true difference that four of five studies find is {least.least:.2f} W/kg "
+        f"({least.condition} less {least.less})."
+    )
+    lines.append(
+        "Lower with probability: the first number assumes beforehand that differences are a few percent either way, the "
+        "second assumes nothing."
+    )
+    if not result.from_persons:
+        lines.append("Each person's numbers were not printed; all follows from printed means and probabilities.")
+    return lines

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import PATH, read_first
+from bowdenfit.questions import metabolic as room
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -26,17 +27,11 @@ def metabolic(
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
-    from bowdenfit.questions.metabolic.answer import analyze_study
-    from bowdenfit.questions.metabolic.study import read_study
-    from bowdenfit.questions.metabolic.words import metabolic_text  # noqa: F401  (how the answer shows itself)
-
-    return analyze_study(*read_study(Path(dataset)))
+    return room.analyze_study(*room.read_study(Path(dataset)))
 
 
 def _reply(result: "Metabolic", _: dict[str, Any]) -> Reply:
-    from bowdenfit.questions.metabolic.words import metabolic_text
-
-    return Reply(metabolic_text(result), lambda: result, csv=result.to_csv)
+    return Reply(room.metabolic_text(result), lambda: result, csv=result.to_csv)
 
 
 VERB = Verb(

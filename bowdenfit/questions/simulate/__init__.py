@@ -1,1 +1,5 @@
-"""What would a bench read, were the truth known?"""
+"""Data sets from known truth: tables, recordings and fleets; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

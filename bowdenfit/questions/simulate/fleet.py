@@ -23,11 +23,12 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.terms import drawn_readings, with_drawn_readings
 from bowdenfit.model import build_model
-from bowdenfit.questions.simulate.simulation import draw_true_values, empty_tables
 from bowdenfit.questions.simulate.tables import (
     TRUTH_FILE,
     BenchPlan,
     description_lines,
+    draw_true_values,
+    empty_tables,
     read_bench,
     read_plan_file,
     table_texts,
@@ -69,14 +70,14 @@ class FleetDesign(Frozen):
 
 
 class _Plan(Frozen):
-    """What of a plan is about the fleet."""
+    """The part of a plan that is about the fleet."""
 
     fleet: FleetDesign
 
 
 @dataclass(frozen=True)
 class FleetPlan:
-    """What to simulate: a bench, and the cables that are measured on it."""
+    """Fleet to simulate: a bench, and the cables that are measured on it."""
 
     bench: BenchPlan
     fleet: FleetDesign
@@ -84,7 +85,7 @@ class FleetPlan:
 
 @dataclass(frozen=True)
 class SimulatedInspection:
-    """One inspection.
+    """One inspection of a cable.
 
     Args:
         cable: Name of the cable.
@@ -104,7 +105,7 @@ class SimulatedInspection:
 
     @property
     def file(self) -> str:
-        """Of its table, as seen from the folder."""
+        """Name of its table, as seen from the folder."""
         return f"{READINGS}/{self.cable}-{self.cycles:.0f}.csv"
 
 
@@ -125,7 +126,7 @@ def read_fleet_plan(path: Path) -> FleetPlan:
 
 
 def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list[SimulatedInspection], dict[str, Any]]:
-    """All inspections, and the truth: of the population, and of each cable.
+    """Return all inspections, and the truth: of the population, and of each cable.
 
     Args:
         plan: What to simulate.
@@ -183,3 +184,24 @@ def write_fleet(plan: FleetPlan, inspections: list[SimulatedInspection], truth: 
         (new_folder / READINGS).mkdir()
         for name, content in files.items():
             write_text(new_folder / name, content)
+
+
+def make_fleet(path: Path, output: Path | None, seed: int, noise: bool) -> Dataset:
+    """Make the inspections of a fleet from known truth, write them, and return the data set of the first.
+
+    Args:
+        path: The plan.
+        output: Folder of the fleet; nothing is written without one.
+        seed: Seed of everything random.
+        noise: Whether readings scatter.
+
+    Raises:
+        DescriptionError: The plan is missing or wrong, or fills several tables an inspection.
+        StoreError: The folder cannot be written.
+    """
+    plan = read_fleet_plan(path)
+    with jax.enable_x64(True):
+        inspections, truth = simulate_fleet(plan, seed, noise)
+    if output is not None:
+        write_fleet(plan, inspections, truth, output)
+    return inspections[0].dataset

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit.arguments import LARGEST_SEED, PATH, Output, Seed, read_first
+from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.questions import simulate as room
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
@@ -38,58 +40,18 @@ def simulate(
     Raises:
         BowdenfitError: What is wrong, in a sentence.
     """
-    import jax
-
-    from bowdenfit.errors import StoreError, UsageError
-
     if fleet and recordings:
         raise UsageError("--fleet and --recordings both say what to make; leave one of them out.")
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
-    if output is not None and Path(output).exists() and any(p.name != Path(bench).name for p in Path(output).iterdir()):
+    folder = None if output is None else Path(output)
+    if folder is not None and folder.exists() and any(p.name != Path(bench).name for p in folder.iterdir()):
         raise StoreError(f"{output} exists already; name another folder with --output, nothing was written.")
     if recordings:
-        return _simulate_recordings(Path(bench), output, seed, noise)
-    if fleet:
-        return _simulate_fleet(Path(bench), output, seed, noise)
-    from bowdenfit.questions.simulate.tables import read_bench, simulate_tables, write_tables
-
-    plan = read_bench(Path(bench))
-    with jax.enable_x64(True):
-        dataset, truth = simulate_tables(plan, jax.random.key(seed), noise)
-    if output is not None:
-        write_tables(plan, dataset, truth, Path(output), seed)
-    return dataset
-
-
-def _simulate_recordings(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
-    import jax
-
-    from bowdenfit.dataset import load_dataset
-    from bowdenfit.errors import UsageError
-    from bowdenfit.questions.simulate.recordings.making import make_recordings
-    from bowdenfit.questions.simulate.recordings.plan import read_recordings_plan
-    from bowdenfit.questions.simulate.recordings.writing import write_recordings
-
-    if output is None:
-        raise UsageError("simulated recordings are files; name a folder for them with output.")
-    plan = read_recordings_plan(bench)
-    with jax.enable_x64(True):
-        recording_set = make_recordings(plan, seed, noise)
-    write_recordings(recording_set, Path(output))
-    return load_dataset(Path(output))
-
-
-def _simulate_fleet(bench: Path, output: str | Path | None, seed: int, noise: bool) -> "Dataset":
-    import jax
-
-    from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
-
-    plan = read_fleet_plan(bench)
-    with jax.enable_x64(True):
-        inspections, truth = simulate_fleet(plan, seed, noise)
-    if output is not None:
-        write_fleet(plan, inspections, truth, Path(output))
-    return inspections[0].dataset
+        if folder is None:
+            raise UsageError("simulated recordings are files; name a folder for them with output.")
+        return room.make_recorded_data_set(Path(bench), folder, seed, noise)
+    make = room.make_fleet if fleet else room.make_data_set
+    return make(Path(bench), folder, seed, noise)
 
 
 def _reply(_: "Dataset", options: dict[str, Any]) -> Reply:

@@ -1,14 +1,59 @@
 """One recording of the bench: the true forces under a motion of the motor, and what the load cells make of them."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
+from scipy.signal import lfilter
 
+from bowdenfit.description import Finite, NonNegative, Positive
 from bowdenfit.errors import UsageError
-from bowdenfit.questions.simulate.bench.faults import LoadCellFaults, apply_faults
-from bowdenfit.questions.simulate.bench.mechanics import BenchFriction, BenchSettings, Mechanics
-from bowdenfit.questions.simulate.bench.profile import MotorProfile, plan_motion
+from bowdenfit.questions.simulate.bench.mechanics import (
+    BenchFriction,
+    BenchSettings,
+    Mechanics,
+    MotorProfile,
+    plan_motion,
+)
 from bowdenfit.types import Labels, Vector
+
+
+@dataclass(frozen=True)
+class LoadCellFaults:
+    """Faults of readings on their way from the rope to the file; nothing, unless said.
+
+    Args:
+        input_noise, output_noise: Standard deviation of a reading [N].
+        noise_cutoff: Corner frequency of a first-order low-pass that the noise went through [Hz]; None for white noise.
+            The standard deviation of a reading stays the same.
+        gain_error: Added to log(F_in/F_out): the output cell shows too little by this fraction [1].
+        input_offset, output_offset: Added to the forces [N].
+        delay: How much later the output channel shows what happened [s].
+        input_range, output_range: Lowest and highest force that the cells can show [N]; beyond, readings stay there.
+        bits: Readings are rounded to one of 2^bits forces evenly over the range.
+        dropouts: Gaps a minute in each channel [1/min].
+        dropout_length: Length of a gap [s].
+        dropout_kind: Whether samples are "missing" in a gap or "frozen" at the last reading.
+        spikes: Single wild readings a minute in each channel [1/min].
+        spike_size: How far off these are, up or down [N].
+    """
+
+    input_noise: NonNegative = 0.0
+    output_noise: NonNegative = 0.0
+    noise_cutoff: Positive | None = None
+    gain_error: Finite = 0.0
+    input_offset: Finite = 0.0
+    output_offset: Finite = 0.0
+    delay: Finite = 0.0
+    input_range: tuple[Finite, Finite] | None = None
+    output_range: tuple[Finite, Finite] | None = None
+    bits: Annotated[int, Field(ge=1, le=32)] | None = None
+    dropouts: NonNegative = 0.0
+    dropout_length: Positive = 0.1
+    dropout_kind: Literal["missing", "frozen"] = "missing"
+    spikes: NonNegative = 0.0
+    spike_size: NonNegative = 50.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +102,7 @@ def simulate_recording(
     generator: np.random.Generator,
     run_effect: float = 0.0,
 ) -> SimulatedRecording:
-    r"""One recording as a bench would give it, quasi-static.
+    r"""Simulate one recording as a bench would give it, quasi-static.
 
     The motor pulls the rope by q, the load's spring gives way by x >= 0: `F_in = K (q - x) + P`, `F_out = P + k x`.
     While the rope slides toward the motor `g(F_in) - g(F_out) = Lambda(v) + m`, while it slides back minus that, and in
@@ -124,3 +169,39 @@ def check_settings(profile: MotorProfile, faults: LoadCellFaults) -> None:
     for limits in (faults.input_range, faults.output_range):
         if limits is not None and not limits[0] < limits[1]:
             raise UsageError(f"the range [{limits[0]:g}, {limits[1]:g}] N is empty; write [lowest, highest].")
+
+
+def apply_faults(
+    force: Vector,
+    noise: float,
+    limits: tuple[float, float] | None,
+    faults: LoadCellFaults,
+    rate: float,
+    generator: np.random.Generator,
+) -> Vector:
+    """Return the readings of one cell: noise, spikes, the ends of its range, rounding, gaps."""
+    noise_generator, spike_generator, gap_generator = generator.spawn(3)
+    reading = force + noise * _unit_noise(len(force), faults.noise_cutoff, rate, noise_generator)
+    minutes = len(force) / rate / 60
+    spiked = spike_generator.integers(0, len(force), spike_generator.poisson(faults.spikes * minutes))
+    reading[spiked] += faults.spike_size * spike_generator.choice([-1.0, 1.0], len(spiked))
+    if limits is not None:
+        reading = np.clip(reading, *limits)
+        if faults.bits is not None:
+            step = (limits[1] - limits[0]) / (2**faults.bits - 1)
+            reading = limits[0] + step * np.round((reading - limits[0]) / step)
+    length = max(1, round(faults.dropout_length * rate))
+    for first in gap_generator.integers(0, len(force), gap_generator.poisson(faults.dropouts * minutes)):
+        reading[first : first + length] = np.nan if faults.dropout_kind == "missing" else reading[max(first - 1, 0)]
+    return reading
+
+
+def _unit_noise(n: int, cutoff: float | None, rate: float, generator: np.random.Generator) -> Vector:
+    """Return noise of standard deviation 1, white or after a first-order low-pass."""
+    white = generator.standard_normal(n)
+    if cutoff is None:
+        return white
+    memory = float(np.exp(-2 * np.pi * cutoff / rate))
+    drive = white * np.sqrt(1 - memory**2)
+    drive[0] = white[0]
+    return np.asarray(lfilter([1.0], [1.0, -memory], drive))

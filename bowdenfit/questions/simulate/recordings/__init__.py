@@ -1,1 +1,0 @@
-"""Recordings made from known truth: the plan (`bench.toml` with [recordings]), and the folder that comes of it."""

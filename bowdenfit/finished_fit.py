@@ -1,21 +1,23 @@
-"""`bf.Fit`: a finished fit as users hold it, with a method or attribute for every question."""
+"""`bf.Fit`: a finished fit as users hold it, with a method or attribute for every question, and the answers that it keeps."""
 
 from collections.abc import Callable
 from dataclasses import fields
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.display import Rows, text_of
+from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, checks_of
 from bowdenfit.questions.check.words import checks_page
-from bowdenfit.questions.figure_methods import FigureMethods
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_with_title, parse_page_width, warning_mark
 from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
 from bowdenfit.questions.identify.judgment import assess_identifiability
 from bowdenfit.questions.predict.predictions import predictions_text
-from bowdenfit.questions.stored_answers import collect_answers
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import posterior_intervals
 from bowdenfit.questions.summary.page import Summary, summarize
@@ -24,6 +26,14 @@ from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
 from bowdenfit.results.store import save
+from bowdenfit.words import listed
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
+import numpy as np
+
+from bowdenfit.questions.predict.lengths import predict_at_lengths
+from bowdenfit.results.serialization import serialize
 
 
 class Fit(Record):
@@ -52,7 +62,7 @@ class Fit(Record):
         save(self, self.summary(), Path(path), force, answers=collect_answers(self))
 
     @cached_property
-    def plot(self) -> FigureMethods:
+    def plot(self) -> "FigureMethods":
         """The figures, a method for each, such as `fit.plot.efficiency()`."""
         return FigureMethods(self)
 
@@ -103,6 +113,78 @@ def load(path: str | Path) -> Fit:
         StoreError: The folder is missing, unfinished or damaged.
     """
     return Fit.load(path)
+
+
+class FigureMethods:
+    """A method for each figure that a fit has something to show in, which gives the figure; `dir()` lists them.
+
+    Figures are matplotlib's; pyplot does not know them, so that they are shown once and go when nobody holds them.
+
+    Args:
+        fit: The fit.
+    """
+
+    def __init__(self, fit: Record) -> None:
+        self._fit = fit
+        self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
+
+    def __call__(self, name: str, width: NumberWithUnit | None = None) -> "Figure":
+        """Return one of the figures.
+
+        Args:
+            name: Which.
+            width: On which words stay as large as they are, such as (3.5, "in"); what suits the figure if omitted.
+
+        Raises:
+            UsageError: The fit has no such figure, and which it has; or none can be so wide.
+        """
+        if name not in FIGURES:
+            raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
+        if self._data_of(name) is None:
+            raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
+        mark = warning_mark(assess_fit(self._fit).troubles)
+        return draw_with_title(name, self._data_of(name), self._fit.name, parse_page_width(width), mark)
+
+    def __getattr__(self, name: str) -> "Callable[..., Figure]":
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name not in FIGURES:
+            raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
+        return partial(self, name)
+
+    def __dir__(self) -> list[str]:
+        return [name for name in FIGURES if self._data_of(name) is not None]
+
+    def __repr__(self) -> str:
+        return f"Figures of {self._fit.name}: {', '.join(f'plot.{name}()' for name in dir(self))}"
+
+    def _data_of(self, name: str) -> Any:
+        if name not in self._data:
+            self._data[name] = dict(collect_figure_data(self._fit, [name])).get(name)
+        return self._data[name]
+
+
+class NoSuchFigureError(UsageError, AttributeError):
+    """There is no figure of that name."""
+
+
+def collect_answers(fit: Record) -> dict[str, Any]:
+    """Return the answers that are kept in the results folder, as plain data by question.
+
+    They are what verbs are asked most, where that needs no further physics; what a fit cannot answer is not among them.
+
+    Args:
+        fit: The fit.
+    """
+    answers: dict[str, Any] = {"troubles": list(assess_fit(fit).troubles)}
+    if fit.sampled is not None:
+        answers["identify"] = serialize(vars(assess_identifiability(fit)))
+        if (route := fit.dataset.description.route) is not None:
+            answers["length"] = serialize(fit.optimal_length())
+            if route.choices:
+                rows = predict_at_lengths(fit, np.asarray(route.choices), None, "pull")
+                answers["predict"] = [[length, serialize(row)] for length, row in zip(route.choices, rows, strict=True)]
+    return answers
 
 
 _WORDS: dict[type, Callable[..., str]] = {

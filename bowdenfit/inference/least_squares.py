@@ -18,10 +18,9 @@ from jax import Array
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.departure import Departure, FarReading
 from bowdenfit.inference.disagreement import Disagreement, find_disagreements
 from bowdenfit.inference.interval import NORMAL_90
-from bowdenfit.inference.lack_of_fit import find_departures
+from bowdenfit.inference.lack_of_fit import Departure, FarReading, find_departures
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import PINS, LocalMinimum, find_lowest_minimum, find_rivals, range_of_minima
 from bowdenfit.inference.objective import Objective, Problem, Solution, noise_scales, sum_of_squares, total_squares

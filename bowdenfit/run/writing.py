@@ -8,12 +8,11 @@ from typing import Any
 import jax
 
 from bowdenfit.errors import DiskError, system_error
-from bowdenfit.finished_fit import Fit
+from bowdenfit.finished_fit import Fit, collect_answers
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
 from bowdenfit.questions.figures import collect_figure_data, titles_and_captions, warning_mark, write_figure_files
 from bowdenfit.questions.report.page import report_page
-from bowdenfit.questions.stored_answers import collect_answers
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit

@@ -15,8 +15,8 @@ from IPython.lib.pretty import pretty
 
 import bowdenfit as bf
 from bowdenfit.display import Display, as_html, shorten_lines
+from bowdenfit.finished_fit import FigureMethods
 from bowdenfit.questions.calibrate.answer import Calibration, CheckedQuantity, Coverage
-from bowdenfit.questions.figure_methods import FigureMethods
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
 from bowdenfit.results.record import Record
 from bowdenfit.verbs import VERBS

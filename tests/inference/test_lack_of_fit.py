@@ -16,7 +16,7 @@ from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
-from bowdenfit.inference.departure import FALSE_ALARM
+from bowdenfit.inference.lack_of_fit import FALSE_ALARM
 from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective

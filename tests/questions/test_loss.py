@@ -5,7 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.loss.answer import ContactShare, LossByContact, loss_by_contact, loss_text
+from bowdenfit.questions.loss import ContactShare, LossByContact, loss_by_contact, loss_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.1", "sampler.max_steps=1000")
 

@@ -8,7 +8,7 @@ import pytest
 from recorded_benches import RecordedBench, write
 
 import bowdenfit as bf
-from bowdenfit.inference.departure import FALSE_ALARM, NOTICEABLE_SHIFT
+from bowdenfit.inference.lack_of_fit import FALSE_ALARM, NOTICEABLE_SHIFT
 from bowdenfit.kinds.sliding_rows import ZERO
 
 pytestmark = pytest.mark.extended

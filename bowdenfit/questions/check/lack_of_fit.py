@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import BY_GROUP
-from bowdenfit.inference.departure import FALSE_ALARM, Departure
+from bowdenfit.inference.lack_of_fit import FALSE_ALARM, Departure
 from bowdenfit.kinds import reading_called, readings_called
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE

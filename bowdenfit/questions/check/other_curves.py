@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.departure import FALSE_ALARM
+from bowdenfit.inference.lack_of_fit import FALSE_ALARM
 from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective

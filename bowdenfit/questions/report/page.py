@@ -18,7 +18,7 @@ from bowdenfit.questions.figures import (
     write_figure_files,
 )
 from bowdenfit.questions.length.efficiency_chart import efficiency_chart
-from bowdenfit.questions.loss.answer import loss_section
+from bowdenfit.questions.loss import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import ranking_section

@@ -11,7 +11,7 @@ from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.groups import contrast_groups
-from bowdenfit.questions.loss.answer import loss_by_contact
+from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.summary.sampled_quantities import BETWEEN_MOUNTINGS

@@ -17,7 +17,7 @@ from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
-from bowdenfit.questions.loss.answer import loss_text
+from bowdenfit.questions.loss import loss_text
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
 from bowdenfit.questions.recorded.stick_slip import stick_slip

@@ -17,7 +17,7 @@ from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
-from bowdenfit.questions.loss.answer import loss_by_contact
+from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.lost_force import lost_force
 from bowdenfit.questions.recorded.rate import rate_effect
 from bowdenfit.questions.recorded.stick_slip import stick_slip

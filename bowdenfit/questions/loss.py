@@ -1,4 +1,4 @@
-"""Which contact takes how much of what a cable loses: where to work on it."""
+"""Loss by contact: which contact takes how much of what a cable loses, in words and as a section of the report."""
 
 import textwrap
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from bowdenfit.questions.recorded.rate import usual_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent, table
 
-_LONGEST_NAME = 40  # characters of a contact's name in a sentence
-_FEW = 3  # contacts after the first that a sentence names
-
-
+_LONGEST_NAME = 40  # characters of a contact's name in a sentence; a judgement
+_FEW = 3  # contacts after the first that a sentence names; a judgement
 HEADS = ("contact", "share", "90 % interval", "probability of the largest")
+
+
 @dataclass(frozen=True)
 class ContactShare:
-    """One contact.
+    """Share of one contact in the loss.
 
     Args:
         contact: Its name.
@@ -57,7 +57,7 @@ class LossByContact:
     JSON: ClassVar = (("at", "position"), "contacts", ("in_words", "sentence"))
 
     def sentence(self) -> str:
-        """'72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at the squeezed sheath, ...'"""
+        """Return the shares in words: "72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at ..."."""
         largest, *others = self.contacts
         low, high = (percent(end, 0) for end in (largest.share.q05, largest.share.q95))
         remaining = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
@@ -72,7 +72,7 @@ class LossByContact:
 
 @cached_per_fit
 def loss_by_contact(fit: Record) -> LossByContact | None:
-    r"""Share of each contact in the friction exponent, at the best length if there is one; None without draws or contacts.
+    r"""Return the share of each contact in the friction exponent, at the best length if any; None without draws or contacts.
 
     .. math:: \frac{\mu_k \theta_k}{\sum_j \mu_j \theta_j}
 
@@ -89,7 +89,7 @@ def loss_by_contact(fit: Record) -> LossByContact | None:
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
         route_value, position = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"
-    shares = _contact_shares(fit, route_value)
+    shares = _compute_shares(fit, route_value)
     largest = np.argmax(shares, axis=1)
     contacts = [
         ContactShare(law.contact, Interval.of(shares[:, k]), float(np.mean(largest == k))) for k, law in enumerate(laws)
@@ -97,8 +97,8 @@ def loss_by_contact(fit: Record) -> LossByContact | None:
     return LossByContact(position, tuple(sorted(contacts, key=lambda c: -c.share.median)))
 
 
-def _contact_shares(fit: Record, at: float) -> np.ndarray:
-    """Share of each contact (columns) in each draw (rows) at a value of the route variable."""
+def _compute_shares(fit: Record, at: float) -> np.ndarray:
+    """Return the share of each contact (columns) in each draw (rows) at a value of the route variable."""
     cable = fit.model.cable
 
     def exponents(values: dict[str, Array], route: Float[Array, " one"]) -> Array:
@@ -112,18 +112,18 @@ def _contact_shares(fit: Record, at: float) -> np.ndarray:
 
 
 def loss_text(fit: Record) -> str:
-    """A table of the contacts' shares; empty for one contact, or without draws."""
+    """Return a table of the contacts' shares; empty for one contact, or without draws."""
     loss = loss_by_contact(fit)
     return f"{loss_heading(loss)}\n{table(HEADS, loss_rows(loss))}" if loss is not None else ""
 
 
 def loss_heading(loss: LossByContact) -> str:
-    """What is said of which place."""
+    """Return the heading of the table, with the place on the route."""
     return "Where the force is lost" + (f", {loss.position}" if loss.position else "")
 
 
 def loss_rows(loss: LossByContact) -> list[tuple[str, ...]]:
-    """A row for each contact, under `HEADS`."""
+    """Return a row for each contact, under `HEADS`."""
     rows = list[tuple[str, ...]]()
     for contact in loss.contacts:
         interval = f"{percent(contact.share.q05)} to {percent(contact.share.q95)}"
@@ -132,7 +132,7 @@ def loss_rows(loss: LossByContact) -> list[tuple[str, ...]]:
 
 
 def loss_section(fit: Record) -> PageSection | None:
-    """The share of each contact; None for one contact, or without draws."""
+    """Return the share of each contact as a section; None for one contact, or without draws."""
     loss = loss_by_contact(fit)
     if loss is None:
         return None

@@ -1,1 +1,0 @@
-"""Where a cable loses its force: the share of each contact."""

@@ -19,20 +19,20 @@ class AnswerFigure(Protocol):
     HEADING: str
 
     def draw(self, answer: Any, /) -> "Figure":
-        """The figure."""
+        """Return the figure."""
 
     def caption(self, answer: Any, /) -> str:
-        """What is drawn, in plain words."""
+        """Say what is drawn, in plain words."""
 
 
 def add_cable_name(heading: str, cable: str) -> str:
-    """A heading with the name of the cable, where it is known."""
+    """Return a heading with the name of the cable, where it is known."""
     return f"{heading} \N{EN DASH} {cable}" if cable else heading
 
 
 @in_paper_style
 def draw_answer_figure(figure: AnswerFigure, answer: Any, cable: str) -> "Figure":
-    """The figure of an answer under its title.
+    """Draw the figure of an answer under its title.
 
     Args:
         figure: Its file.
@@ -48,7 +48,7 @@ def write_figure(figure: AnswerFigure, answer: Any, folder: Path, name: str, cab
     """Write the figure of an answer in every format, and its caption beside it.
 
     Args:
-        figure, answer, cable: See `answer_figure`.
+        figure, answer, cable: See `draw_answer_figure`.
         folder: Where to; made if it is missing.
         name: Of the files.
     """

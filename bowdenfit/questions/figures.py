@@ -73,12 +73,12 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
-NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure
+NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure; a judgement
 
 
 def collect_figure_data(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
-    """Name and data of each figure that a fit has something to show in, or of some of them."""
-    import jax
+    """Yield name and data of each figure that a fit has something to show in, or of some of them."""
+    import jax  # here alone, because drawing loads no JAX
 
     for name in names or FIGURES:
         with jax.enable_x64(True):
@@ -88,7 +88,7 @@ def collect_figure_data(fit: "Record", names: Collection[str] = ()) -> Iterator[
 
 
 def read_figure_data(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Data of the figures that a fit was drawn with, or of some of them; empty where they are not kept.
+    """Read the data of the figures that a fit was drawn with, or of some of them; empty where they are not kept.
 
     Args:
         folder: Its results folder.
@@ -103,20 +103,20 @@ def read_figure_data(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
 
 
 def figure_data_types(names: Iterable[str]) -> dict[str, Any]:
-    """Annotated type of the data of some figures, by their names."""
+    """Return the annotated type of the data of some figures, by their names."""
     return {name: get_type_hints(FIGURES[name].data, localns={"Record": object})["return"] for name in names}
 
 
 @in_paper_style
 def draw_with_title(name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "") -> "Figure":
-    """A figure under its title; loads matplotlib, and no model.
+    """Draw a figure under its title; loads matplotlib, and no model.
 
     Args:
         name: Which of `FIGURES`.
         data: What it shows.
         cable: Name of the cable, for the title.
         width: Of the page [in], on which words stay as large as they are; what suits the figure if omitted.
-        mark: See `mark_of`.
+        mark: See `warning_mark`.
     """
     figure: Figure = FIGURES[name].draw(data, width)
     title_above(figure, figure_title(name, cable), mark)
@@ -124,7 +124,7 @@ def draw_with_title(name: str, data: Any, cable: str = "", width: float | None =
 
 
 def warning_mark(troubles: Iterable[str]) -> str:
-    """What stands on every figure of a fit that is not to be trusted; empty of one that is.
+    """Return what stands on every figure of a fit that is not to be trusted; empty of one that is.
 
     Args:
         troubles: Kinds of what is wrong, see `verdict`.
@@ -134,7 +134,7 @@ def warning_mark(troubles: Iterable[str]) -> str:
 
 
 def parse_page_width(width: NumberWithUnit | None) -> float | None:
-    """Width of the page [in]; None for what suits each figure.
+    """Return the width of the page [in]; None for what suits each figure.
 
     Args:
         width: As stated, with its unit.
@@ -145,7 +145,7 @@ def parse_page_width(width: NumberWithUnit | None) -> float | None:
     if width is None:
         return None
 
-    from bowdenfit.units import conversion_factor  # which loads pint
+    from bowdenfit.units import conversion_factor  # here alone, because figures are drawn without pydantic
 
     value, unit = width
     inches = round(value * conversion_factor(unit, "length") / conversion_factor("in", "length"), 9)
@@ -158,12 +158,12 @@ def parse_page_width(width: NumberWithUnit | None) -> float | None:
 
 
 def figure_title(name: str, cable: str) -> str:
-    """Heading of a figure with the name of the cable."""
+    """Return the heading of a figure with the name of the cable."""
     return add_cable_name(FIGURES[name].HEADING, cable)
 
 
 def figure_caption(name: str, data: Any) -> str:
-    """What a figure shows, in plain words: what is drawn, what the bands are, of how many."""
+    """Say what a figure shows, in plain words: what is drawn, what the bands are, of how many."""
     text: str = FIGURES[name].caption(data)
     return text
 
@@ -184,19 +184,19 @@ def write_figure_files(
         data: What it shows.
         folder: Where the files go; made if it is missing.
         formats: Endings; the figure is written in every one.
-        cable, width, mark: See `figure_of`.
+        cable, width, mark: See `draw_with_title`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     return write_all(draw_with_title(name, data, cable, width, mark), folder, name, formats)
 
 
 def titles_and_captions(data: Mapping[str, Any], cable: str, mark: str) -> dict[str, str]:
-    """Title and caption of each figure, by name.
+    """Return title and caption of each figure, by name.
 
     Args:
         data: Data of the figures, by name.
         cable: Name of the cable.
-        mark: See `mark_of`.
+        mark: See `warning_mark`.
     """
     titles = {name: f"{figure_title(name, cable)}. {mark}".rstrip() for name in FIGURES if name in data}
     return {name: f"{title} {figure_caption(name, data[name])}" for name, title in titles.items()}

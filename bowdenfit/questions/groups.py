@@ -13,7 +13,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import decimals, filled, listed
 
-_ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with the first
+_ALL_PAIRS = 4  # groups, of which each is compared with each; of more, all with the first; a judgement
 _SURE = 0.999  # beyond which draws are too few to say more
 
 
@@ -37,7 +37,7 @@ class Contrast(Display):
     JSON: ClassVar = (..., ("in_words", "sentence"))
 
     def sentence(self) -> str:
-        """'new less old: -0.140, 90 % interval -0.160 to -0.120, different (lower) with probability 0.99'"""
+        """Return the contrast in words: "new less old: -0.140, 90 % interval -0.160 to -0.120, different (lower) with ..."."""
         difference, direction = self.difference, "lower" if self.difference.median < 0 else "higher"
         value, low, high = (
             f"{v:z.{decimals(difference.sd)}f}" for v in (difference.median, difference.q05, difference.q95)
@@ -76,7 +76,7 @@ class Groups(Display):
     contrasts: tuple[Contrast, ...]
 
     def sentences(self) -> list[str]:
-        """The contrasts."""
+        """Return the contrasts in words."""
         return [f"Friction {c.coefficient}, {c.sentence()}." for c in self.contrasts]
 
     def _table(self) -> Rows:

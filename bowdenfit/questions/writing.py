@@ -29,7 +29,7 @@ class Files(Display, list[Path]):
 
 
 def answer_files(folder: str | Path, name: str) -> list[Path]:
-    """The files of an answer.
+    """Return the files of an answer.
 
     Args:
         folder: Where they are.
@@ -39,7 +39,7 @@ def answer_files(folder: str | Path, name: str) -> list[Path]:
 
 
 def answer_figures(folder: str | Path, name: str) -> list[Path]:
-    """The figure of an answer in every format.
+    """Return the figure of an answer in every format.
 
     Args:
         folder: Where they are.

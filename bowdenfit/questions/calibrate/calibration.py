@@ -126,7 +126,7 @@ def open_calibration(
 
 
 def _fingerprint(plan: CalibrationPlan, assumptions: Sequence[str]) -> dict[str, Any]:
-    """What must not change between an interrupted calibration and its continuation."""
+    """Return what must not change between an interrupted calibration and its continuation."""
     page = {
         "description": plan.stated.description.to_json(),
         "sha256": plan.stated.sha256,

@@ -19,7 +19,7 @@ _MARK = 0.2  # in, from a name to the panel and to the edge of the page
 
 
 def caption(calibration: Calibration) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     return (
         "Dots: share of the 50 % and 90 % intervals of each quantity that held the true value; gray: the range that "
         "chance allows for all of "
@@ -29,7 +29,7 @@ def caption(calibration: Calibration) -> str:
 
 @in_paper_style
 def draw(calibration: Calibration) -> Figure:
-    """The share of the 50 and 90 % intervals of each quantity that hold the truth, and what chance allows."""
+    """Draw the share of the 50 and 90 % intervals of each quantity that hold the truth, and what chance allows."""
     figure, flat = quantity_panels(calibration, 2)
     for k, axes in enumerate(flat):
         for i, q in enumerate(calibration.quantities):
@@ -52,7 +52,7 @@ def draw(calibration: Calibration) -> Figure:
 
 
 def quantity_panels(calibration: Calibration, columns: int) -> tuple[Figure, list[Axes]]:
-    """Panels side by side with one row for each quantity, the first on top."""
+    """Return panels side by side with one row for each quantity, the first on top."""
     names = [wrap_words(q.symbol, _LONGEST, most=1) for q in calibration.quantities]
     figure, flat = panels([0.3 + _ROW * len(names)], columns, 0.1, (0.35, 0.3), sharey=True)
     for axes in flat:

@@ -23,7 +23,7 @@ _BAND = 0.99
 
 
 def caption(calibration: Calibration) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     return (
         "Line: share of the true values at or below each rank, minus that of uniform ranks; gray: what chance "
         "leaves in 99 % of calibrations. A hump followed by a dip means that intervals are too narrow, a dip then a hump that "
@@ -35,7 +35,7 @@ def caption(calibration: Calibration) -> str:
 
 @in_paper_style
 def draw(calibration: Calibration) -> Figure:
-    """Distribution function of the ranks less that of uniform ones, with the band that holds uniform ones in 99 %."""
+    """Draw the distribution function of the ranks less that of uniform ones, with the band that holds uniform ones in 99 %."""
     n = len(calibration.quantities)
     rows, columns = -(-n // _COLUMNS), min(_COLUMNS, n)
     figure, flat = panels([1.15] * rows, columns, TITLE, (_APART, 0.5), sharex=True)

@@ -182,7 +182,7 @@ def _is_valid(replication: Replication) -> bool:
 
 
 def _read_lines(path: Path) -> list[dict[str, Any]]:
-    """The whole lines of a file of replications, the fingerprint first."""
+    """Return the whole lines of a file of replications, the fingerprint first."""
     if not path.exists():
         raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
     text = read_text(path)

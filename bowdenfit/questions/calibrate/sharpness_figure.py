@@ -17,7 +17,7 @@ HEADING = "Bias, and how much the measurements narrow the prior"
 
 
 def caption(calibration: Calibration) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     return (
         "Left: estimate minus true value, in standard deviations of the estimate, with three standard errors. Right: "
         "how much of the "
@@ -28,7 +28,7 @@ def caption(calibration: Calibration) -> str:
 
 @in_paper_style
 def draw(calibration: Calibration) -> Figure:
-    """Bias of the posterior mean, and how far the data narrow the prior."""
+    """Draw bias of the posterior mean, and how far the data narrow the prior."""
     figure, (left, right) = quantity_panels(calibration, 2)
     for i, q in enumerate(calibration.quantities):
         left.errorbar(q.bias, i, xerr=3 * q.bias_error, fmt="o", color=BLUE, lw=1.2, label="Mean, 3 standard errors")

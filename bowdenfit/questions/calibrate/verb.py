@@ -90,7 +90,7 @@ def calibrate(
 def _read_stated_and_assumed(
     dataset: "str | Path | Dataset", reading: Reading, assume: Sequence[str]
 ) -> "tuple[Dataset, Dataset]":
-    """The data set as it is described, which is simulated, and as the fits take it to be."""
+    """Read the data set as it is described, which is simulated, and as the fits take it to be."""
     stated = read(dataset, **reading)
     if not assume:
         return stated, stated

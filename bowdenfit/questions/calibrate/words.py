@@ -128,7 +128,7 @@ def verdict_sentences(calibration: Calibration) -> list[str]:
 
 
 def _power_sentence(calibration: Calibration) -> str:
-    """What so many replications can see."""
+    """Say what so many replications can see."""
     seen = listed(
         [f"too small by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in calibration.power]
     )

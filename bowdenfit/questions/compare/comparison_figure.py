@@ -42,7 +42,7 @@ HEADING = "Fits side by side"
 
 
 def caption(comparison: Comparison) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     return (
         "Above: by how much each fit predicts worse than the best, with one and two standard errors. Middle: the same reading "
         "by reading, up where a fit predicts it better than the best one does. Below: coefficients of each fit, median and "
@@ -53,7 +53,7 @@ def caption(comparison: Comparison) -> str:
 
 @in_paper_style
 def draw(comparison: Comparison) -> Figure:
-    """Differences of the score with standard errors, their contributions by reading, and parameters side by side."""
+    """Draw differences of the score with standard errors, their contributions by reading, and parameters side by side."""
     cells = _parameter_cells(comparison)
     names = [shorten_name(name, MAX_NAME_LENGTH) for name in comparison.differences]
     left = max(0.66, 0.2 + _CHARACTER * max(map(len, names)))
@@ -78,7 +78,7 @@ def draw(comparison: Comparison) -> Figure:
 
 
 def _label_room(comparison: Comparison) -> float:
-    """Room below the panel of readings [in]."""
+    """Return the room below the panel of readings [in]."""
     if len(comparison.readings) > MAX_LABELED:
         return _BELOW + 0.1
     return 0.25 + 0.045 * max(len(_plain(label)) for _, label in comparison.readings)
@@ -89,7 +89,7 @@ def _plain(label: str) -> str:
 
 
 def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns: int, height: float) -> Axes:
-    """The panel of a parameter."""
+    """Return the panel of a parameter."""
     width = (WIDE - left - _RIGHT - 0.22 * (columns - 1)) / columns
     row = i // columns
     bottom = sum(parts[6 + 2 * row + 1 :])
@@ -97,7 +97,7 @@ def _cell_axes(figure: Figure, left: float, parts: list[float], i: int, columns:
 
 
 def _parameter_cells(comparison: Comparison) -> list[tuple[str, dict[str, Interval]]]:
-    """What is shown of each fit: label of the axis, and intervals by fit."""
+    """Return what is shown of each fit: label of the axis, and intervals by fit."""
     cells = [(axis_label(row.symbol, row.unit), row.by_fit) for row in comparison.parameters.values()]
     lengths = {name: interval for name, (interval, _) in comparison.optimal_length.items()}
     if lengths:
@@ -107,7 +107,7 @@ def _parameter_cells(comparison: Comparison) -> list[tuple[str, dict[str, Interv
 
 
 def _draw_differences(axes: Axes, comparison: Comparison, names: list[str]) -> None:
-    """Difference to the best with one and two standard errors."""
+    """Draw the difference to the best with one and two standard errors."""
     for i, (name, difference) in enumerate(comparison.differences.items()):
         color, marker = SERIES_COLORS[i % len(SERIES_COLORS)], SERIES_MARKERS[i % len(SERIES_MARKERS)]
         error = difference.standard_error
@@ -124,7 +124,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, names: list[str]) -> N
 
 
 def _draw_by_reading(axes: Axes, comparison: Comparison, names: list[str]) -> None:
-    """What each reading adds to the difference."""
+    """Draw what each reading adds to the difference."""
     x = np.arange(len(comparison.readings))
     others = list(comparison.differences)[1:]
     width = 0.8 / len(others)
@@ -147,7 +147,7 @@ def _draw_by_reading(axes: Axes, comparison: Comparison, names: list[str]) -> No
 
 
 def _mark_tables(axes: Axes, comparison: Comparison) -> None:
-    """Every other table on gray, its name above."""
+    """Mark every other table on gray, its name above."""
     start = 0
     for number, (table, group) in enumerate(groupby(name for name, _ in comparison.readings)):
         n = len(list(group))
@@ -165,7 +165,7 @@ def _mark_tables(axes: Axes, comparison: Comparison) -> None:
 def _draw_parameter(
     axes: Axes, cell: tuple[str, dict[str, Interval]], names: list[str], fits: list[str], named: bool
 ) -> None:
-    """Median and interval of one parameter in each fit that has it."""
+    """Draw median and interval of one parameter in each fit that has it."""
     label, by_fit = cell
     for i, name in enumerate(fits):
         if name in by_fit:

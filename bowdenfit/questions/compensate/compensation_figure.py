@@ -20,7 +20,7 @@ _TORQUE = "Torque (N m)"
 
 
 def caption(answer: Compensation) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     fed = (
         " Dashed and dotted: what a controller may feed forward without the device moving by itself."
         if answer.fixed
@@ -35,7 +35,7 @@ def caption(answer: Compensation) -> str:
 
 @in_paper_style
 def draw(answer: Compensation) -> Figure:
-    """Friction with what may be fed forward, and the preload."""
+    """Draw friction with what may be fed forward, and the preload."""
     figure, (friction, preload) = panels([_HEIGHT], 2, TITLE, (0.75, 0))
     _draw_friction(friction, answer)
     _draw_preload(preload, answer)

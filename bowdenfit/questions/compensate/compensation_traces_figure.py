@@ -20,7 +20,7 @@ _TORQUE = "Torque (N m)"
 
 
 def caption(answer: Compensation) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     n = len(answer.simulated.laws) if answer.simulated is not None else 0
     return (
         "Simulated torques at the motor and at the joint while a hand moves the device to and fro, a panel for each way of "
@@ -30,7 +30,7 @@ def caption(answer: Compensation) -> str:
 
 @in_paper_style
 def draw(answer: Compensation) -> Figure:
-    """Torques at motor and joint while a hand moves the device to and fro, a panel a law."""
+    """Draw torques at motor and joint while a hand moves the device to and fro, a panel a law."""
     simulation = answer.simulated
     assert simulation is not None  # asked only of a simulation
     figure, axes_by_law = panels([_HEIGHT], len(simulation.laws), TITLE, (0.25, 0), sharey=True)

@@ -28,11 +28,19 @@ from bowdenfit.questions.compensate.answer import (
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 
+# Shares of the cable's own preload that are looked at; a judgement.
+PRELOAD_RATIOS = np.array([0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])
 _PLANT = ("motor.inertia", "motor.damping", "joint.inertia", "joint.damping", "rope.damping", "controller.sample_time")
 NEEDED = (*_PLANT, "motor.friction")
+STABILIZING = (
+    "motor.friction",
+    "motor.damping",
+    "joint.damping",
+)  # which make feeding forward safer; nothing where not stated
+DEAD_ZONE, FILTER = "controller.dead_zone", "controller.filter_time"
 INTEGRAL = "controller.integral_gain"
 HAND = ("hand.inertia", "hand.damping", "hand.stiffness")
-_DRAWS, _BENDS = 300, 3  # draws, and bends among them
+_DRAWS, _BENDS = 300, 3  # draws, and bends among them; so many that a 5 % quantile has 15 draws below it
 _NAMES = {
     "motor.inertia": "the inertia of the motor",
     "motor.damping": "the damping of the motor",
@@ -42,7 +50,7 @@ _NAMES = {
     "controller.sample_time": "the sampling time",
     "stiffness": "the stiffness of the cable",
 }
-_DEFAULT_RISK = (5.0, "%")  # of moving by itself, the accepted probability if none is given
+_DEFAULT_RISK = (5.0, "%")  # of moving by itself, the accepted probability if none is given; a judgement
 
 
 def parse_risk(risk: tuple[float, str] | None) -> float:
@@ -139,15 +147,6 @@ def _squared_rank_correlation(values: np.ndarray, gain: np.ndarray) -> float:
     return float(np.corrcoef(first, second)[0, 1] ** 2)
 
 
-PRELOAD_RATIOS = np.array([0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])  # shares of the cable's own
-STABILIZING = (
-    "motor.friction",
-    "motor.damping",
-    "joint.damping",
-)  # which make feeding forward safer; nothing where not stated
-DEAD_ZONE, FILTER = "controller.dead_zone", "controller.filter_time"
-
-
 def estimate_compensation(
     fit: Record, device: Device | None, stated: str | tuple[tuple[float, str], tuple[float, str]] | None, law: str | None,
     risk: float,
@@ -180,11 +179,11 @@ def estimate_compensation(
         for torque in (np.full_like(nominal, constant), share * nominal)
     )
     gain, missing = (
-        (None, []) if law == "karnopp" else _gain_or_missing(fit, device, loop, friction[:, np.argmax(nominal)], risk)
+        (None, []) if law == "karnopp" else _try_feedback_gain(fit, device, loop, friction[:, np.argmax(nominal)], risk)
     )
     answer = Compensation(
         fit.name, device.name if device is not None else "", law, (float(np.rad2deg(bends[0])), float(np.rad2deg(bends[-1]))),
-        risk, len(friction), loop.scatter, loop.scatter_from_fit, dead_zone, _chatters_below(device, known),
+        risk, len(friction), loop.scatter, loop.scatter_from_fit, dead_zone, _compute_chatter_speed(device, known),
         fixed if law != "active" else None, scheduled if law != "active" else None,
         largest_safe_share(without_mounting + damping[:, None], np.median(without_mounting, axis=0), risk),
         tuple(_summarize_bend(bends[i], friction[:, i], share * nominal[i], constant) for i in range(len(bends))),
@@ -209,14 +208,14 @@ def _draw_stabilizing(known: Mapping[str, Known], n: int, seed: int) -> tuple[np
     )
 
 
-def _chatters_below(device: Device | None, known: Mapping[str, Known]) -> float | None:
+def _compute_chatter_speed(device: Device | None, known: Mapping[str, Known]) -> float | None:
     """Return one count of the encoder per time constant of the filter [rad/s], where both are stated."""
     if device is None or device.controller.encoder_counts is None or FILTER not in known:
         return None
     return device.count / known[FILTER].value
 
 
-def _gain_or_missing(
+def _try_feedback_gain(
     fit: Record, device: Device | None, loop: LoopDraws, friction: np.ndarray, risk: float
 ) -> tuple[FeedbackGain | None, list[str]]:
     """Return the feedback gain, or the keys that are missing for it."""

@@ -35,13 +35,18 @@ from bowdenfit.questions.compensate.answer import (
 from bowdenfit.questions.compensate.limits import HAND, INTEGRAL, NEEDED, estimate_compensation, parse_risk
 from bowdenfit.results.record import Record
 
+# The simulated movement and push: a scenario; judgements.
 AMPLITUDE = 0.5  # of the hand's path [rad]
-_PERIOD, _SECONDS, _SINCE = 1.25, 2.5, 0.625  # of the movement to and fro [s]
+_PERIOD, _SECONDS, _SINCE = 1.25, 2.5, 0.625  # s: period and length of the movement to and fro, and since when it counts
 _SPEED_FACTOR = 2.0  # times the dead zone, which a push and the movement reach at least
-_PUSH = 3.0  # s
+_PUSH = 3.0  # s, from a push to when the device should rest
 _LAST_SAMPLES = 50  # samples at the end of a push, which tell whether it goes on
 _TRACE_STEP = 4  # every so many samples are kept of a trace
 _LEAST_SPEED = 0.05  # rad/s, where there is no dead zone
+_LEAST_PRELOAD = 1e-6  # N m, of a loop that bending has made slack
+DRAWS = 400  # devices that are simulated; a probability of 5 % is then known to 1 %
+ACTIVE_ZONE = "controller.active_zone"
+SIMULATION_KEYS = ("motor.largest_torque", "controller.filter_time", "controller.dead_zone", "controller.torque_noise")
 
 
 @dataclass(frozen=True)
@@ -98,11 +103,11 @@ def simulate_hand_motion(devices: SimulatedDevices, middle: int) -> tuple[tuple[
         torque = measure_transmitted_torque(
             runs, max(float(devices.control.dead_zone), _LEAST_SPEED), start=_SINCE * period / _PERIOD
         )
-        results.append(SimulatedLaw(name, Interval.of(torque.mean), Interval.of(torque.peak), _trace(runs, middle)))
+        results.append(SimulatedLaw(name, Interval.of(torque.mean), Interval.of(torque.peak), _pick_trace(runs, middle)))
     return tuple(results), 2 * np.pi * AMPLITUDE / period
 
 
-def _trace(runs: DeviceRuns, middle: int) -> TorqueTrace:
+def _pick_trace(runs: DeviceRuns, middle: int) -> TorqueTrace:
     return TorqueTrace(
         runs.time[::_TRACE_STEP],
         runs.motor_torque[::_TRACE_STEP, middle].copy(),
@@ -127,12 +132,6 @@ def find_runaways(plant: Plant, control: Controller, sample: float) -> np.ndarra
     runs = simulate_device(plant, control, Hand(0.0, 0.0), path, start=start, sample=sample)
     still_moving: np.ndarray = np.abs(runs.speed[-_LAST_SAMPLES:]).max(axis=0) > zone / 2
     return still_moving
-
-
-DRAWS = 400
-ACTIVE_ZONE = "controller.active_zone"
-SIMULATION_KEYS = ("motor.largest_torque", "controller.filter_time", "controller.dead_zone", "controller.torque_noise")
-_LEAST_PRELOAD = 1e-6  # N m, of a loop that bending has made slack
 
 
 def simulate_devices(

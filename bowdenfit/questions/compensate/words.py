@@ -14,15 +14,15 @@ from bowdenfit.questions.compensate.answer import (
 )
 from bowdenfit.words import decimals, filled, listed, percent, table
 
-_ROWS = 3  # of the bends in the table
+_ROWS = 3  # of the bends in the table; a judgement
 _LAWS = {NONE: "with nothing hidden", KARNOPP: "when it is fed forward", ACTIVE: "when it is fed back"}
-_WORTHWHILE = 1.2  # times better, from which on a schedule is worth its trouble
-_LIKELY_SLACK = 0.005
+_WORTHWHILE = 1.2  # times better, from which on a schedule is worth its trouble; a judgement
+_LIKELY_SLACK = 0.005  # probability that rounds to 1 %
 
 
 @text_of.register(Compensation)
 def compensation_text(answer: Compensation) -> str:
-    """The answer for people, the answer first, in at most 25 lines."""
+    """Return the answer for people, the answer first, in at most 25 lines."""
     blocks = ["\n".join(filled(line) for line in sentences(answer)), _bend_table(answer)]
     if answer.simulated is not None:
         blocks.append("\n".join(filled(line) for line in _simulation_sentences(answer)))
@@ -30,11 +30,11 @@ def compensation_text(answer: Compensation) -> str:
 
 
 def sentences(answer: Compensation) -> list[str]:
-    """What to do, what is left, what it rests on, and what would be needed to say more."""
+    """Say what to do, what is left, what it rests on, and what would be needed to say more."""
     every = [
         *_feed_forward_sentences(answer),
         *_feedback_sentences(answer),
-        *_cautions(answer),
+        *_caution_sentences(answer),
         _preload_sentence(answer),
         *_missing_sentences(answer),
     ]
@@ -42,7 +42,7 @@ def sentences(answer: Compensation) -> list[str]:
 
 
 def format_torque(value: float) -> str:
-    """'0.216 N*m'"""
+    """Return a torque with its unit, as '0.216 N*m'."""
     return f"{value:.{max(decimals(abs(value)) + 1, 3) if abs(value) >= 1e-3 else 4}f} N*m"
 
 
@@ -77,7 +77,7 @@ def _feed_forward_sentences(answer: Compensation) -> Iterator[str]:
 
 
 def _mounting_sentence(answer: Compensation, scheduled: FeedForward) -> str:
-    """What the scatter from mounting to mounting costs."""
+    """Say what the scatter from mounting to mounting costs."""
     source = "measured" if answer.scatter_from_fit else "stated, not measured"
     if answer.scatter == 0:
         seem = "so this holds for this mounting alone, and the next one may move by itself"
@@ -95,7 +95,7 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
     if gain.safe <= 0:
         yield (
             "No gain on the measured torque is safe: some devices that fit what is known oscillate with the least of them. "
-            f"What decides is {gain.decided_by}; {_describe_remedy(gain)}, and damp the rope{_or_integrate_less(gain)}."
+            f"What decides is {gain.decided_by}; {_describe_remedy(gain)}, and damp the rope{_describe_integral_remedy(gain)}."
         )
         return
     most = "10000 or more" if gain.safe >= 9999 else f"at most {gain.safe:.2g}"
@@ -119,18 +119,18 @@ def _passivity_sentence(gain: FeedbackGain) -> str:
     return f"Up to {gain.passive:.2g} no hand can make it oscillate."
 
 
-def _or_integrate_less(gain: FeedbackGain) -> str:
+def _describe_integral_remedy(gain: FeedbackGain) -> str:
     return f", or integrate less than {gain.integral:.3g} 1/s" if gain.integral else ""
 
 
 def _describe_remedy(gain: FeedbackGain) -> str:
-    """What to do about the input that decides."""
+    """Say what to do about the input that decides."""
     if gain.decided_by != ROPE_DAMPING:
         return "measure it"
     return "which was measured by a ring-down; measure more of them" if gain.from_ring_down else "measure it by a ring-down"
 
 
-def _cautions(answer: Compensation) -> Iterator[str]:
+def _caution_sentences(answer: Compensation) -> Iterator[str]:
     if (
         answer.fixed is not None
         and answer.dead_zone > 0
@@ -149,11 +149,11 @@ def _cautions(answer: Compensation) -> Iterator[str]:
 
 
 def _preload_sentence(answer: Compensation) -> str:
-    """What less preload would give, and cost."""
+    """Say what less preload would give, and cost."""
     taut = [row for row in answer.preloads if row.slack_from.q05 > 0]
     if not taut or answer.slack > _LIKELY_SLACK:
         return ""
-    least, own = taut[0], min(answer.preloads, key=lambda row: abs(row.preload - _actual_preload(answer)))
+    least, own = taut[0], min(answer.preloads, key=lambda row: abs(row.preload - _find_own_preload(answer)))
     if least.preload >= own.preload:
         return f"Less preload than its {own.preload:.3g} N would be felt less, but the loop could be slack at rest."
     return (
@@ -163,8 +163,8 @@ def _preload_sentence(answer: Compensation) -> str:
     )
 
 
-def _actual_preload(answer: Compensation) -> float:
-    """Preload of the cable as it is: that of which the others are shares."""
+def _find_own_preload(answer: Compensation) -> float:
+    """Return the preload of the cable as it is: that of which the others are shares."""
     return answer.preloads[len(answer.preloads) // 2].preload
 
 
@@ -181,7 +181,7 @@ def _missing_sentences(answer: Compensation) -> Iterator[str]:
 
 
 def _bend_table(answer: Compensation) -> str:
-    """Some bends, as a table."""
+    """Return some bends as a table."""
     if answer.scheduled is None or len(answer.by_bend) == 1:
         return ""
     rows = []
@@ -194,7 +194,7 @@ def _bend_table(answer: Compensation) -> str:
 
 
 def _simulation_sentences(answer: Compensation) -> Iterator[str]:
-    """What the simulation shows."""
+    """Say what the simulation shows."""
     simulation = answer.simulated
     if simulation is None:
         return

@@ -19,10 +19,16 @@ import numpy as np
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.tables import LEVELS, TransmissionTables
-from bowdenfit.questions.export.text import ascii_text, comment, fill_template, identifier
+from bowdenfit.questions.export.text import ascii_text, fill_template, format_comment, make_identifier
 from bowdenfit.words import printable
 
 _ACROSS = 4  # numbers in a line
+_COMPILERS = ("cc", "gcc", "clang")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-fvisibility=hidden")
+# By system and machine: folder and ending of the library (FMI 2.0).
+_BINARY = {("linux", "x86_64"): ("linux64", ".so"), ("darwin", "x86_64"): ("darwin64", ".dylib")}
+_COMPILE_TIMEOUT = 120.0  # s that a compiler may take; a judgement
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same tables give the same file
 
 
 def c_header(tables: TransmissionTables) -> str:
@@ -38,7 +44,7 @@ def c_header(tables: TransmissionTables) -> str:
         speed = f"in {tables.speed_unit}; the coefficients hold at BOWDEN_REFERENCE_SPEED"
     return fill_template(
         "bowden.h",
-        about=comment(tables.sentences, " * "),
+        about=format_comment(tables.sentences, " * "),
         place_words="not used: friction is the same everywhere" if constant else ascii_text(points.words),
         speed_words=speed,
         version=ascii_text(tables.about.version).replace('"', "'"),
@@ -50,14 +56,14 @@ def c_header(tables: TransmissionTables) -> str:
         of_load=int(tables.depends_on_load),
         of_rate=int(tables.depends_on_rate),
         reference_speed=float(tables.reference_speed).hex(),
-        place=hexadecimal(points.values, "    "),
+        place=format_hexadecimal(points.values, "    "),
         exponent=",\n".join(_format_strokes(level.exponent) for level in levels),
-        more_tables=_optional_tables(tables),
+        more_tables=_format_optional_tables(tables),
         law=fill_template("loop.h" if tables.is_loop else "rope.h"),
     )
 
 
-def hexadecimal(values: Iterable[float], before: str) -> str:
+def format_hexadecimal(values: Iterable[float], before: str) -> str:
     """Format numbers as hexadecimal constants, some in a line."""
     texts = [float(value).hex() for value in np.ravel(np.asarray(list(values)))]
     lines = [", ".join(texts[i : i + _ACROSS]) for i in range(0, len(texts), _ACROSS)]
@@ -70,10 +76,10 @@ def _format_strokes(exponent: np.ndarray) -> str:
 
 
 def _format_row(values: Iterable[float], before: str) -> str:
-    return f"{before}{{\n{hexadecimal(values, before + '    ')}\n{before}}}"
+    return f"{before}{{\n{format_hexadecimal(values, before + '    ')}\n{before}}}"
 
 
-def _optional_tables(tables: TransmissionTables) -> str:
+def _format_optional_tables(tables: TransmissionTables) -> str:
     """Return tables that not every cable has."""
     parts = []
     if tables.is_loop:
@@ -99,16 +105,6 @@ def _format_tuples(rows: Iterable[tuple[float, ...]]) -> str:
     return ",\n".join("    {" + ", ".join(float(value).hex() for value in row) + "}" for row in rows)
 
 
-_COMPILERS = ("cc", "gcc", "clang")
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-fvisibility=hidden")
-_BINARY = {
-    ("linux", "x86_64"): ("linux64", ".so"),
-    ("darwin", "x86_64"): ("darwin64", ".dylib"),
-}  # by system and machine
-_COMPILE_TIMEOUT = 120.0  # s that a compiler may take
-_ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same tables give the same file
-
-
 @dataclass(frozen=True)
 class _Variable:
     """A real variable: its name, whether it is an input, its unit and what it is."""
@@ -129,14 +125,14 @@ def build_fmu(tables: TransmissionTables, name: str) -> bytes:
     Raises:
         UsageError: There is no C compiler, it fails, or FMI 2.0 has no name for this kind of machine.
     """
-    model_name, text = identifier(name), c_header(tables)
+    model_name, text = make_identifier(name), c_header(tables)
     guid = "{" + hashlib.sha256(text.encode("ascii")).hexdigest()[:32] + "}"
     source = fill_template(
-        "fmu.c", about=comment(tables.sentences, " * "), guid=guid, first_place=float(tables.points.values[0]).hex()
+        "fmu.c", about=format_comment(tables.sentences, " * "), guid=guid, first_place=float(tables.points.values[0]).hex()
     )
-    folder, ending = _binary_folder()
+    folder, ending = _choose_binary_folder()
     parts = {
-        "modelDescription.xml": "\n".join(_model_description(tables, model_name, guid)).encode("ascii"),
+        "modelDescription.xml": "\n".join(_write_model_description(tables, model_name, guid)).encode("ascii"),
         "sources/fmu.c": source.encode("ascii"),
         "sources/bowden.h": text.encode("ascii"),
         f"binaries/{folder}/{model_name}{ending}": _compile(source, text, find_compiler()),
@@ -169,7 +165,7 @@ def find_compiler() -> list[str]:
     )
 
 
-def _binary_folder() -> tuple[str, str]:
+def _choose_binary_folder() -> tuple[str, str]:
     """Return folder and suffix of compiled programs of this machine."""
     kind = (sys.platform, platform.machine().lower())
     if kind not in _BINARY:
@@ -207,7 +203,7 @@ def _compile(source: str, text: str, command: list[str]) -> bytes:
         return library.read_bytes()
 
 
-def _variables(tables: TransmissionTables) -> list[_Variable]:
+def _list_variables(tables: TransmissionTables) -> list[_Variable]:
     """Return the real variables in the order of their value references."""
     place, speed = tables.points, tables.speed_unit
     return [
@@ -225,40 +221,40 @@ def _variables(tables: TransmissionTables) -> list[_Variable]:
     ]
 
 
-def _model_description(tables: TransmissionTables, model_name: str, guid: str) -> Iterator[str]:
+def _write_model_description(tables: TransmissionTables, model_name: str, guid: str) -> Iterator[str]:
     """Yield the lines of modelDescription.xml."""
-    variables, about = _variables(tables), tables.about
+    variables, about = _list_variables(tables), tables.about
     starts = {"place": tables.points.values[0], "speed": tables.reference_speed}
     units = dict.fromkeys(v.unit for v in variables if v.unit)
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield (
         f'<fmiModelDescription fmiVersion="2.0" modelName="{model_name}" guid="{guid}" numberOfEventIndicators="0" '
-        f'variableNamingConvention="flat" generationTool={_quoted(f"bowdenfit {about.version}, seed {about.seed}")}'
+        f'variableNamingConvention="flat" generationTool={_quote(f"bowdenfit {about.version}, seed {about.seed}")}'
     )
-    yield f"  description={_quoted(' '.join(tables.sentences))}>"
+    yield f"  description={_quote(' '.join(tables.sentences))}>"
     yield (
         f'  <CoSimulation modelIdentifier="{model_name}" canHandleVariableCommunicationStepSize="true" '
         'canGetAndSetFMUstate="true" canSerializeFMUstate="true">'
     )
     yield '    <SourceFiles><File name="fmu.c"/></SourceFiles>'
     yield "  </CoSimulation>"
-    yield "  <UnitDefinitions>" + "".join(f"<Unit name={_quoted(name)}/>" for name in units) + "</UnitDefinitions>"
+    yield "  <UnitDefinitions>" + "".join(f"<Unit name={_quote(name)}/>" for name in units) + "</UnitDefinitions>"
     yield '  <LogCategories><Category name="logStatusError"/></LogCategories>'
     yield '  <DefaultExperiment startTime="0" stepSize="0.001"/>'
     yield "  <ModelVariables>"
     for number, variable in enumerate(variables):
         kind = 'causality="input"' if variable.is_input else 'causality="output" initial="calculated"'
         start = f' start="{float(starts.get(variable.name, 0.0))!r}"' if variable.is_input else ""
-        of_unit = f" unit={_quoted(variable.unit)}" if variable.unit else ""
+        of_unit = f" unit={_quote(variable.unit)}" if variable.unit else ""
         yield (
             f'    <ScalarVariable name="{variable.name}" valueReference="{number}" {kind} variability="continuous" '
-            f"description={_quoted(variable.words)}><Real{of_unit}{start}/></ScalarVariable>"
+            f"description={_quote(variable.words)}><Real{of_unit}{start}/></ScalarVariable>"
         )
     levels = ", ".join(f"{i} {level.name}" for i, level in enumerate(tables.levels[: len(LEVELS)]))
     words = f"How much friction: {levels}" + (", then draws" if len(tables.levels) > len(LEVELS) else "")
     yield (
         f'    <ScalarVariable name="level" valueReference="0" causality="parameter" variability="tunable" description='
-        f'{_quoted(words)}><Integer min="0" max="{len(tables.levels) - 1}" start="1"/></ScalarVariable>'
+        f'{_quote(words)}><Integer min="0" max="{len(tables.levels) - 1}" start="1"/></ScalarVariable>'
     )
     yield (
         '    <ScalarVariable name="flags" valueReference="1" causality="output" variability="discrete" initial="calculated" '
@@ -271,6 +267,6 @@ def _model_description(tables: TransmissionTables, model_name: str, guid: str) -
     yield "</fmiModelDescription>\n"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """Quote a text as an attribute of XML."""
     return quoteattr(ascii_text(text))

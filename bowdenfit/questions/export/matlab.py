@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.tables import TransmissionTables
-from bowdenfit.questions.export.text import ascii_text, comment, fill_template
+from bowdenfit.questions.export.text import ascii_text, fill_template, format_comment
 
 _ACROSS = 5  # numbers in a line
 _NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
@@ -25,20 +25,20 @@ def matlab_function(tables: TransmissionTables, name: str) -> str:
     return fill_template(
         "bowden.m",
         function=name,
-        about=comment(tables.sentences, "%  "),
+        about=format_comment(tables.sentences, "%  "),
         level_words=f"its name, such as 'q50', or its number from 1 to {len(levels)}",
         place_words=ascii_text(points.words) if points.unit else "not used: friction is the same everywhere",
         speed_words=f"in {tables.speed_unit}" if tables.depends_on_rate else "not used: friction does not depend on it",
         names=", ".join(f"'{level.name}'" for level in levels),
-        place=_matrix([points.values]),
-        pull=_matrix([level.exponent[0] for level in levels]),
-        returning=_matrix([level.exponent[1] for level in levels]),
-        taut_loss=_matrix([level.taut_loss for level in levels]),
-        load=_matrix([(level.load_exponent, level.drag) for level in levels]),
-        rate=_matrix([level.rate for level in levels]),
-        is_loop=_logical(tables.is_loop),
-        of_load=_logical(tables.depends_on_load),
-        of_rate=_logical(tables.depends_on_rate),
+        place=_format_matrix([points.values]),
+        pull=_format_matrix([level.exponent[0] for level in levels]),
+        returning=_format_matrix([level.exponent[1] for level in levels]),
+        taut_loss=_format_matrix([level.taut_loss for level in levels]),
+        load=_format_matrix([(level.load_exponent, level.drag) for level in levels]),
+        rate=_format_matrix([level.rate for level in levels]),
+        is_loop=_format_logical(tables.is_loop),
+        of_load=_format_logical(tables.depends_on_load),
+        of_rate=_format_logical(tables.depends_on_rate),
         varies=int(bool(points.unit)),
         reference_force=repr(float(tables.reference_force)),
         reference_speed=repr(float(tables.reference_speed)),
@@ -46,7 +46,7 @@ def matlab_function(tables: TransmissionTables, name: str) -> str:
 
 
 def function_name(path: Path) -> str:
-    """Name of the function in a file, which is that of the file.
+    """Return the name of the function in a file, which is that of the file.
 
     Args:
         path: The file.
@@ -62,15 +62,15 @@ def function_name(path: Path) -> str:
     return path.stem
 
 
-def _matrix(rows: Iterable[Iterable[float]]) -> str:
-    """Rows of numbers with all their digits, on lines of a length that can be read."""
-    return ";\n        ".join(_matlab_row(row) for row in rows)
+def _format_matrix(rows: Iterable[Iterable[float]]) -> str:
+    """Format rows of numbers with all their digits, on lines of a length that can be read."""
+    return ";\n        ".join(_format_row(row) for row in rows)
 
 
-def _matlab_row(values: Iterable[float]) -> str:
+def _format_row(values: Iterable[float]) -> str:
     texts = [repr(float(value)) for value in np.asarray(list(values))]
     return ", ...\n        ".join(", ".join(texts[i : i + _ACROSS]) for i in range(0, len(texts), _ACROSS))
 
 
-def _logical(value: bool) -> str:
+def _format_logical(value: bool) -> str:
     return "true" if value else "false"

@@ -9,9 +9,9 @@ import numpy as np
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.tables import TransmissionTables
-from bowdenfit.questions.export.text import ascii_text, comment, fill_template
+from bowdenfit.questions.export.text import ascii_text, fill_template, format_comment
 
-_STEP = 1e-3  # s, the longest time step
+_STEP = 1e-3  # s, the longest time step; a judgement
 _MASS, _DAMPING = 4.0, 0.5  # of the node, in units of K h^2, and as a share of the critical one of its springs
 _ENDS = ".xml", ".py"
 TextAndRemarks = tuple[str, tuple[str, ...]]
@@ -39,8 +39,8 @@ def mujoco_model(tables: TransmissionTables, point: float | None, path: Path) ->
         else (f"Friction is that at {_describe_point(tables, chosen)}" + ("." if point is not None else _MIDDLE),)
     )
     if path.suffix == ".py":
-        return _callback(tables, chosen), remarks
-    text, slack = _mjcf(tables, chosen, path.name)
+        return _write_callback(tables, chosen), remarks
+    text, slack = _write_mjcf(tables, chosen, path.name)
     remark = f"It holds up to {slack:.3g} N m at the motor, above which the return side goes slack"
     return text, (*remarks, f"{remark}; --output cable.py holds there too.")
 
@@ -76,7 +76,7 @@ def _refuse_inexpressible(tables: TransmissionTables, path: Path) -> None:
         )
 
 
-def _mjcf(tables: TransmissionTables, point: float, file: str) -> tuple[str, float]:
+def _write_mjcf(tables: TransmissionTables, point: float, file: str) -> tuple[str, float]:
     """Return the XML, and the torque at the motor [N m] up to which it holds."""
     points, median = tables.points, tables.median
     friction, exponent, stiffness = (
@@ -90,7 +90,7 @@ def _mjcf(tables: TransmissionTables, point: float, file: str) -> tuple[str, flo
     numeric += [("bowden_stiffness_N_per_m", 1000 * median.stiffness)]
     text = fill_template(
         "bowden.xml",
-        about=comment(tables.sentences, ""),
+        about=format_comment(tables.sentences, ""),
         file=ascii_text(file).replace('"', "'").replace("<", "'").replace("&", "'"),
         place=_describe_point(tables, point),
         slack_torque=f"{slack:.4g}",
@@ -105,19 +105,19 @@ def _mjcf(tables: TransmissionTables, point: float, file: str) -> tuple[str, flo
         joint_radius=joint,
         sentences=quoteattr(" ".join(map(ascii_text, tables.sentences))),
         unit=quoteattr(ascii_text(points.unit or "none")),
-        places=_space_separated(points.values),
+        places=_join_numbers(points.values),
         tables="\n".join(
-            f'    <numeric name="{name}" data="{_space_separated(values)}"/>' for name, values in numeric
+            f'    <numeric name="{name}" data="{_join_numbers(values)}"/>' for name, values in numeric
         ),
     )
     return text, slack
 
 
-def _space_separated(values: Iterable[float]) -> str:
+def _join_numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _callback(tables: TransmissionTables, point: float) -> str:
+def _write_callback(tables: TransmissionTables, point: float) -> str:
     """Return the Python module of the callback."""
     levels, has_radii = tables.levels, all(tables.radii)
     motor, joint = (repr(radius / 1000) for radius in tables.radii) if has_radii else ("None", "None")
@@ -128,7 +128,7 @@ def _callback(tables: TransmissionTables, point: float) -> str:
 
     return fill_template(
         "callback.template",
-        about=comment(tables.sentences, "").replace('"', "'"),
+        about=format_comment(tables.sentences, "").replace('"', "'"),
         pulley_words=words,
         is_loop=tables.is_loop,
         of_rate=tables.depends_on_rate,
@@ -149,7 +149,7 @@ def _callback(tables: TransmissionTables, point: float) -> str:
 
 
 def _describe_point(tables: TransmissionTables, point: float) -> str:
-    """'wrap_angle 90 deg'"""
+    """Return the point in words, as 'wrap_angle 90 deg'."""
     if tables.points.unit == "rad":
         return f"{ascii_text(tables.points.variable)} {math.degrees(point):.4g} deg"
     return f"{ascii_text(tables.points.variable)} {point:.6g} {ascii_text(tables.points.unit)}".strip()

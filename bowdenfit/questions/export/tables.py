@@ -27,6 +27,14 @@ QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 MOUNTING = "mounting_"
 LEVELS = (*QUANTILES, f"{MOUNTING}q05", f"{MOUNTING}q95")
 DRAW = "draw_"
+# Options of friction that tables can express.
+SUPPORTED_OPTIONS = ("drag", "load-dependent", "rate-dependent", "stroke-dependent", "by-group")
+_LEAST_BEND = 1e-3  # rad that a range of bends has at least; a judgement
+_LEAST_SHARE = 1e-9  # of the reference force, which is left of it at least, so that its logarithm is finite
+# What stands for each parameter where friction does not depend on speed.
+_RATE = {STRIBECK: 0.0, STRIBECK_SPEED: 1.0, VISCOUS: 0.0}
+LoadLaw = tuple[float, float]
+Arrays = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -165,24 +173,6 @@ class TransmissionTables:
         return [*sentences, *([f"Warning: this fit is {about.distrust}."] if about.distrust else [])]
 
 
-SUPPORTED_OPTIONS = (
-    "drag",
-    "load-dependent",
-    "rate-dependent",
-    "stroke-dependent",
-    "by-group",
-)  # of the options of friction
-_LEAST_BEND = 1e-3  # rad that a range of bends has at least
-_LEAST_SHARE = 1e-9  # of the reference force, which is left of it at least
-_RATE = {
-    STRIBECK: 0.0,
-    STRIBECK_SPEED: 1.0,
-    VISCOUS: 0.0,
-}  # what stands for each where friction does not depend on speed
-LoadLaw = tuple[float, float]
-Arrays = Mapping[str, np.ndarray]
-
-
 def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distrust: str = "") -> TransmissionTables:
     """Tabulate the transmission of a fit.
 
@@ -220,13 +210,13 @@ def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distru
         conditions.reference_force,
         conditions.reference_speed,
         conditions.velocity_unit or "mm/s" if cable.friction.depends_on_rate else "",
-        _interpolation_error(np.median(mean_tables["effective"][:, 0], axis=0)),
-        _radii(fit),
+        _measure_interpolation_error(np.median(mean_tables["effective"][:, 0], axis=0)),
+        _pulley_radii(fit),
     )
 
 
-def _radii(fit: Record) -> tuple[float, float]:
-    """Radii of the pulleys at the motor and at the load side [mm]; 0 where none is stated."""
+def _pulley_radii(fit: Record) -> tuple[float, float]:
+    """Return the radii of the pulleys at the motor and at the load side [mm]; 0 where none is stated."""
     cable = fit.dataset.description.cable
     at_motor, at_load = (
         0.0 if stated is None else stated.to("length")
@@ -257,7 +247,7 @@ def _add_midpoints(points: np.ndarray) -> np.ndarray:
     return np.interp(np.arange(2 * len(points) - 1) / 2, np.arange(len(points)), points)
 
 
-def _interpolation_error(curve: np.ndarray) -> float:
+def _measure_interpolation_error(curve: np.ndarray) -> float:
     """Return the largest error of linear interpolation between every other point of a curve."""
     return float(np.max(np.abs(curve[1::2] - (curve[:-2:2] + curve[2::2]) / 2), initial=0.0))
 
@@ -289,19 +279,19 @@ def _tabulate_draws(
 
     def tabulate_draw(z_and_mounting: Array, points: Array, middle: Array) -> dict[str, Any]:
         values = model.space.constrain(z_and_mounting[:-1])
-        exponent, preload = _exponent_and_preload(model, values, points, bent)
+        exponent, preload = _compute_exponent_and_preload(model, values, points, bent)
         exponent = jnp.maximum(exponent + z_and_mounting[-1], LEAST_EXPONENT)
         own = jnp.stack(friction.shifts(values, exponent))
         load_exponent, drag, _ = friction.scale(values)
         rate = {name: values[name] for name in _RATE if name in values}
         return {
             "own": own,
-            "effective": _effective_exponents(friction, values, own, middle) if friction.depends_on_load else own,
+            "effective": _compute_effective_exponents(friction, values, own, middle) if friction.depends_on_load else own,
             "taut_loss": 2 * preload * exponent,
             "load_exponent": load_exponent,
             "drag": drag,
             **rate,
-            "stiffness": _stiffness(model, values, points, bent),
+            "stiffness": _compute_stiffness(model, values, points, bent),
         }
 
     with jax.enable_x64(True):
@@ -312,7 +302,7 @@ def _tabulate_draws(
     return tables
 
 
-def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
+def _compute_exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
     """Return exponent [1] and preload [N] of one draw at wrap angles or route positions."""
     if bent:
         cable = BentCable(model, bending_contact(model), points)
@@ -322,7 +312,7 @@ def _exponent_and_preload(model: Model, values: Mapping[str, Array], points: Arr
     return model.cable.friction_exponent(values, angles), preload
 
 
-def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:
+def _compute_stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:
     """Return stiffness at wrap angles [N/mm], of an unloaded loop or a rope under the reference force; empty if unknown."""
     if not (bent and has_stretch(model)):
         return jnp.zeros(0)
@@ -330,7 +320,7 @@ def _stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: b
     return BentCable(model, bending_contact(model), points).stiffness(values, load)
 
 
-def _effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
+def _compute_effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:
     """Return exponents that give the same loss at the reference force under a common load exponent and drag."""
     reference = friction.conditions.reference_force
     force, (load_exponent, drag) = jnp.asarray(reference), middle

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from importlib.resources import files
 from string import Template
 
-_WIDTH = 110
+_WIDTH = 110  # characters of a line of a comment; a judgement
 
 
-def comment(sentences: Iterable[str], before: str) -> str:
-    """Sentences as lines of a comment, ASCII alone, in which nothing ends the comment or goes on behind it.
+def format_comment(sentences: Iterable[str], before: str) -> str:
+    """Return sentences as lines of a comment, ASCII alone, in which nothing ends the comment or goes on behind it.
 
     Args:
         sentences: A line or more each.
@@ -20,7 +20,7 @@ def comment(sentences: Iterable[str], before: str) -> str:
 
 
 def ascii_text(text: str) -> str:
-    """Text as one line of ASCII without anything that begins or ends a comment, or that C reads as something else."""
+    """Return text as one line of ASCII without anything that begins or ends a comment, or that C reads as something else."""
     text_out = "".join(x if " " <= x <= "~" and x != "\\" else ascii(x)[1:-1].replace("\\", "~") for x in text)
     for bad in ("*/", "/*", "??", "--", "%{", "%}"):
         while bad in text_out:
@@ -29,7 +29,7 @@ def ascii_text(text: str) -> str:
 
 
 def fill_template(name: str, **values: object) -> str:
-    """A template of this folder with its places filled.
+    """Return a template of this folder with its places filled.
 
     Args:
         name: Of the file.
@@ -39,8 +39,8 @@ def fill_template(name: str, **values: object) -> str:
     return Template(text).substitute(values)
 
 
-def identifier(name: str) -> str:
-    """A name as file systems and programs take one: letters of ASCII, digits and single underscores."""
+def make_identifier(name: str) -> str:
+    """Return a name as file systems and programs take one: letters of ASCII, digits and single underscores."""
     letters = "".join(x.lower() if x.isascii() and x.isalnum() else " " for x in name)
     word = "_".join(letters.split())[:40].strip("_")
     return word if word[:1].isalpha() else f"cable_{word}".strip("_")

@@ -21,7 +21,7 @@ from bowdenfit.questions.export.tables import (
     TransmissionTables,
     tabulate_transmission,
 )
-from bowdenfit.questions.export.text import comment, identifier
+from bowdenfit.questions.export.text import format_comment, make_identifier
 from bowdenfit.questions.export.yaml import compensation_parameters, yaml_parameters
 from bowdenfit.questions.predict.verb import predict
 from bowdenfit.questions.summary.verdict import assess_fit
@@ -47,8 +47,8 @@ def lookup_table(fit: Record, tables: TransmissionTables) -> str:
     lines = [",".join(map(csv_heading, heads))]
     for i, row in enumerate(rows):
         cells = [value for name, value in row.items() if name != "note"]
-        lines.append(",".join(_cell(value) for value in (*cells, *(x.exponent[0, i] for x in tables.levels))))
-    return "\n".join([comment(tables.sentences, "# "), *lines]) + "\n"
+        lines.append(",".join(_format_cell(value) for value in (*cells, *(x.exponent[0, i] for x in tables.levels))))
+    return "\n".join([format_comment(tables.sentences, "# "), *lines]) + "\n"
 
 
 def draws_table(tables: TransmissionTables) -> str:
@@ -74,11 +74,11 @@ def draws_table(tables: TransmissionTables) -> str:
             cells += [level.taut_loss[i]] if tables.is_loop else []
             cells += [level.load_exponent, level.drag] if tables.depends_on_load else []
             cells += level.rate if tables.depends_on_rate else ()
-            lines.append(",".join(_cell(value) for value in cells))
-    return "\n".join([comment(tables.sentences, "# "), *lines]) + "\n"
+            lines.append(",".join(_format_cell(value) for value in cells))
+    return "\n".join([format_comment(tables.sentences, "# "), *lines]) + "\n"
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     """Format numbers with all their digits, and quote words where necessary."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -182,7 +182,7 @@ class ExportedFile(Display):
         return "\n".join(self.sentences())
 
     def sentences(self) -> list[str]:
-        """The file, and remarks on it."""
+        """Return the file, and remarks on it."""
         return [f"Wrote {self.file}.", *self.remarks]
 
     def _table(self) -> Rows:
@@ -289,7 +289,7 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
         StoreError: The file exists already, or cannot be written.
     """
     to = options.to
-    path = Path(identifier(fit.name) + _ENDINGS[to]) if output is None else output
+    path = Path(make_identifier(fit.name) + _ENDINGS[to]) if output is None else output
     if path.exists() and not (options.force and path.is_file()):
         raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
     fit.draws()

@@ -9,12 +9,12 @@ import numpy as np
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.compensate.answer import Compensation, FeedbackGain, FeedForward
 from bowdenfit.questions.export.tables import TransmissionTables
-from bowdenfit.questions.export.text import ascii_text, comment
+from bowdenfit.questions.export.text import ascii_text, format_comment
 
 NODES, PARAMETERS = "/**", "ros__parameters"  # of every node
 _LEAST_FRICTION = "mounting_q05"
 _YAML_KEYWORDS = {"yes", "no", "on", "off", "true", "false", "null"}  # words that YAML 1.1 takes for something else
-_EXCEEDED = 0.95  # probability that one mounting has more friction than that
+_EXCEEDED = 0.95  # probability that one mounting has more friction than `_LEAST_FRICTION`
 
 
 def yaml_parameters(tables: TransmissionTables, compensation: Mapping[str, Any] | None = None) -> str:
@@ -26,13 +26,13 @@ def yaml_parameters(tables: TransmissionTables, compensation: Mapping[str, Any] 
     """
     page = {
         NODES: {
-            PARAMETERS: {"bowden": _parameter_tree(tables) | ({"compensation": compensation} if compensation else {})}
+            PARAMETERS: {"bowden": _build_parameter_tree(tables) | ({"compensation": compensation} if compensation else {})}
         }
     }
-    return "\n".join([comment(tables.sentences, "# "), *yaml_lines(page)]) + "\n"
+    return "\n".join([format_comment(tables.sentences, "# "), *yaml_lines(page)]) + "\n"
 
 
-def _parameter_tree(tables: TransmissionTables) -> dict[str, Any]:
+def _build_parameter_tree(tables: TransmissionTables) -> dict[str, Any]:
     """Return all parameters by name; those that a cable lacks are left out."""
     about, points, levels = tables.about, tables.points, tables.levels
     page: dict[str, Any] = {
@@ -67,7 +67,7 @@ def _parameter_tree(tables: TransmissionTables) -> dict[str, Any]:
 
 
 def yaml_lines(page: Mapping[str, Any], indent: str = "") -> Iterator[str]:
-    """A mapping as lines of YAML; texts are in quotes, so that none is taken for anything else.
+    """Yield a mapping as lines of YAML; texts are in quotes, so that none is taken for anything else.
 
     Args:
         page: Texts, numbers, lists of them, and mappings of such, by name.
@@ -76,27 +76,27 @@ def yaml_lines(page: Mapping[str, Any], indent: str = "") -> Iterator[str]:
     for name, value in page.items():
         if isinstance(value, Mapping):
             if value:
-                yield f"{indent}{_yaml_key(name)}:"
+                yield f"{indent}{_format_key(name)}:"
                 yield from yaml_lines(value, indent + "  ")
         elif isinstance(value, list | tuple | np.ndarray):
             items = value.tolist() if isinstance(value, np.ndarray) else value
             if any(isinstance(item, Mapping) for item in items):
-                yield f"{indent}{_yaml_key(name)}:"
+                yield f"{indent}{_format_key(name)}:"
                 yield from yaml_lines({str(i + 1): item for i, item in enumerate(items)}, indent + "  ")
             elif items:
-                yield f"{indent}{_yaml_key(name)}: [{', '.join(map(yaml_scalar, items))}]"
+                yield f"{indent}{_format_key(name)}: [{', '.join(map(yaml_scalar, items))}]"
         elif value is not None:
-            yield f"{indent}{_yaml_key(name)}: {yaml_scalar(value)}"
+            yield f"{indent}{_format_key(name)}: {yaml_scalar(value)}"
 
 
-def _yaml_key(name: str) -> str:
-    """A name, in quotes where it is more than letters, digits and underscores, or anything else to YAML."""
+def _format_key(name: str) -> str:
+    """Return a name, in quotes where it is more than letters, digits and underscores, or anything else to YAML."""
     is_word = name.isidentifier() and name.isascii() and len(name) > 1 and name.lower() not in _YAML_KEYWORDS
     return name if is_word else json.dumps(name if name == NODES else ascii_text(name))
 
 
 def yaml_scalar(value: object) -> str:
-    """A number, a truth or a text as readers of YAML 1.1 and 1.2 take it alike."""
+    """Return a number, a truth or a text as readers of YAML 1.1 and 1.2 take it alike."""
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, int | np.integer):
@@ -111,7 +111,7 @@ def yaml_scalar(value: object) -> str:
 
 
 def compensation_parameters(answer: Compensation) -> dict[str, Any]:
-    """The answer in plain data; what it does not hold is left out.
+    """Return the answer in plain data; what it does not hold is left out.
 
     Args:
         answer: Of both laws.
@@ -133,18 +133,18 @@ def compensation_parameters(answer: Compensation) -> dict[str, Any]:
         "chatters_below_rad_per_s": answer.chatters_below,
     }
     if answer.fixed is not None:
-        page["fixed"] = {"torque_N_m": answer.fixed.torque, **_feed_forward_parameters(answer.fixed)}
+        page["fixed"] = {"torque_N_m": answer.fixed.torque, **_list_feed_forward(answer.fixed)}
     if answer.scheduled is not None:
         page["scheduled"] = {
             "torque_N_m": [bend.scheduled for bend in bends],
-            **_feed_forward_parameters(answer.scheduled),
+            **_list_feed_forward(answer.scheduled),
         }
     if answer.gain is not None:
-        page["gain"] = _gain_parameters(answer.gain)
+        page["gain"] = _list_gain(answer.gain)
     return page | {"not_stated": list(answer.missing)}
 
 
-def _feed_forward_parameters(feed_forward: FeedForward) -> dict[str, float]:
+def _list_feed_forward(feed_forward: FeedForward) -> dict[str, float]:
     return {
         "share": feed_forward.share,
         "probability_of_moving_by_itself": feed_forward.risk,
@@ -152,15 +152,15 @@ def _feed_forward_parameters(feed_forward: FeedForward) -> dict[str, float]:
     }
 
 
-def _gain_parameters(gain: FeedbackGain) -> dict[str, Any]:
+def _list_gain(gain: FeedbackGain) -> dict[str, Any]:
     return {
         "safe": gain.safe,
         "passive": gain.passive,
-        "stable_up_to": _quantile_parameters(gain.stable),
-        "left_N_m": _quantile_parameters(gain.left),
+        "stable_up_to": _list_quantiles(gain.stable),
+        "left_N_m": _list_quantiles(gain.left),
         "decided_by": gain.decided_by,
     }
 
 
-def _quantile_parameters(interval: Interval) -> dict[str, float]:
+def _list_quantiles(interval: Interval) -> dict[str, float]:
     return {"q05": interval.q05, "q50": interval.median, "q95": interval.q95}

@@ -10,6 +10,10 @@ from bowdenfit.display import Display, Rows, text_of
 from bowdenfit.inference.interval import Interval
 from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
 
+_NAMED = 12  # broken or untrusted inspections that are named; a judgement
+_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "sampling by gradients"}
+_HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
+
 
 @dataclass(frozen=True)
 class FailedInspection:
@@ -91,7 +95,7 @@ class Fleet(Display):
 
     @property
     def is_trusted(self) -> bool:
-        """Whether every inspection was fitted, and every fit may be trusted."""
+        """Say whether every inspection was fitted, and every fit may be trusted."""
         return not (self.broken or self.untrusted)
 
     @property
@@ -101,7 +105,7 @@ class Fleet(Display):
         return {name: names.count(name) for name in dict.fromkeys(sorted(names))}
 
     def summarize_quantity(self, quantity: str) -> tuple[float, float, float, float]:
-        """Of a quantity over the fleet: 5 %, 50 % and 95 % of the medians, and the median of single standard deviations."""
+        """Return 5 %, 50 % and 95 % of the medians of a quantity over the fleet, and the median of its standard deviations."""
         intervals = [interval.quantities[quantity] for interval in self.fitted if quantity in interval.quantities]
         low, middle, high = np.quantile([interval.median for interval in intervals], (0.05, 0.5, 0.95))
         return float(low), float(middle), float(high), float(np.median([interval.sd for interval in intervals]))
@@ -125,25 +129,20 @@ class Fleet(Display):
         return rows, dict(self.units)
 
 
-_NAMED = 12  # broken or untrusted inspections that are named
-_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "sampling by gradients"}
-_HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
-
-
 @text_of.register(Fleet)
 def fleet_text(fleet: Fleet) -> str:
-    """A fleet for people: whether all went well, the range of each quantity, and what is broken."""
+    """Return a fleet for people: whether all went well, the range of each quantity, and what is broken."""
     blocks = [
         filled(status_sentence(fleet)),
-        "\n".join([*_listed("broken", [(b.inspection, b.why) for b in fleet.broken]), *_untrusted(fleet)]),
-        f"{table(_HEADS, _rows(fleet))}\n\n{filled(_how_to_read(fleet))}" if fleet.fitted else "",
+        "\n".join([*_list_inspections("broken", [(b.inspection, b.why) for b in fleet.broken]), *_list_untrusted(fleet)]),
+        f"{table(_HEADS, _quantity_rows(fleet))}\n\n{filled(_explain_columns(fleet))}" if fleet.fitted else "",
         "\n".join(filled(line) for line in _method_sentences(fleet)),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
 def status_sentence(fleet: Fleet) -> str:
-    """Whether every inspection was fitted and may be trusted."""
+    """Say whether every inspection was fitted and may be trusted."""
     total = len(fleet.fitted) + len(fleet.broken)
     what = f"{counted(total, 'inspection')} of {counted(len(fleet.cables), 'cable')}"
     if fleet.is_trusted:
@@ -153,22 +152,22 @@ def status_sentence(fleet: Fleet) -> str:
     return f"{fleet.name}: of {what} {listed(wrong)}; the others are as they would be without these."
 
 
-def _listed(what: str, named: list[tuple[str, str]]) -> list[str]:
-    """Inspections with what is wrong, and how many more."""
+def _list_inspections(what: str, named: list[tuple[str, str]]) -> list[str]:
+    """List inspections with what is wrong, and how many more."""
     lines = [filled(f"- {label}: {' '.join(why.split())}", hangs=True) for label, why in named[:_NAMED]]
     more = len(named) - _NAMED
     return [*lines, f"- and {more} more {what} ones, in fleet.json."] if more > 0 else lines
 
 
-def _untrusted(fleet: Fleet) -> list[str]:
-    return _listed(
+def _list_untrusted(fleet: Fleet) -> list[str]:
+    return _list_inspections(
         "untrusted",
         [(inspection.inspection, f"not to be trusted: {inspection.reasons[0]}.") for inspection in fleet.untrusted],
     )
 
 
-def _rows(fleet: Fleet) -> list[tuple[str, ...]]:
-    """Every quantity, under `_HEADS`."""
+def _quantity_rows(fleet: Fleet) -> list[tuple[str, ...]]:
+    """Return a row for every quantity, under `_HEADS`."""
     rows = []
     for name, unit in fleet.units.items():
         low, middle, high, sd = fleet.summarize_quantity(name)
@@ -178,7 +177,7 @@ def _rows(fleet: Fleet) -> list[tuple[str, ...]]:
     return rows
 
 
-def _how_to_read(fleet: Fleet) -> str:
+def _explain_columns(fleet: Fleet) -> str:
     first = next(iter(fleet.units))
     _, middle, _, sd = fleet.summarize_quantity(first)
     return (
@@ -188,7 +187,7 @@ def _how_to_read(fleet: Fleet) -> str:
 
 
 def _method_sentences(fleet: Fleet) -> list[str]:
-    """Models, engines, and what is known of the inspections."""
+    """Describe models, engines, and what is known of the inspections."""
     lines = []
     if len(fleet.shapes) > 1:
         models = listed(list(fleet.shapes))

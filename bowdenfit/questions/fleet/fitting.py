@@ -38,7 +38,8 @@ SETTINGS = BatchSettings(
     SamplerSettings(n_ensembles=2, n_walkers=64, max_steps=20_000, target_ess=400, target_r_hat=1.03),
     target_sd_error=0.05,
 )
-_SMALLEST, _LARGEST = CHUNK, 8 * CHUNK  # data sets of a piece; what is lost when a fleet is interrupted
+# Data sets of a piece, a judgement: the largest is what is lost when a fleet is interrupted.
+_SMALLEST, _LARGEST = CHUNK, 8 * CHUNK
 
 
 def divide_into_pieces(

@@ -26,7 +26,7 @@ from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TAB
 from bowdenfit.words import few, shown
 
 _TEMPERATURES = {"temperature_degC": 0.0, "temperature_C": 0.0, "temperature_K": -273.15}  # what each adds to be in °C
-_COLDEST, _HOTTEST = -100.0, 400.0  # degC
+_COLDEST, _HOTTEST = -100.0, 400.0  # degC, beyond which a temperature is a slip of unit; a judgement
 _YES, _NO = {"yes", "y", "true", "1"}, {"no", "n", "false", "0"}
 UNKNOWN = math.nan
 
@@ -117,11 +117,11 @@ def _read_inspection_table(path: Path) -> list[Inspection]:
     columns = find_columns(table, (*(Quantity(name, "text") for name in texts), Quantity("cycles", "ratio")))
     cables = [
         cell.text.strip()
-        for cell in require_column(table, columns, "cable", "cable").read_cells(_require_text, _blank(table))
+        for cell in require_column(table, columns, "cable", "cable").read_cells(_require_text, _make_blank_cell(table))
     ]
     files = [
         cell.text.strip()
-        for cell in require_column(table, columns, "file", "file").read_cells(_require_text, _blank(table))
+        for cell in require_column(table, columns, "file", "file").read_cells(_require_text, _make_blank_cell(table))
     ]
     unknown = [UNKNOWN] * len(table.rows)
     cycles = columns["cycles"].read_cells(_parse_cycles, UNKNOWN) if "cycles" in columns else unknown
@@ -139,7 +139,7 @@ def _read_inspection_table(path: Path) -> list[Inspection]:
     return inspections
 
 
-def _blank(table: RawTable) -> Cell:
+def _make_blank_cell(table: RawTable) -> Cell:
     return Cell(table.file, table.header_row, "", "")
 
 
@@ -271,7 +271,7 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
             yield FailedInspection(inspection.label, str(error))
             continue
         if case.hash in seen:
-            yield FailedInspection(inspection.label, _duplicate_message(inspection.label, seen[case.hash]))
+            yield FailedInspection(inspection.label, _describe_duplicate(inspection.label, seen[case.hash]))
             continue
         seen[case.hash] = inspection.label
         yield case
@@ -299,22 +299,22 @@ def _read_common_description(folder: Path, reading: Reading) -> Description:
 def _read_table_dataset(path: Path, description: Description, folder: Path) -> Dataset:
     """Read one table under the common description."""
     (kind, settings), *_ = description.tables.stated.items()
-    named: dict[str, Any] = {"file": None, "files": None} | {_file_key(settings): escape(_relative_to(path, folder))}
+    named: dict[str, Any] = {"file": None, "files": None} | {_choose_file_key(settings): escape(_shorten_path(path, folder))}
     known = {name: value for name, value in named.items() if name in type(settings).model_fields}
     tables = description.tables.model_copy(update={kind: settings.model_copy(update=known)})
     return read_dataset(description.model_copy(update={"tables": tables}), folder, {})
 
 
-def _relative_to(path: Path, folder: Path) -> str:
+def _shorten_path(path: Path, folder: Path) -> str:
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
-def _file_key(settings: Any) -> str:
+def _choose_file_key(settings: Any) -> str:
     """Return the key under which a table's file stands."""
     return "file" if "file" in type(settings).model_fields else "files"
 
 
-def _duplicate_message(label: str, other: str) -> str:
+def _describe_duplicate(label: str, other: str) -> str:
     return (
         f"{label} has the readings of {other} to the last digit; the usual cause is a file that was copied or is named twice: "
         "name the right file, or delete the row."

@@ -95,12 +95,12 @@ class FleetStore:
         """Return the fits of a finished fleet."""
         draws, path = read_fleet_draws(self.folder), self.folder / FLEET_DRAWS
         with damage_as(StoreError(f"{path} is damaged; restore the folder from a copy, or start over with --force.")):
-            return self._as_fits(draws)
+            return self._split_by_input(draws)
 
-    def _as_fits(self, draws: FleetDraws) -> dict[str, PieceFit]:
+    def _split_by_input(self, draws: FleetDraws) -> dict[str, PieceFit]:
         fits = dict[str, PieceFit]()
         quantities: dict[str, list[str]] = draws.about["quantities"]
-        stats = {name: [_as_text(value) for value in values] for name, values in draws.stats.items()}
+        stats = {name: [_decode_text(value) for value in values] for name, values in draws.stats.items()}
         for i, name in enumerate(stats["input"]):
             own = quantities[stats["shape"][i]]
             values = [draws.values[value][i] for value in own]
@@ -186,5 +186,5 @@ def _is_valid(fit: PieceFit) -> bool:
     return texts and isinstance(fit.values, np.ndarray) and fit.values.ndim == 2 and fit.values.dtype == np.float64
 
 
-def _as_text(value: Any) -> str:
+def _decode_text(value: Any) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)

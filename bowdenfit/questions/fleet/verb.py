@@ -69,7 +69,7 @@ def _reply(answer: "Fleet", options: dict[str, Any]) -> Reply:
 
 
 def _show(bar: Any, done: int, total: int, seconds: float) -> None:
-    """How many are done, how many a minute, and how long the rest will take."""
+    """Show how many are done, how many a minute, and how long the rest will take."""
     bar.total, bar.n = total, done
     left = timedelta(seconds=round(seconds * (total - done)))
     bar.set_postfix_str(f"{60 / max(seconds, 1e-9):.0f} cables a minute, {left} left", refresh=False)

@@ -26,7 +26,7 @@ LABEL_WIDTH = 2.8  # in, of a label
 
 
 def caption(ranking: NextMeasurement) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     best = f" Circle: {ranking.best.words}, most worth measuring." if ranking.best is not None else ""
     gray = " Gray: outside the range of the curves." if _is_along_route(ranking) and ranking.route_label else ""
     return (
@@ -39,7 +39,7 @@ def caption(ranking: NextMeasurement) -> str:
 
 @in_paper_style
 def draw(ranking: NextMeasurement) -> Figure:
-    """Expected standard deviation of the answer, against the route with a line for each kind; else a row a candidate."""
+    """Draw the expected standard deviation against the route, a line for each kind; without a route, a row a candidate."""
     return _draw_along_route(ranking) if _is_along_route(ranking) else _draw_rows(ranking)
 
 
@@ -50,19 +50,19 @@ def _is_along_route(ranking: NextMeasurement) -> bool:
 
 
 def _axis_label(ranking: NextMeasurement) -> str:
-    """What the axis shows."""
+    """Return what the axis shows."""
     return axis_label("Standard deviation afterwards", ranking.answer.unit)
 
 
 def _set_title(axes: Axes, ranking: NextMeasurement, start: float = 0.0) -> None:
-    """What the figure is about, from a place left of the axes on."""
+    """Write what the figure is about, from a place left of the axes on."""
     words = ranking.answer.words
     first = words[0].upper() if len(words.split()) > 1 else words[0]
     axes.set_title(f"{first}{words[1:]}: how well it would be known", loc="left", x=start)
 
 
 def _limits(ranking: NextMeasurement) -> tuple[float, float]:
-    """An axis that shows what the candidates change, and does not make it look like more than it is."""
+    """Return limits of an axis that shows what the candidates change, and does not make it look like more than it is."""
     now, least = ranking.answer.sd, min(r.sd for r in ranking.ranked)
     change = max(now - least, 0.05 * now)
     return max(0.0, least - 1.5 * change), now + 0.3 * change
@@ -94,7 +94,7 @@ def _draw_along_route(ranking: NextMeasurement) -> Figure:
 
 
 def _draw_reference(axes: Axes, ranking: NextMeasurement, horizontal: bool) -> None:
-    """The standard deviation as things are, and the best candidate."""
+    """Draw the standard deviation as things are, and the best candidate."""
     line = axes.axhline if horizontal else axes.axvline
     line(ranking.answer.sd, color=GRAY, linestyle="--", linewidth=1.0, label="Present uncertainty")
     best = ranking.best
@@ -106,7 +106,7 @@ def _draw_reference(axes: Axes, ranking: NextMeasurement, horizontal: bool) -> N
 
 
 def _draw_rows(ranking: NextMeasurement) -> Figure:
-    """A row for each of the best candidates."""
+    """Draw a row for each of the best candidates."""
     best = ranking.ranked[:MAX_ROWS]
     names = [wrap_words(r.words, LABEL_WIDTH, most=1) for r in best]
     room = max(LEFT, 0.15 + max(map(text_width, names)))

@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.pool.answer import Curves, Pool
 
-MOST_CABLES, LONGEST_NAME, MOST_COEFFICIENTS = 60, 18, 2
+MOST_CABLES, LONGEST_NAME, MOST_COEFFICIENTS = 60, 18, 2  # rows, characters and panels that a page has room for
 _ROW, _BELOW, _HEIGHT = 0.115, 0.45, 2.3  # in
 
 
 def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
-    """All figures of a pooled fleet, by name.
+    """Draw all figures of a pooled fleet, by name.
 
     Args:
         pool: The pooled fleet.
@@ -65,13 +65,13 @@ def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
 
 @in_paper_style
 def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
-    """Coefficients and wear of every cable, alone and pooled."""
+    """Draw coefficients and wear of every cable, alone and pooled."""
     names = [name for name in pool.typical if any(name in cable.coefficients for cable in pool.cables)][
         :MOST_COEFFICIENTS
     ]
     columns = [*names, *(["wear"] if pool.wear is not None else [])]
     order = sorted(
-        pool.cables, key=lambda cable: (names[0] in cable.coefficients, _median(cable.coefficients.get(names[0])))
+        pool.cables, key=lambda cable: (names[0] in cable.coefficients, _median_or_zero(cable.coefficients.get(names[0])))
     )
     step = -(-len(order) // MOST_CABLES)
     shown = [cable for i, cable in enumerate(order) if i % step == 0 or cable.departure]
@@ -92,7 +92,7 @@ def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
             _draw_cable(axes, y, pooled, cable.unpooled.get(name), bool(cable.departure), name == "wear")
         _draw_population(axes, pool, name)
         axes.set_yticks(range(len(shown)), labels if i == 0 or not across else [])
-        axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_label(pool, name))
+        axes.set(ylim=(-0.7, len(shown) - 0.3), xlabel=_axis_label(pool, name))
         axes.grid(axis="y", visible=False)
         axes.locator_params(axis="x", nbins=max(2, int(inner / 0.55)))
         place_labels(figure, axes)
@@ -104,7 +104,7 @@ def draw_coefficients(pool: Pool, width: float | None = None) -> Figure:
 def _draw_cable(
     axes: Axes, y: int, pooled: Interval | None, unpooled: Interval | None, is_outlier: bool, percent: bool
 ) -> None:
-    """One cable in one panel."""
+    """Draw one cable in one panel."""
     if pooled is None:
         return
     color, times = VERMILLION if is_outlier else BLUE, 100.0 if percent else 1.0
@@ -118,21 +118,21 @@ def _draw_cable(
 
 
 def _draw_population(axes: Axes, pool: Pool, name: str) -> None:
-    """Where nine of ten new cables lie."""
+    """Mark where nine of ten new cables lie."""
     new = pool.coefficients.get(name)
     if new is not None:
         axes.axvspan(new.q05, new.q95, color=LIGHT, linewidth=0, zorder=0, label="Nine of ten new cables")
 
 
-def _label(pool: Pool, name: str) -> str:
+def _axis_label(pool: Pool, name: str) -> str:
     return f"Wear (% in {pool.reference_cycles:,.0f} cycles)" if name == "wear" else name.replace("_", " ")
 
 
 @in_paper_style
 def draw_wear(pool: Pool, curves: Curves, width: float | None = None) -> Figure:
-    """Efficiency or friction over cycles."""
-    figure, axes = _panel(width)
-    at, scale = curves.cycles / _scale(curves), _scale(curves)
+    """Draw efficiency or friction over cycles."""
+    figure, axes = _make_panel(width)
+    at, scale = curves.cycles / _choose_cycle_unit(curves), _choose_cycle_unit(curves)
     times = 100.0 if pool.limit is not None else 1.0
     for i, line in enumerate(curves.cables):
         axes.plot(at, times * line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
@@ -144,16 +144,16 @@ def draw_wear(pool: Pool, curves: Curves, width: float | None = None) -> Figure:
     if pool.limit is not None:
         axes.axhline(100 * pool.limit.efficiency, color=VERMILLION, linestyle="--", linewidth=1.0, label="Required")
     axes.set_ylabel("Efficiency (%)" if pool.limit is not None else "Friction / when new")
-    return _finish(figure, axes, curves, "pooled-wear", pool)
+    return _finish_curves(figure, axes, curves, "pooled-wear", pool)
 
 
 @in_paper_style
 def draw_life(
     pool: Pool, curves: Curves, fails: np.ndarray, new_fails: np.ndarray, width: float | None = None
 ) -> Figure:
-    """Probability of having failed over cycles."""
-    figure, axes = _panel(width)
-    at, scale = curves.cycles / _scale(curves), _scale(curves)
+    """Draw the probability of having failed over cycles."""
+    figure, axes = _make_panel(width)
+    at, scale = curves.cycles / _choose_cycle_unit(curves), _choose_cycle_unit(curves)
     for i, line in enumerate(fails):
         axes.plot(at, line, "-", color=GRAY, linewidth=0.5, alpha=0.7, label="A cable" if i == 0 else None)
     if len(pool.cables) > 1:
@@ -162,22 +162,22 @@ def draw_life(
     if pool.limit is not None and pool.limit.cycles is not None:
         axes.axvline(pool.limit.cycles / scale, color=VERMILLION, linestyle="--", linewidth=1.0, label="Required")
     axes.set(ylim=(-0.02, 1.02), ylabel="Probability of having failed")
-    return _finish(figure, axes, curves, "pooled-life", pool)
+    return _finish_curves(figure, axes, curves, "pooled-life", pool)
 
 
-def _scale(curves: Curves) -> float:
-    """Cycles that a unit of the axis is."""
+def _choose_cycle_unit(curves: Curves) -> float:
+    """Return how many cycles a unit of the axis is."""
     return 1000.0 if curves.cycles[-1] >= 10_000 else 1.0
 
 
-def _panel(width: float | None) -> tuple[Figure, Axes]:
+def _make_panel(width: float | None) -> tuple[Figure, Axes]:
     page = width or MEDIUM
     figure = empty_page(page, 0.12 + _HEIGHT + _BELOW)
     return figure, axes_at(figure, LEFT, _BELOW, page - LEFT - 2 * RIGHT, _HEIGHT)
 
 
-def _finish(figure: Figure, axes: Axes, curves: Curves, name: str, pool: Pool) -> Figure:
-    scale = _scale(curves)
+def _finish_curves(figure: Figure, axes: Axes, curves: Curves, name: str, pool: Pool) -> Figure:
+    scale = _choose_cycle_unit(curves)
     axes.set(xlim=(0.0, float(curves.cycles[-1]) / scale), xlabel="Cycles (thousands)" if scale > 1 else "Cycles")
     axes.locator_params(axis="x", nbins=6)
     place_labels(figure, axes)
@@ -190,7 +190,7 @@ def _add_title(figure: Figure, name: str, pool: Pool) -> Figure:
     return figure
 
 
-def _median(interval: Interval | None) -> float:
+def _median_or_zero(interval: Interval | None) -> float:
     return interval.median if interval is not None else 0.0
 
 

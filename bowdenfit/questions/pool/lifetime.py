@@ -25,6 +25,11 @@ from bowdenfit.words import shown
 
 _ANGLE_OPTION = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>\d+\.?\d*|\.\d+)\s*(?P<unit>[A-Za-z°][\w°]*)")
 _MOST_TURNS = 100  # a wrap angle beyond this is a typing error
+_POINTS, _BEYOND = 61, 1.25  # of a curve, and how far it goes beyond what was inspected or asked for; judgements
+_FURTHEST = 8.0  # times the longest inspected, where curves end; a judgement
+MOST_INSPECTIONS = 5  # that are named; a judgement
+_GROUPS = 20  # of draws: what is learned on all but one is judged on that one; a judgement
+_LEAST = 1e-3  # share of a variance below which nothing is told; a judgement
 
 
 def parse_service_limit(
@@ -109,10 +114,6 @@ def summarize_life(limit: ServiceLimit, cycles: np.ndarray, longest: float) -> L
     return Life(median, early, fails, float(np.mean(np.isinf(cycles))), bool(beyond))
 
 
-_POINTS, _BEYOND = 61, 1.25  # of a curve, and how far it goes beyond what was inspected or asked for
-_FURTHEST = 8.0  # times the longest inspected
-
-
 def compute_curves(data: PoolingData, draws: PopulationDraws, limit: ServiceLimit | None, new: np.ndarray) -> Curves:
     """Compute curves over cycles of every cable and of a new one.
 
@@ -163,11 +164,6 @@ def _share_failed(life: np.ndarray, cycles: np.ndarray) -> np.ndarray:
     return share
 
 
-MOST_INSPECTIONS = 5  # that are named
-_GROUPS = 20
-_LEAST = 1e-3  # share of a variance below which nothing is told
-
-
 def rank_next_inspections(
     data: PoolingData, draws: PopulationDraws, limit: ServiceLimit | None, seed: int
 ) -> tuple[NextInspection, ...]:
@@ -203,10 +199,10 @@ def rank_next_inspections(
             fails = (cycles_to_failure(limit, logs, wear, data.reference_cycles) < limit.cycles).astype(float)
             proxy = friction_log_margin(limit, logs) - wear * limit.cycles / data.reference_cycles
             inspection = NextInspection(
-                cable, cycles, "failing", *_sd_before_and_after(fails, proxy, readings), float(fails.mean())
+                cable, cycles, "failing", *_compute_sd_before_and_after(fails, proxy, readings), float(fails.mean())
             )
         else:
-            inspection = NextInspection(cable, cycles, "wear", *_sd_before_and_after(wear, wear, readings), None)
+            inspection = NextInspection(cable, cycles, "wear", *_compute_sd_before_and_after(wear, wear, readings), None)
         candidates.append(inspection)
     best = sorted(candidates, key=lambda candidate: candidate.after**2 - candidate.before**2)[:MOST_INSPECTIONS]
     return tuple(
@@ -214,7 +210,7 @@ def rank_next_inspections(
     )
 
 
-def _sd_before_and_after(target: np.ndarray, proxy: np.ndarray, readings: np.ndarray) -> tuple[float, float]:
+def _compute_sd_before_and_after(target: np.ndarray, proxy: np.ndarray, readings: np.ndarray) -> tuple[float, float]:
     """Return the standard deviation of a target now, and expected after an inspection.
 
     Args:

@@ -27,10 +27,11 @@ from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 from bowdenfit.multiple_testing import adjust_p_values
 
-FALSE_ALARM = 0.05  # share of homogeneous fleets in which any cable is named as an outlier
-MIXTURE_LEVEL = 0.01  # significance level of the test for a mixture of populations
-_POPULATIONS = 1000  # draws of the population
-_REPEATS = 20  # draws of the error scales for each of them
+# Share of homogeneous fleets in which any cable is named as an outlier; measured in `tests/questions/test_pool_alarms.py`.
+FALSE_ALARM = 0.05
+MIXTURE_LEVEL = 0.01  # significance level of the test for a mixture of populations; customary
+_POPULATIONS = 1000  # draws of the population; a judgement
+_REPEATS = 20  # draws of the error scales for each of them; a judgement
 _TAIL_FACTOR = 4.0  # the proposal of the error scales has so many times fewer degrees of freedom, hence heavier tails
 _LEAST_SQUARE = 1e-200  # smallest chi-square draw that divides without overflow
 _RANK = 1e-9  # relative singular value below which a direction is not determined

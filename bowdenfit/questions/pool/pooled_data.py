@@ -21,7 +21,10 @@ from bowdenfit.words import counted, few, listed
 
 FRICTION = "friction"  # the role of what is pooled
 _OWN_NAME = "own_name"  # of a coefficient in single fits, where some of that name mean something else
-_SMALLEST = 1e-12  # that a coefficient may be drawn as
+_SMALLEST = 1e-12  # that a coefficient may be drawn as, so that its logarithm is finite
+# Effective draws of a single fit, below which it is not known what its readings say there: means are then known to a tenth of
+# a standard deviation.
+LEAST_EFFECTIVE_DRAWS = 100.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def select_inspections(fleet: FleetDraws) -> PoolingData:
     cables = tuple(dict.fromkeys(name for name, keep in zip(fleet.cable, kept, strict=True) if keep))
     number = np.array([cables.index(name) for name, keep in zip(fleet.cable, kept, strict=True) if keep])
     logs = np.log(np.maximum(np.stack([draws[kept] for draws in values.values()], axis=2), _SMALLEST))
-    priors = [_log_prior(about[name]) for name in values]
+    priors = [_parse_log_prior(about[name]) for name in values]
     mean, sd = (np.array([prior[i] for prior in priors]) for i in (0, 1))
     known = np.isfinite(logs).all(axis=1)
     reference = float(np.nanmax(cycles)) if np.isfinite(cycles).any() else 0.0
@@ -95,7 +98,7 @@ def select_inspections(fleet: FleetDraws) -> PoolingData:
     inputs = fleet.stats.get("input", np.full(len(kept), ""))[kept]
     return PoolingData(
         cables, tuple(values), symbols, inspected, logs, labels, cycles, reference, left_out, tuple(notes),
-        tuple(map(_text, inputs)), own_names,
+        tuple(map(_decode_text, inputs)), own_names,
     )  # fmt: skip
 
 
@@ -119,7 +122,7 @@ def _split_by_meaning(
     fleet: FleetDraws, notes: list[str]
 ) -> tuple[dict[str, np.ndarray], dict[str, Mapping[str, str]]]:
     """Return draws and attributes of coefficients; one name with several meanings is split into several."""
-    shapes = [_text(key) for key in fleet.stats["shape"]]
+    shapes = [_decode_text(key) for key in fleet.stats["shape"]]
     meanings: Mapping[str, Mapping[str, str]] = fleet.about.get("meanings", {})
     values: dict[str, np.ndarray] = {}
     about: dict[str, Mapping[str, str]] = {}
@@ -127,7 +130,7 @@ def _split_by_meaning(
     for name, draws in fleet.values.items():
         if fleet.attributes[name].get("role") != FRICTION:
             continue
-        if _log_prior(fleet.attributes[name]) is None:
+        if _parse_log_prior(fleet.attributes[name]) is None:
             no_prior.append(name)
             continue
         row_meanings = [meanings.get(key, {}).get(name, "") for key in shapes]
@@ -147,7 +150,7 @@ def _split_by_meaning(
     return values, about
 
 
-def _log_prior(about: Mapping[str, str]) -> Any:
+def _parse_log_prior(about: Mapping[str, str]) -> Any:
     """Return mean and standard deviation of the prior of a log coefficient in single fits; None if it has none."""
     try:
         prior = json.loads(about["prior"])
@@ -212,13 +215,8 @@ def _select_covariates(fleet: FleetDraws, kept: np.ndarray, notes: list[str]) ->
     return covariates
 
 
-def _text(value: Any) -> str:
+def _decode_text(value: Any) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
-
-
-LEAST_EFFECTIVE_DRAWS = (
-    100.0  # effective draws of a single fit, below which it is not known what its readings say there
-)
 
 
 def count_effective_draws(data: PoolingData, population: PopulationDraws) -> np.ndarray:

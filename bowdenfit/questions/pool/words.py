@@ -13,21 +13,21 @@ HEADINGS = {
     "pooled-wear": "Wear",
     "pooled-life": "How many have failed",
 }
-_NAMED, _SHOWN = 5, 12  # unlike cables, and cables in the table
-_SURE = 0.999
-_INDISTINGUISHABLE = 0.1  # 5 % of a spread over its 95 %, below which it cannot be told from none
-_UNRELATED = 5.0  # 95 % of new cables over their 5 %, above which one cable tells little of another
+_NAMED, _SHOWN = 5, 12  # unlike cables, and cables in the table; judgements
+_SURE = 0.999  # probability beyond which draws are too few to say more
+_INDISTINGUISHABLE = 0.1  # 5 % of a spread over its 95 %, below which it cannot be told from none; a judgement
+_UNRELATED = 5.0  # 95 % of new cables over their 5 %, above which one cable tells little of another; a judgement
 
 
 @text_of.register(Pool)
 def pool_text(pool: Pool) -> str:
-    """A pooled fleet for people: life or wear first, then who is unlike, what to inspect, and the numbers."""
+    """Return a pooled fleet for people: life or wear first, then who is unlike, what to inspect, and the numbers."""
     blocks = [
         filled(headline(pool)),
         "\n".join(filled(line) for line in (*trust_sentences(pool), *life_sentences(pool), *outlier_sentences(pool))),
         "\n".join(filled(line) for line in next_sentences(pool)),
         "\n".join(filled(line) for line in effect_sentences(pool)),
-        table(*population_rows(pool)) + "\n\n" + filled(how_to_read(pool)),
+        table(*population_rows(pool)) + "\n\n" + filled(explain_columns(pool)),
         _cable_table(pool),
         "\n".join(filled(line) for line in pool.notes),
     ]
@@ -35,7 +35,7 @@ def pool_text(pool: Pool) -> str:
 
 
 def headline(pool: Pool) -> str:
-    """The answer in a sentence."""
+    """Return the answer in a sentence."""
     who = f"{pool.name}: " if pool.name else ""
     if pool.limit is not None and pool.new_cable is not None:
         until = percent(pool.limit.efficiency, 0)
@@ -55,12 +55,12 @@ def headline(pool: Pool) -> str:
 
 
 def trust_sentences(pool: Pool) -> list[str]:
-    """Why the answer must not be trusted; empty if it may."""
+    """Say why the answer must not be trusted; empty if it may."""
     return [f"DO NOT USE these numbers: {reason}." for reason in pool.reasons[:2]]
 
 
 def life_sentences(pool: Pool) -> list[str]:
-    """Of cables that are in use."""
+    """Say how long cables last that are in use."""
     if pool.limit is None:
         return []
     limit, lives = pool.limit, [(cable, cable.life) for cable in pool.cables if cable.life is not None]
@@ -90,7 +90,7 @@ def life_sentences(pool: Pool) -> list[str]:
 
 
 def outlier_sentences(pool: Pool) -> list[str]:
-    """Which cables are unlike the rest."""
+    """Say which cables are unlike the rest."""
     if len(pool.cables) == 1:
         return []
     lines = [
@@ -99,7 +99,7 @@ def outlier_sentences(pool: Pool) -> list[str]:
     ]
     if len(pool.outliers) > _NAMED:
         lines.append(f"So are {counted(len(pool.outliers) - _NAMED, 'other')}, in the JSON.")
-    lines += _outlier_treatment(pool)
+    lines += _outlier_treatment_sentences(pool)
     if pool.mixtures:
         names = listed(list(pool.mixtures))
         lines.append(
@@ -109,8 +109,8 @@ def outlier_sentences(pool: Pool) -> list[str]:
     return [*(lines or ["No cable is unlike the rest."]), *homogeneity_sentences(pool)]
 
 
-def _outlier_treatment(pool: Pool) -> list[str]:
-    """By what cables that are unlike the rest are shown."""
+def _outlier_treatment_sentences(pool: Pool) -> list[str]:
+    """Say by what cables that are unlike the rest are shown."""
     if not pool.outliers:
         return []
     shown = "It is shown by its" if len(pool.outliers) == 1 else "They are shown by their"
@@ -139,7 +139,7 @@ def homogeneity_sentences(pool: Pool) -> list[str]:
 
 
 def next_sentences(pool: Pool) -> list[str]:
-    """What to inspect next."""
+    """Say what to inspect next."""
     if not pool.next_inspections:
         return []
     best = pool.next_inspections[0]
@@ -157,7 +157,7 @@ def next_sentences(pool: Pool) -> list[str]:
 
 
 def effect_sentences(pool: Pool) -> list[str]:
-    """What changes friction."""
+    """Say what changes friction."""
     lines = []
     if pool.wear is not None and pool.new_cable is not None:
         lines.append(
@@ -172,7 +172,7 @@ def effect_sentences(pool: Pool) -> list[str]:
 
 
 def population_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heads and rows of the population."""
+    """Return heads and rows of the population."""
     heads = ("quantity", "typical", "from", "to", "between cables", "new cable from", "to")
     rows = []
     for name, typical in pool.typical.items():
@@ -185,8 +185,8 @@ def population_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
     return heads, rows
 
 
-def how_to_read(pool: Pool) -> str:
-    """What the columns are."""
+def explain_columns(pool: Pool) -> str:
+    """Say what the columns are."""
     dry = "dry " if any(effect.name == "lubrication" for effect in pool.effects) else ""
     warm = (
         f"at {pool.reference_temperature:g} °C " if any(effect.name == "per_degree" for effect in pool.effects) else ""
@@ -201,7 +201,7 @@ def how_to_read(pool: Pool) -> str:
 
 
 def cable_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heads and rows of the cables."""
+    """Return heads and rows of the cables."""
     names = list(pool.typical)[:2]
     wears, lives = pool.wear is not None, pool.limit is not None
     with_failures = lives and pool.limit is not None and pool.limit.cycles is not None
@@ -224,15 +224,15 @@ def cable_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def _cable_table(pool: Pool) -> str:
-    """The cables that matter most in a table."""
+    """Return the cables that matter most in a table."""
     heads, rows = cable_rows(pool)
-    order = sorted(range(len(rows)), key=lambda i: _importance(pool.cables[i]))
+    order = sorted(range(len(rows)), key=lambda i: _rank_importance(pool.cables[i]))
     shown = sorted(order[:_SHOWN])
     more = f"\n... and {len(rows) - len(shown)} more; --csv and --json have all" if len(shown) < len(rows) else ""
     return table(heads, [rows[i] for i in shown], left=("",)) + more
 
 
-def _importance(cable: PooledCable) -> tuple[float, float]:
+def _rank_importance(cable: PooledCable) -> tuple[float, float]:
     life = cable.life
     return (-1.0 if cable.departure else 0.0, life.median if life else -(cable.wear.median if cable.wear else 0.0))
 
@@ -265,7 +265,7 @@ def _life(life: Life) -> str:
 
 
 def _cycles(count: float, bare: bool = False) -> str:
-    """A count to three digits, in words."""
+    """Return a count to three digits, in words."""
     if math.isinf(count):
         return "for ever"
     digits = max(0, len(str(int(count))) - 3)
@@ -286,7 +286,7 @@ def _count_cables(pool: Pool) -> str:
 
 
 def captions(pool: Pool) -> dict[str, str]:
-    """What each figure shows, in plain words."""
+    """Say what each figure shows, in plain words."""
     limit = pool.limit
     what = f"efficiency falls below {100 * limit.efficiency:g} %" if limit is not None else ""
     return {
@@ -308,7 +308,7 @@ def captions(pool: Pool) -> dict[str, str]:
 
 
 def pool_page(pool: Pool) -> HtmlPage:
-    """The page of a pooled fleet.
+    """Return the page of a pooled fleet.
 
     Args:
         pool: The pooled fleet.
@@ -326,7 +326,7 @@ def pool_page(pool: Pool) -> HtmlPage:
             pictures=(pictures["pooled-life"], pictures["pooled-wear"]),
         ),
         prose_section(
-            "What cables have in common", [*effect_sentences(pool), how_to_read(pool)], [PageTable(heads, tuple(rows))]
+            "What cables have in common", [*effect_sentences(pool), explain_columns(pool)], [PageTable(heads, tuple(rows))]
         ),
         prose_section(
             "Every cable",

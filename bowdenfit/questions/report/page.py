@@ -49,7 +49,7 @@ CHARTS: dict[str, Callable[[Any], tuple[Chart, ...]]] = {
 
 
 def figures_section(figures: dict[str, Any]) -> PageSection | None:
-    """The figures of a fit; None without any.
+    """Return the figures of a fit; None without any.
 
     Args:
         figures: Data by name.
@@ -65,7 +65,7 @@ def _figure_picture(name: str, data: Any) -> Picture:
 
 
 def report_page(fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None) -> HtmlPage:
-    """The report of a fit.
+    """Return the report of a fit.
 
     Args:
         fit: The fit.

@@ -109,13 +109,13 @@ class Teleoperation(Display):
 
 @text_of.register(Teleoperation)
 def teleoperation_text(answer: Teleoperation) -> str:
-    """The answer for people, the answer first, in at most 25 lines."""
+    """Return the answer for people, the answer first, in at most 25 lines."""
     lines = "\n".join(filled(line) for line in sentences(answer))
     return f"{lines}\n\n{_scheme_table(answer)}\n"
 
 
 def sentences(answer: Teleoperation) -> list[str]:
-    """What is felt, whether the wall is stable, and what other couplings would do."""
+    """Say what is felt, whether the wall is stable, and what other couplings would do."""
     return [
         sentence
         for sentence in (

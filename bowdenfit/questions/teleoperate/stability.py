@@ -27,12 +27,54 @@ from bowdenfit.questions.bends.ring_down import device_with_ring_down
 from bowdenfit.questions.teleoperate.answer import CouplingScheme, SimulatedContact, Teleoperation
 from bowdenfit.results.record import Record
 
+# The simulated contact: a hand moves to and fro in the open, then pushes the slave into a wall. A scenario; judgements.
 FREE_SECONDS, SECONDS = 2.0, 4.5  # s in the open, and in all
 SWING = 0.15  # rad, half of the way in the open
 WALL, PUSHED = 0.1, 0.5  # rad: where the wall is, and how far the hand wants to go
 _PERIOD, _PUSHING, SETTLED = 1.0, 1.0, 1.2  # s: of the swing, until the hand is there, from the first touch on
 _TRACE_STEP = 4  # every so many samples are kept
-_LEAST_PRELOAD = 1e-6  # N m
+_LEAST_PRELOAD = 1e-6  # N m, of a loop that bending has made slack; far below any friction
+DRAWS = 150  # devices that are looked at; a probability of 95 % is then known to 2 %
+WALLS = np.geomspace(1.0, 3000.0, 13)  # N m/rad, of the walls that are looked at; a judgement
+LOCAL_GAINS = (0.5, 1.0)  # gains on the master's own torque that are looked at beside the stated one
+_PAIR = (
+    "rope.damping",
+    "motor.inertia",
+    "motor.damping",
+    "joint.inertia",
+    "joint.damping",
+    "hand.inertia",
+    "hand.damping",
+    "hand.stiffness",
+    "slave.inertia",
+    "slave.damping",
+)
+_COUPLING = (
+    "coupling.master_stiffness",
+    "coupling.master_damping",
+    "coupling.slave_stiffness",
+    "coupling.slave_damping",
+    "coupling.torque_to_master",
+    "coupling.torque_to_slave",
+    "coupling.local_gain",
+)
+_SCALES = ("coupling.position_to_slave", "coupling.position_to_master")
+_ROUNDING = 1e-3  # that the product of the scales may be away from 1; a judgement
+NEEDED = (
+    *_PAIR,
+    "wall.damping",
+    "controller.sample_time",
+    "controller.filter_time",
+    "motor.friction",
+    "slave.friction",
+    "wall.stiffness",
+    "motor.largest_torque",
+    "slave.largest_torque",
+    *_COUPLING,
+    "coupling.delay",
+)
+Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
+Draws = Mapping[str, np.ndarray]
 
 
 def simulate_contact(
@@ -79,7 +121,7 @@ def simulate_contact(
         slave,
         controller,
         gains,
-        hand_path(sample),
+        compute_hand_path(sample),
         delay=delay,
         sample=sample,
     )
@@ -95,7 +137,7 @@ def simulate_contact(
     )
 
 
-def hand_path(sample: float) -> np.ndarray:
+def compute_hand_path(sample: float) -> np.ndarray:
     """Return the hand's path, to and fro in free motion and then into the wall: angle [rad] and speed [rad/s] by sample."""
     time = np.arange(round(SECONDS / sample)) * sample
     frequency, speed = 2 * np.pi / _PERIOD, PUSHED / _PUSHING
@@ -118,48 +160,6 @@ def detect_bouncing(time: np.ndarray, wall_torque: np.ndarray) -> bool | None:
     if not len(contact):
         return None
     return bool(np.any(wall_torque[time > time[contact[0]] + SETTLED] == 0))
-
-
-DRAWS = 150
-WALLS = np.geomspace(1.0, 3000.0, 13)  # N m/rad
-LOCAL_GAINS = (0.5, 1.0)  # gains on the master's own torque that are looked at beside the stated one
-_PAIR = (
-    "rope.damping",
-    "motor.inertia",
-    "motor.damping",
-    "joint.inertia",
-    "joint.damping",
-    "hand.inertia",
-    "hand.damping",
-    "hand.stiffness",
-    "slave.inertia",
-    "slave.damping",
-)
-_COUPLING = (
-    "coupling.master_stiffness",
-    "coupling.master_damping",
-    "coupling.slave_stiffness",
-    "coupling.slave_damping",
-    "coupling.torque_to_master",
-    "coupling.torque_to_slave",
-    "coupling.local_gain",
-)
-_SCALES, _ROUNDING = ("coupling.position_to_slave", "coupling.position_to_master"), 1e-3
-NEEDED = (
-    *_PAIR,
-    "wall.damping",
-    "controller.sample_time",
-    "controller.filter_time",
-    "motor.friction",
-    "slave.friction",
-    "wall.stiffness",
-    "motor.largest_torque",
-    "slave.largest_torque",
-    *_COUPLING,
-    "coupling.delay",
-)
-Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
-Draws = Mapping[str, np.ndarray]
 
 
 def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: float) -> Teleoperation:
@@ -185,7 +185,7 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
     draws = {name: values[picked] for name, values in draw_device(stated, n, fit.provenance.seed).items()}
     bend = np.random.default_rng([fit.provenance.seed, 43]).integers(len(angles), size=len(picked))
     stiffness = loop.stiffness[picked, bend]
-    gains = _coupling_gains({key: stated[key].value for key in _COUPLING}, _position_scales(device))
+    gains = _scale_coupling_gains({key: stated[key].value for key in _COUPLING}, _read_position_scales(device))
     delay = round(stated["coupling.delay"].value / stated["controller.sample_time"].value)
     most = int(np.argmax(np.median(loop.friction, axis=0)))
     frictions = {
@@ -203,7 +203,7 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
         for name, each in gains_by_name.items()
     )
     stable_at_wall = float(
-        np.mean(is_stable(spectral_radius_in_contact(_master_and_slave(draws, stiffness, wall), gains, delay)))
+        np.mean(is_stable(spectral_radius_in_contact(_build_master_and_slave(draws, stiffness, wall), gains, delay)))
     )
     return Teleoperation(
         fit.name,
@@ -219,12 +219,12 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
     )
 
 
-def _coupling_gains(stated: Mapping[str, float], scales: tuple[float, float]) -> CouplingGains:
+def _scale_coupling_gains(stated: Mapping[str, float], scales: tuple[float, float]) -> CouplingGains:
     k_m, d_m, k_s, d_s, c_2, c_3, k_f = (stated[key] for key in _COUPLING)
     return CouplingGains(k_m, d_m, k_s, d_s, c_2, c_3, k_f, False, *scales)
 
 
-def _position_scales(device: Device) -> tuple[float, float]:
+def _read_position_scales(device: Device) -> tuple[float, float]:
     """Return C_1 and C_4; 1 where neither is stated, and one from the other."""
     known = device.known(*_SCALES)
     to_slave, to_master = (known[key].value if key in known else None for key in _SCALES)
@@ -246,7 +246,7 @@ def _refuse_missing(device: Device, loop: LoopDraws) -> None:
         raise missing_settings("teleoperation", missing)
 
 
-def _master_and_slave(draws: Draws, stiffness: np.ndarray, wall: float) -> MasterSlave:
+def _build_master_and_slave(draws: Draws, stiffness: np.ndarray, wall: float) -> MasterSlave:
     """Return all devices with a wall of one stiffness, or in free motion."""
     damping = draws["wall.damping"] if wall > 0 else np.zeros_like(stiffness)
     rope, j_m, b_m, j_j, b_j, j_h, b_h, k_h, j_s, b_s = (draws[key] for key in _PAIR)
@@ -268,10 +268,10 @@ def _assess_scheme(
     probability: float,
 ) -> CouplingScheme:
     """Assess one coupling: what is felt, and which walls are stable."""
-    radius = spectral_radius_in_contact(_master_and_slave(draws, stiffness, 0.0), gains, delay)
+    radius = spectral_radius_in_contact(_build_master_and_slave(draws, stiffness, 0.0), gains, delay)
     stable = np.array(
         [
-            np.mean(is_stable(spectral_radius_in_contact(_master_and_slave(draws, stiffness, k), gains, delay)))
+            np.mean(is_stable(spectral_radius_in_contact(_build_master_and_slave(draws, stiffness, k), gains, delay)))
             for k in WALLS
         ]
     )

@@ -19,7 +19,7 @@ _HEIGHT, _DOWN = 1.7, 0.62  # in
 
 
 def caption(answer: Teleoperation) -> str:
-    """What is drawn, in plain words."""
+    """Say what is drawn, in plain words."""
     return (
         "Top left: probability that the slave touches a wall without oscillating, by the stiffness of the wall, for each "
         f"coupling; the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median numbers, in "
@@ -31,7 +31,7 @@ def caption(answer: Teleoperation) -> str:
 
 @in_paper_style
 def draw(answer: Teleoperation) -> Figure:
-    """Probability of stable contact by wall, then positions, torques, and torque against position."""
+    """Draw the probability of stable contact by wall, then positions, torques, and torque against position."""
     figure, (walls, position, torque, stiffness) = panels([_HEIGHT, _HEIGHT], 2, TITLE, (0.75, _DOWN))
     _draw_walls(walls, answer)
     _draw_traces(position, torque, answer)

@@ -15,9 +15,9 @@ from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.files import is_ros2_folder
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
-from bowdenfit.kinds import KINDS, each_table
-from bowdenfit.kinds.descriptions import load_description, measured_groups, parse_description, with_columns
-from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, only_kind
+from bowdenfit.kinds import KINDS, iterate_tables
+from bowdenfit.kinds.descriptions import add_columns, load_description, order_groups, parse_description
+from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.units import ColumnSource
@@ -44,7 +44,7 @@ class Dataset(Display):
 
     def sentences(self) -> list[str]:
         """What the cable is, and what was measured on it."""
-        lines = [line for kind, table in each_table(self.measurements) for line in kind.describe(table, self.description)]
+        lines = [line for kind, table in iterate_tables(self.measurements) for line in kind.describe(table, self.description)]
         return [*self.description.sentences(), *(f"- {line}" for line in lines), *self.measurements.remarks]
 
     def _table(self) -> Rows:
@@ -106,7 +106,7 @@ def single_file_dataset(
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
-    kind = kind or only_kind(path, bool(channels), tuple(columns or ()))
+    kind = kind or require_one_kind(path, bool(channels), tuple(columns or ()))
     if has_own_angles(path, kind, tuple(columns or ()), wrap_angle is not None):
         angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
     elif wrap_angle is None:
@@ -122,7 +122,7 @@ def single_file_dataset(
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": glob.escape(path.name)}},
     }
-    described = with_columns(override(raw, overrides), columns or {})
+    described = add_columns(override(raw, overrides), columns or {})
     return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)
 
 
@@ -159,15 +159,15 @@ def read_dataset(
             accounts += read.accounts
             checksums |= {name: _sha256(path) for name, path in read.files.items()}
     faults.refuse()
-    if channels and not any(kind.takes_channels for kind, _ in each_table(measurements)):
+    if channels and not any(kind.takes_channels for kind, _ in iterate_tables(measurements)):
         raise DescriptionError(
             "--channel names channels of recordings, but the data set has none; a column of a table is named by --column."
         )
     with faults.collect():
         check_names(description)
     with faults.collect():
-        measured_groups(description, measurements)
-    for kind, table in each_table(measurements):
+        order_groups(description, measurements)
+    for kind, table in iterate_tables(measurements):
         with faults.collect():
             kind.check(table, description, measurements)
     faults.refuse()

@@ -22,10 +22,10 @@ from bowdenfit.description import (
 )
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, suggest_name
-from bowdenfit.kinds.places import Places, places_of
+from bowdenfit.kinds.covariates import Covariates, collect_covariates
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Term
-from bowdenfit.kinds.terms import measured_cable, measured_kinds, parameters_asked_for
+from bowdenfit.kinds.terms import collect_parameters, iterate_term_kinds, make_measured_cable
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.parameters.symbols import make_symbol
@@ -39,7 +39,7 @@ class Model(Display):
     cable: Cable
     space: ParameterSpace
     terms: tuple[Term, ...]
-    places: Mapping[str, Places] = field(default_factory=dict, compare=False)
+    covariates: Mapping[str, Covariates] = field(default_factory=dict, compare=False)
 
     @property
     def description(self) -> Description:
@@ -64,20 +64,20 @@ def build_model(dataset: Dataset) -> Model:
         DescriptionError: A curve family, contact law or parameter that the description names is unknown.
     """
     description, measurements = dataset.description, dataset.measurements
-    cable = measured_cable(description, measurements)
-    kinds = list(measured_kinds(measurements))
+    cable = make_measured_cable(description, measurements)
+    kinds = list(iterate_term_kinds(measurements))
     terms = [term for kind, table in kinds for term in kind.terms(cable, table, measurements.table(AngleTable))]
     space = _build_space(cable, measurements)
     for kind, table in kinds:
         kind.check(table, space)
-    places = {term.name: places_of(description, measurements, term) for term in terms}
+    places = {term.name: collect_covariates(description, measurements, term) for term in terms}
     return Model(cable, space, tuple(terms), places)
 
 
 def _build_space(cable: Cable, measurements: Measurements) -> ParameterSpace:
     """Return all parameters as the user has set them; their order is that of z."""
     description, defaults = cable.description, PriorDefaults()
-    requested = parameters_asked_for(cable, measurements)
+    requested = collect_parameters(cable, measurements)
     parameters = [
         *(_make_friction_parameter(description, name, defaults.friction) for name in cable.coefficients),
         *(p for p in requested if p.role == "curve"),

@@ -35,7 +35,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.replicator import why_implausible
 from bowdenfit.questions.fleet.fitting import SETTINGS
@@ -141,7 +141,7 @@ def cables(number: int) -> list[LogDensity]:
         }
     )
     own = {f"{name}_angle": column for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)}
-    design = design_of(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
+    design = make_design(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
     tables = empty_tables(description, design)
     found: list[LogDensity] = []
     seeds = itertools.count()

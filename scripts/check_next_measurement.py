@@ -39,7 +39,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
@@ -50,7 +50,7 @@ from bowdenfit.results.along_route import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
 CANDIDATES = tuple(Candidate(kind, at) for kind in ("angle", "efficiency") for at in LENGTHS)
-DESIGN = design_of(angles=(435.0, 450.0, 475.0, 500.0, 525.0), efficiencies=(445.0, 470.0, 510.0))
+DESIGN = make_design(angles=(435.0, 450.0, 475.0, 500.0, 525.0), efficiencies=(445.0, 470.0, 510.0))
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=2000, target_ess=500, target_r_hat=1.03)
 BASE, OUTCOMES = 4096, 1000  # draws that are weighted, and outcomes that they are weighted for
 STARTS, CHAINS, STEPS, KEPT = (

@@ -30,7 +30,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.fitting import BatchFit
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.questions.calibrate.plan import StatedTruth, list_quantities, parse_truths
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 from bowdenfit.questions.calibrate.replications import RankedTruth
@@ -73,7 +73,7 @@ class Bench:
         tables = {"angles": limit, "forces": {"file": "forces.csv"}}
         raw = {"name": "bench", "route": ROUTE, "contact": contacts, "tables": tables}
         at = np.linspace(410.0, 590.0, self.mountings)
-        design = design_of(
+        design = make_design(
             angles=LENGTHS, runs=tuple(at), input_forces=tuple(self.load * np.array([0.4, 0.8, 1.2, 1.6]))
         )
         description = parse_description(raw)

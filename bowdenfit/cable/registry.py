@@ -48,7 +48,7 @@ def check_names(description: Description) -> None:
                 )
 
 
-def load_class(place: str) -> Any:
+def load_class(class_path: str) -> Any:
     """The class at a place such as "bowdenfit.cable.laws:Capstan"."""
-    module, _, name = place.partition(":")
+    module, _, name = class_path.partition(":")
     return getattr(import_module(module), name)

@@ -60,7 +60,7 @@ class ControllerSettings(Frozen):
     linear_dead_zone: bool = False
 
 
-class Hand(Frozen):
+class HandSettings(Frozen):
     """The hand at the joint."""
 
     inertia: Quantity = None
@@ -68,7 +68,7 @@ class Hand(Frozen):
     stiffness: Quantity = None
 
 
-class Slave(Frozen):
+class SlaveSettings(Frozen):
     """The slave that the device commands."""
 
     inertia: Quantity = None
@@ -126,8 +126,8 @@ class Device(Frozen):
     joint: Joint = Joint()
     rope: RopeSettings = RopeSettings()
     controller: ControllerSettings = ControllerSettings()
-    hand: Hand = Hand()
-    slave: Slave = Slave()
+    hand: HandSettings = HandSettings()
+    slave: SlaveSettings = SlaveSettings()
     wall: Wall = Wall()
     coupling: Coupling = Coupling()
 

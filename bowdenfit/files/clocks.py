@@ -109,12 +109,12 @@ def is_date(text: str) -> bool:
     return bool(_DATE.fullmatch(text) or _TIME_OF_DAY.fullmatch(text))
 
 
-def seconds_of_dates(texts: Iterable[str], place: str) -> Vector:
+def seconds_of_dates(texts: Iterable[str], source: str) -> Vector:
     """Seconds from the first of some dates; a time of day may pass midnight.
 
     Args:
         texts: Dates such as "2021-02-04 14:52:00.120", "04.02.2021 14:52:00,120" or "14:52:00.120"; blank is missing.
-        place: File and column, for the error.
+        source: File and column, for the error.
 
     Raises:
         DatasetError: A text is no date.
@@ -130,7 +130,7 @@ def seconds_of_dates(texts: Iterable[str], place: str) -> Vector:
         dates = pandas.to_datetime(written, format=form, dayfirst="." in first[:3], utc=True)
     except ValueError as error:
         raise DatasetError(
-            f"{place}: a cell is no date or time like the others ({error}); correct it, or write the time in seconds."
+            f"{source}: a cell is no date or time like the others ({error}); correct it, or write the time in seconds."
         ) from None
     return _from_first((dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy(dtype=float))
 

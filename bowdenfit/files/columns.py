@@ -10,7 +10,7 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import split_brackets
-from bowdenfit.files.matching import Candidate, find_candidates, meanings, plain_name
+from bowdenfit.files.matching import MatchedColumn, find_candidates, meanings, plain_name
 from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.naming import option_naming
 from bowdenfit.files.spellings import parse_heading
@@ -153,7 +153,7 @@ def _check_known_units(
             )
 
 
-def _ambiguous(table: RawTable, quantity: str, columns: Sequence[Candidate]) -> DatasetError:
+def _ambiguous(table: RawTable, quantity: str, columns: Sequence[MatchedColumn]) -> DatasetError:
     names = [table.header[candidate.position] for candidate in columns]
     both = "both" if len(names) == 2 else "all"
     return DatasetError(

@@ -29,7 +29,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class MatchedColumn:
     """A column that can be a quantity.
 
     Args:
@@ -45,7 +45,7 @@ class Candidate:
 
 def find_candidates(
     headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], stated: Collection[str] = ()
-) -> dict[str, list[Candidate]]:
+) -> dict[str, list[MatchedColumn]]:
     """The columns that can be each quantity; several where a file leaves it open.
 
     The name of a quantity comes first, then other spellings of it; one that only a pair makes clear, such as T1 beside T2,
@@ -56,15 +56,15 @@ def find_candidates(
         wanted: What to look for.
         stated: Quantities whose column the user has named; none is looked for.
     """
-    by_quantity: dict[str, list[Candidate]] = {quantity.name: [] for quantity in wanted}
-    loose: dict[str, list[Candidate]] = {quantity.name: [] for quantity in wanted}
+    by_quantity: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
+    loose: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
     for i, (heading, unit) in enumerate(headings):
         named = meanings(heading, wanted)
         for quantity, written in named:
-            by_quantity[quantity.name].append(Candidate(i, written or unit or None))
+            by_quantity[quantity.name].append(MatchedColumn(i, written or unit or None))
         other = parse_heading(heading, unit) if heading and not named and len(heading) <= _LONGEST_HEADING else None
         if other and other.quantity in by_quantity:
-            (loose if other.pair else by_quantity)[other.quantity].append(Candidate(i, other.unit, other.pair))
+            (loose if other.pair else by_quantity)[other.quantity].append(MatchedColumn(i, other.unit, other.pair))
     for one, far in (("input_force", "output_force"), ("output_force", "input_force")):
         if one in by_quantity and not by_quantity[one]:
             beside = [candidate.pair for candidate in (*by_quantity[far], *loose[far])] + [""] * (far in stated)

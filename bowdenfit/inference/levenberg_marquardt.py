@@ -24,7 +24,7 @@ import optimistix as optx
 from jax import Array
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.term import rounded_up
+from bowdenfit.kinds.term import round_up_count
 
 _SINGULAR = 1e-13  # relative size of scaled singular values below which a direction takes no step
 _UNCOMPUTABLE = 1e100  # replaces a residual that cannot be computed, so that no step goes there
@@ -161,7 +161,7 @@ def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[n
     at the point that the last step returned. It returns the accepted parameters, the state, the next point to evaluate, and
     whether the solve has ended. Padding with rows of zeros, which change nothing, lets one program serve many tables.
     """
-    (program, state), more = _compile_step(rounded_up(rows), columns), rounded_up(rows) - rows
+    (program, state), more = _compile_step(round_up_count(rows), columns), round_up_count(rows) - rows
     none, flat = np.zeros(more), np.zeros((more, columns))
 
     def step(settings: Any, first: Any, y: Any, state: Any, residuals: np.ndarray, jacobian: np.ndarray) -> Any:

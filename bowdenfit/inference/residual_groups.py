@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.kinds.places import RUN, Places
+from bowdenfit.kinds.covariates import RUN, Covariates
 from bowdenfit.kinds.sliding_rows import ORDER, STROKE, InsideRuns
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model
@@ -97,7 +97,7 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
         size = len(solution["residuals"][term.name])
         of_term = solution["residuals"][term.name], solution["jacobian"][position : position + size]
         position += size
-        for block in _make_blocks(term, model.places.get(term.name), *of_term, solution["readings"][term.name], values):
+        for block in _make_blocks(term, model.covariates.get(term.name), *of_term, solution["readings"][term.name], values):
             stop = start + len(block.residuals)
             blocks.append(replace(block, rows=slice(start, stop)))
             start = stop
@@ -140,7 +140,7 @@ def _project_out(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
 
 def _make_blocks(
     term: Term,
-    places: Places | None,
+    places: Covariates | None,
     residuals: np.ndarray,
     jacobian: np.ndarray,
     expected: np.ndarray,
@@ -172,7 +172,7 @@ def _bare_block(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: 
 
 
 def _labelled_block(
-    term: Term, places: Places | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
+    term: Term, places: Covariates | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
 ) -> ResidualGroup:
     """Return the labelled readings, or whole runs."""
     n = len(residuals)

@@ -2,7 +2,7 @@
 
 Imports go downward only (a contract of import-linter in pyproject.toml holds that):
 
-    fit_command  places  run_parts                       commands that fit a lone file; where readings were taken; parts of runs
+    fit_command  covariates  run_parts                   commands that fit a lone file; covariates of readings; parts of runs
     file_kind  terms                                     what a lone file holds; TERMS, the kinds in the likelihood (JAX)
     descriptions                                         cable.toml and plans, with a field for every kind
     this module                                          KINDS: the kinds that read and describe tables (NumPy)
@@ -47,7 +47,7 @@ KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in _ALL}
 """Every kind by its name, in the order in which tables are read, fitted and spoken of."""
 
 
-def each_table(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
+def iterate_tables(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
     """Yield every table with its kind, in the order of the kinds."""
     for kind in KINDS.values():
         table = measurements.table(kind.table)
@@ -55,19 +55,19 @@ def each_table(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:
             yield kind, table
 
 
-def kind_of(readings: str) -> Kind[Any] | None:
+def find_kind(readings: str) -> Kind[Any] | None:
     """Return the kind whose readings have a name in results; None if none has."""
     return next((kind for kind in KINDS.values() if any(one.name == readings for one in kind.readings)), None)
 
 
-def readings_called(name: str) -> Readings:
+def find_readings(name: str) -> Readings:
     """Return what readings of this name are called; by their name where no kind has such."""
-    kind = kind_of(name)
+    kind = find_kind(name)
     return next(
         (one for one in (kind.readings if kind else ()) if one.name == name), Readings(name, name, name, "{}", name)
     )
 
 
-def reading_called(name: str, label: str) -> str:
+def describe_reading(name: str, label: str) -> str:
     """Return what one of the readings of this name is called."""
-    return readings_called(name).one.format(label)
+    return find_readings(name).one.format(label)

@@ -92,7 +92,7 @@ class Situation:
             return [Candidate(kind)]
         angles = np.column_stack([own.column(name)[0] for name in self.columns_without_curve])
         cases = np.unique(np.deg2rad(np.rad2deg(angles[np.isfinite(angles).all(axis=1)]).round(1)), axis=0)
-        chosen = cases[_evenly(len(cases), MOST_ANGLES)] if len(cases) else cases
+        chosen = cases[_evenly_spaced(len(cases), MOST_ANGLES)] if len(cases) else cases
         return [Candidate(kind, angles=tuple(float(angle) for angle in case)) for case in chosen]
 
     def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, RowOrigin]:
@@ -132,14 +132,14 @@ class CandidateKind(ABC):
         along_route: Whether it is made at a value of the route, where there is one.
         angles: Which wrap angles name it elsewhere: none, those measured row by row, or the total one.
         loaded: Whether it is made under a load.
-        tells_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
+        measures_curves: Whether it is of the wrap angles themselves, so that no measured angle can stand in.
         mounted_anew: Whether each means mounting the cable anew.
     """
 
     along_route: bool = False
     angles: Literal["none", "columns", "total"] = "columns"
     loaded: bool = False
-    tells_curves: bool = False
+    measures_curves: bool = False
     mounted_anew: bool = False
 
     @property
@@ -200,7 +200,7 @@ class CandidateKind(ABC):
         """What figures call them."""
         return self.noun[0].upper() + self.noun[1:]
 
-    def measured(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: Cable) -> str:
         """Return what is measured, such as "the stretch"."""
         return f"the {self.noun}"
 
@@ -216,27 +216,27 @@ class CandidateKind(ABC):
         return Candidate(self.name, route, (np.pi / 2,) * n, USUAL_LOAD if self.loaded else float("nan"))
 
 
-def one_reading_each(term: Any) -> Simulation:
+def simulate_rows(term: Any) -> Simulation:
     """How candidates are read that are the rows of a term, one each."""
     return Simulation(term.simulate, term.data, [(row,) for row in range(len(term.labels))])
 
 
-def some_loads(loads: np.ndarray, most: int = MOST_LOADS) -> list[float]:
+def choose_loads(loads: np.ndarray, most: int = MOST_LOADS) -> list[float]:
     """Some of the loads measured at, to two digits: as they were meant, without the noise of their reading."""
-    return _some(np.array([float(f"{load:.2g}") for load in loads if load > 0]), most)
+    return _choose_distinct(np.array([float(f"{load:.2g}") for load in loads if load > 0]), most)
 
 
-def some_bends(angles: np.ndarray) -> list[float]:
+def choose_wrap_angles(angles: np.ndarray) -> list[float]:
     """Some of the wrap angles measured at [rad], to a tenth of a degree."""
-    return _some(np.deg2rad(np.rad2deg(angles).round(1)), MOST_ANGLES)
+    return _choose_distinct(np.deg2rad(np.rad2deg(angles).round(1)), MOST_ANGLES)
 
 
-def _some(values: np.ndarray, most: int) -> list[float]:
+def _choose_distinct(values: np.ndarray, most: int) -> list[float]:
     """Distinct values, evenly chosen where there are many."""
     different = np.unique(values)
-    return [float(v) for v in different[_evenly(len(different), most)]] if len(different) else []
+    return [float(v) for v in different[_evenly_spaced(len(different), most)]] if len(different) else []
 
 
-def _evenly(n: int, most: int) -> np.ndarray:
+def _evenly_spaced(n: int, most: int) -> np.ndarray:
     """Places of at most so many of n things."""
     return np.unique(np.linspace(0, n - 1, most).round().astype(int))

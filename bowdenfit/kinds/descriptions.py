@@ -13,13 +13,13 @@ from bowdenfit.description.placeholders import Place, find_placeholders
 from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError, Faults, suggest_name
-from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.kind import Design, FrictionKind, Kind, PlannedKind
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import listed
 
-_ASKED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
+_NEEDED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
 """Keys without which tables cannot be read."""
 
 
@@ -44,15 +44,15 @@ def load_description(
         DescriptionError: The file is missing or no TOML, keys are unknown, or values are impossible or left from the template.
     """
     text, stated = read_toml(path, overrides)
-    raw, wrong = with_columns(stated, columns or {}), Faults()
+    raw, wrong = add_columns(stated, columns or {}), Faults()
     placeholders = find_placeholders(raw, text, path.name)
     wrong.faults += placeholders.values()
     try:
         description = parse_description(raw, path.name)
     except DescriptionError as error:
-        wrong.faults += [fault for fault in error.faults or (error,) if not _is_about(fault.key_path, placeholders)]
+        wrong.faults += [fault for fault in error.faults or (error,) if not _concerns_placeholder(fault.key_path, placeholders)]
         keys = {str(fault.key_path[0]) if fault.key_path else "schema" for fault in wrong.faults}
-        if keys & _ASKED_BY_TABLES or not keys <= set(raw):
+        if keys & _NEEDED_BY_TABLES or not keys <= set(raw):
             wrong.refuse()
         try:
             known = {key: value for key, value in raw.items() if key not in keys}
@@ -67,7 +67,7 @@ def load_description(
     return description
 
 
-def _is_about(key_path: Place, placeholders: Mapping[Place, DescriptionError]) -> bool:
+def _concerns_placeholder(key_path: Place, placeholders: Mapping[Place, DescriptionError]) -> bool:
     """Whether a fault is one of a placeholder's."""
     return any(bool(key_path) and key_path[: len(placeholder)] == placeholder[: len(key_path)] for placeholder in placeholders)
 
@@ -79,7 +79,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
         DescriptionError: A key is unknown, or a value is missing or impossible.
     """
     kinds = tuple(KINDS.values())
-    description = validate(raw, _models(kinds)[0], file)
+    description = validate(raw, _description_models(kinds)[0], file)
     faults = Faults()
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
@@ -92,7 +92,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
     return description
 
 
-def with_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:
+def add_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:
     """Plain data of a description whose table has the named columns.
 
     Args:
@@ -125,14 +125,14 @@ def _has_columns(name: str, settings: Any) -> bool:
 
 
 @lru_cache
-def _models(kinds: tuple[Kind[Any], ...]) -> tuple[type[Description], type[Tables]]:
+def _description_models(kinds: tuple[Kind[Any], ...]) -> tuple[type[Description], type[Tables]]:
     """A description, and its tables, with a field for each kind."""
     fields: dict[str, Any] = {kind.name: (kind.settings | None, None) for kind in kinds}
     tables = create_model("CableTables", __base__=Tables, __module__=__name__, **fields)
     return create_model("CableDescription", __base__=Description, __module__=__name__, tables=(tables, ...)), tables
 
 
-CableDescription, CableTables = _models(tuple(KINDS.values()))  # found here by other processes
+CableDescription, CableTables = _description_models(tuple(KINDS.values()))  # found here by other processes
 
 
 def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:
@@ -146,24 +146,24 @@ def read_design(page: Mapping[str, Any], description: Description, file: str) ->
     Raises:
         DescriptionError: A key or a value is wrong, or this cable cannot have what is asked for.
     """
-    design = _parsed(page, file)
+    design = _parse_design(page, file)
     for kind in _planned_kinds():
         if why := kind.design_contradiction(design, description):
             raise DescriptionError(f"{file}, design.{why}")
     return design
 
 
-def design_of(**measured: Any) -> Design:
+def make_design(**measured: Any) -> Design:
     """A design of any cable, from keywords; what a cable does not have of it is not measured."""
-    return _parsed(measured, "the design")
+    return _parse_design(measured, "the design")
 
 
 def _planned_kinds() -> list[PlannedKind[Any]]:
     return [kind for kind in KINDS.values() if isinstance(kind, PlannedKind)]
 
 
-def _parsed(page: Mapping[str, Any], file: str) -> Design:
-    model = _page(tuple(kind.design for kind in _planned_kinds()))
+def _parse_design(page: Mapping[str, Any], file: str) -> Design:
+    model = _design_page_model(tuple(kind.design for kind in _planned_kinds()))
     raw = {"design": dict(page)}
     try:
         return model.model_validate(raw).design  # type: ignore[attr-defined]
@@ -172,7 +172,7 @@ def _parsed(page: Mapping[str, Any], file: str) -> Design:
 
 
 @lru_cache
-def _page(parts: tuple[type[Design], ...]) -> type[BaseModel]:
+def _design_page_model(parts: tuple[type[Design], ...]) -> type[BaseModel]:
     """What is read of a plan."""
     whole = create_model("WholeDesign", __base__=parts, __module__=__name__)
     return create_model("DesignPage", __base__=Frozen, __module__=__name__, design=(whole, ...))
@@ -212,17 +212,17 @@ def description_without_recordings(raw: Mapping[str, Any], file: str) -> Descrip
 
 def design_without_recordings(description: Description, angles: Sequence[float]) -> Design:
     """What is measured beside them, at those route values; the table that stands in is read where all curves hold."""
-    return design_of(angles=angles, efficiencies=(description.route.middle if description.route else 0.0,))
+    return make_design(angles=angles, efficiencies=(description.route.middle if description.route else 0.0,))
 
 
-def measured_groups(description: Description, measurements: Measurements) -> tuple[str, ...]:
+def order_groups(description: Description, measurements: Measurements) -> tuple[str, ...]:
     """Groups in the order in which they come, but first the one that predictions are for where that is stated.
 
     Raises:
         DescriptionError: Groups are to have coefficients of their own, and a table says nothing of groups, or there is one
             group only; or the one that predictions are for is not there.
     """
-    tables = [(kind, kind.groups(table)) for kind, table in each_table(measurements) if isinstance(kind, FrictionKind)]
+    tables = [(kind, kind.groups(table)) for kind, table in iterate_tables(measurements) if isinstance(kind, FrictionKind)]
     names = list(dict.fromkeys(name for _, groups in tables for name in groups))
     without = [kind.name for kind, groups in tables if not groups]
     if description.by_group and without:

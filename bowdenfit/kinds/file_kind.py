@@ -56,7 +56,7 @@ _ONE_FORCE = (Quantity("force", "force"), *FORCES)
 _POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))
 
 
-def stated_angle(path: Path) -> tuple[str, str] | None:
+def find_stated_angle(path: Path) -> tuple[str, str] | None:
     """The wrap angle that a file states, such as "90deg", and where; None if it states none, or several.
 
     Args:
@@ -104,7 +104,7 @@ class FileKind:
     other: str = ""
 
 
-def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ()) -> FileKind:
+def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ()) -> FileKind:
     """What kind of measurement a file without a description holds.
 
     A time column makes a recording, unless a column of runs, strokes or groups says that its rows are readings of their own;
@@ -130,11 +130,11 @@ def file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ())
     try:
         table = read_table(path, HEAD)
     except DatasetError as error:
-        return _without_headings(path, error)
-    return _by_columns(path, table)
+        return _guess_without_headings(path, error)
+    return _guess_by_columns(path, table)
 
 
-def _without_headings(path: Path, error: DatasetError) -> FileKind:
+def _guess_without_headings(path: Path, error: DatasetError) -> FileKind:
     """A file whose first rows are no table; a short one is refused for what is wrong with them.
 
     Raises:
@@ -148,7 +148,7 @@ def _without_headings(path: Path, error: DatasetError) -> FileKind:
     return FileKind("recordings", "it is long, and its first rows are no headings over columns of readings")
 
 
-def _by_columns(path: Path, table: RawTable) -> FileKind:
+def _guess_by_columns(path: Path, table: RawTable) -> FileKind:
     clock = next((i for i, _ in enumerate(table.header) if _is_time(table, i)), None)
     quantities = {name for name, columns in find_candidates(_headings(table), COLUMNS).items() if columns}
     forces = {quantity.name for quantity in FORCES}
@@ -157,7 +157,7 @@ def _by_columns(path: Path, table: RawTable) -> FileKind:
     if _has_one_force_and_a_position(table):
         return FileKind("displacement", "it has one force and a displacement")
     if clock is not None:
-        return _with_clock(table, clock, kind, rows_alone)
+        return _guess_with_clock(table, clock, kind, rows_alone)
     rate = None if path.suffix.lower() in WORKBOOKS else stated_rate(_lines_above(path, table))
     if rate is not None:
         return FileKind("recordings", f"the line {shown(rate[1])} states its sampling rate")
@@ -182,7 +182,7 @@ def _has_one_force_and_a_position(table: RawTable) -> bool:
     return at_motor and forces <= 1 and counts["displacement"] + counts["position"] == 1
 
 
-def _with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
+def _guess_with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -> FileKind:
     heading, steps, many = shown(table.header[clock]), _steps(table, clock), len(table.rows) >= _FEW
     if (rows_alone or kind == "efficiencies") and not (many and steps and float(np.median(steps)) < _SLOW):
         return FileKind(
@@ -219,7 +219,7 @@ def _is_time(table: RawTable, column: int) -> bool:
     return bool(steps) and min(steps) > 0
 
 
-def numbers_in(table: RawTable, column: int) -> list[float]:
+def read_numbers(table: RawTable, column: int) -> list[float]:
     """The numbers of a column, as they stand there; NaN where a cell holds none."""
     numbers = []
     for row in table.rows:
@@ -232,7 +232,7 @@ def numbers_in(table: RawTable, column: int) -> list[float]:
 
 def _steps(table: RawTable, column: int) -> list[float]:
     """Seconds from each of the first rows to the next; empty where these are no numbers."""
-    values = numbers_in(table, column)
+    values = read_numbers(table, column)
     known = [value for value in values if math.isfinite(value)]
     unit = heading_of(table.header[column], table.units[column]).unit
     try:
@@ -248,7 +248,7 @@ def _is_smooth(table: RawTable) -> bool:
         other = parse_heading(heading, unit)
         if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):
             continue
-        values = np.array(numbers_in(table, i))
+        values = np.array(read_numbers(table, i))
         values = values[np.isfinite(values)]
         spread = float(np.var(values)) if len(values) > _LONG else 0.0
         spreads = len(set(values.tolist())) > len(values) / 4 and (values.min() <= 0 or count_loads(values) is None)

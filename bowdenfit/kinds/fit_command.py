@@ -16,7 +16,15 @@ from bowdenfit.files.matching import Quantity, find_candidates
 from bowdenfit.files.naming import option_naming
 from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.file_kind import BESIDE_FORCES, FORCES, HEAD, FileKind, file_kind, numbers_in, stated_angle
+from bowdenfit.kinds.file_kind import (
+    BESIDE_FORCES,
+    FORCES,
+    HEAD,
+    FileKind,
+    find_stated_angle,
+    guess_file_kind,
+    read_numbers,
+)
 from bowdenfit.units import ColumnSource, dimension_of, is_unit
 from bowdenfit.words import listed, shown
 
@@ -46,11 +54,11 @@ class HeadedColumn:
     high: float = 0.0
 
 
-def columns_of(table: RawTable) -> list[HeadedColumn]:
+def list_number_columns(table: RawTable) -> list[HeadedColumn]:
     """The columns of numbers of a table but for clocks."""
     columns = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
-        known = [value for value in numbers_in(table, i) if np.isfinite(value)]
+        known = [value for value in read_numbers(table, i) if np.isfinite(value)]
         if (
             heading
             and len(known) > len(table.rows) / 2
@@ -60,7 +68,7 @@ def columns_of(table: RawTable) -> list[HeadedColumn]:
     return columns
 
 
-def name_ends(
+def name_force_columns(
     columns: Sequence[HeadedColumn], option: str, stated: Mapping[str, ColumnSource], always: bool = False
 ) -> tuple[list[str], list[str]]:
     """Options that name the forces at both ends, and what they take for granted.
@@ -125,7 +133,7 @@ class FitCommand:
     names_more: bool = False
 
 
-def table_command(
+def make_table_command(
     path: Path, table: RawTable, kind: str, stated: Mapping[str, ColumnSource], always: bool = False
 ) -> FitCommand:
     """The command that fits a table.
@@ -140,16 +148,16 @@ def table_command(
     headings = list(zip(table.header, table.units, strict=True))
     options, provided = list[str](), list[str]()
     if kind == "forces":
-        numbers, others = columns_of(table), _of_others(headings)
-        words, could_be = _of_words(headings, numbers), [column for column in numbers if column.name not in others]
-        options, provided = name_ends(could_be, "--column", {**words, **stated}, always)
-    angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle(table, path)
-    command = _command(path, [*angle, *_named(stated, "--column"), *options], [*of_angle, *provided])
+        numbers, others = list_number_columns(table), _find_other_columns(headings)
+        words, could_be = _find_columns_of_words(headings, numbers), [column for column in numbers if column.name not in others]
+        options, provided = name_force_columns(could_be, "--column", {**words, **stated}, always)
+    angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle_options(table, path)
+    command = _make_command(path, [*angle, *_column_options(stated, "--column"), *options], [*of_angle, *provided])
     named = [option for option in (*angle, *options) if option.startswith("--column")]
     return replace(command, names_more=bool(named) and not any(option.endswith("=NAME") for option in named))
 
 
-def recording_command(
+def make_recording_command(
     path: Path,
     columns: Sequence[HeadedColumn],
     has_clock: bool,
@@ -165,40 +173,40 @@ def recording_command(
         stated: What the user has named already, by quantity.
         always: Whether channels are named that say themselves what they are.
     """
-    options, provided = name_ends(columns, "--channel", stated, always)
+    options, provided = name_force_columns(columns, "--channel", stated, always)
     if not has_clock and "time" not in stated:
         options.append("--channel time=RATE")
         provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not say")
-    angle, of_angle = _one_angle(path)
-    return _command(path, [*angle, *_named(stated, "--channel"), *options], [*of_angle, *provided])
+    angle, of_angle = _stated_angle_options(path)
+    return _make_command(path, [*angle, *_column_options(stated, "--channel"), *options], [*of_angle, *provided])
 
 
-def either(path: Path, table: RawTable, guess: FileKind) -> list[FitCommand]:
+def make_both_commands(path: Path, table: RawTable, guess: FileKind) -> list[FitCommand]:
     """The commands for a file that could be a table or a recording, in this order."""
     kind = guess.kind if guess.other == "recordings" else guess.other
     clocks = [i for i, heading in enumerate(table.header) if names_time(heading)]
-    channels = [HeadedColumn(*_split(column.name, column.unit), column.mean) for column in columns_of(table)]
-    return [table_command(path, table, kind, {}, True), recording_command(path, channels, bool(clocks), {}, True)]
+    channels = [HeadedColumn(*_split_heading(column.name, column.unit), column.mean) for column in list_number_columns(table)]
+    return [make_table_command(path, table, kind, {}, True), make_recording_command(path, channels, bool(clocks), {}, True)]
 
 
-def refuse_either(path: Path, table: RawTable, guess: FileKind) -> DatasetError:
+def make_ambiguity_error(path: Path, table: RawTable, guess: FileKind) -> DatasetError:
     """The refusal of a file that could be a table or a recording."""
-    of_table, of_recording = either(path, table, guess)
+    of_table, of_recording = make_both_commands(path, table, guess)
     return DatasetError(
         f"{path.name} could be a table of readings or a recording: {guess.why}; say which, for a table by {of_table.text}, for "
         f"a recording by {of_recording.text}."
     )
 
 
-def only_kind(path: Path, has_channels: bool, named: Sequence[str]) -> str:
+def require_one_kind(path: Path, has_channels: bool, named: Sequence[str]) -> str:
     """Name of the kind of measurement that a file without a description holds.
 
     Raises:
         DatasetError: It could be of either of two; says the command for each.
     """
-    guess = file_kind(path, has_channels, named)
+    guess = guess_file_kind(path, has_channels, named)
     if guess.other:
-        raise refuse_either(path, read_table(path, HEAD), guess)
+        raise make_ambiguity_error(path, read_table(path, HEAD), guess)
     return guess.kind
 
 
@@ -246,7 +254,7 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
         )
 
 
-def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
+def _find_columns_of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
     """Forces whose columns say what they are and hold no numbers, so that no other column is to be taken for them."""
     known = {column.name for column in numbers}
     names_of = {
@@ -258,25 +266,25 @@ def _of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColum
     }
 
 
-def _of_others(headings: Sequence[tuple[str, str]]) -> set[str]:
+def _find_other_columns(headings: Sequence[tuple[str, str]]) -> set[str]:
     """Columns that say themselves that they are something other than a force, such as the label of a run."""
     candidates = find_candidates(headings, BESIDE_FORCES)
     return {headings[columns[0].position][0] for columns in candidates.values() if len(columns) == 1}
 
 
-def _split(heading: str, unit: str) -> tuple[str, str]:
+def _split_heading(heading: str, unit: str) -> tuple[str, str]:
     """Name and unit as a recording has them."""
     both = heading_of(heading, unit)
     return both.name, both.unit
 
 
-def _wrap_angle(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
+def _wrap_angle_options(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
     """What gives the wrap angle of a table: a column of its own, one that may be, or the user."""
     if find_candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))["wrap_angle"]:
         return [], []
     likely = likely_wrap_angles(table)
     if not likely:
-        return _one_angle(path)
+        return _stated_angle_options(path)
     best = next((name for name in likely if "measured" in name.lower()), next(iter(likely)))
     others = [shown(name) for name in likely if name != best]
     rather = f" rather than {listed(others)}" if others else ""
@@ -291,7 +299,7 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
     """
     likely = dict[str, str]()
     units = dict(zip(table.header, table.units, strict=True))
-    for column in columns_of(table):
+    for column in list_number_columns(table):
         spelling = likely_wrap_angle(column.name, units[column.name])
         if spelling is not None and column.high > column.low:
             in_radians = column.high <= _MOST_RADIANS and column.mean != round(column.mean)
@@ -300,18 +308,18 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
     return likely
 
 
-def _named(stated: Mapping[str, ColumnSource], option: str) -> list[str]:
+def _column_options(stated: Mapping[str, ColumnSource], option: str) -> list[str]:
     return [option_naming(quantity, source.name, source.unit or "", option) for quantity, source in stated.items()]
 
 
-def _one_angle(path: Path) -> tuple[list[str], list[str]]:
+def _stated_angle_options(path: Path) -> tuple[list[str], list[str]]:
     """The wrap angle that a file states, or any."""
-    stated = stated_angle(path)
+    stated = find_stated_angle(path)
     if stated is None:
         return ["--wrap-angle 180deg"], ["180 deg is the wrap angle of the bench"]
     angle, where = stated
     return [f"--wrap-angle {angle}"], [f"{angle} is the wrap angle, as {where} says"]
 
 
-def _command(path: Path, options: Sequence[str], provided: Sequence[str]) -> FitCommand:
+def _make_command(path: Path, options: Sequence[str], provided: Sequence[str]) -> FitCommand:
     return FitCommand(" ".join(["bowdenfit fit", shlex.quote(str(path)), *options]), tuple(provided))

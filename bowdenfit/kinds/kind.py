@@ -33,8 +33,8 @@ from bowdenfit.description import Contact, Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, Faults
-from bowdenfit.kinds.plausibility import Coarse
-from bowdenfit.kinds.rows import ForceRows, Page, Rows
+from bowdenfit.kinds.plausibility import CoarseReadings
+from bowdenfit.kinds.rows import FileRows, ForceRows, Rows
 from bowdenfit.kinds.table_files import AnyTable, InitQuestions, Source, TableFromFiles
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.types import Vector
@@ -72,7 +72,7 @@ class Readings:
         return 100.0 if self.are_efficiencies else 1.0
 
 
-def efficiencies(name: str, table: str, words: str, one: str, are_runs: bool = False) -> Readings:
+def efficiency_readings(name: str, table: str, words: str, one: str, are_runs: bool = False) -> Readings:
     """Readings that are efficiencies."""
     return Readings(name, table, words, one, "Efficiency (%)", "% of the force", True, are_runs)
 
@@ -133,7 +133,7 @@ class Kind(ABC, Generic[AnyTable]):
         """Return how many readings were fitted, in words; empty where `TermKind.count_readings` says it."""
         return ""
 
-    def file_rows(self, table: AnyTable, description: Description) -> Page | None:
+    def file_rows(self, table: AnyTable, description: Description) -> FileRows | None:
         """Return the headings and rows of a file that holds the table; None if such files are not made of rows."""
         return None
 
@@ -169,7 +169,7 @@ class Kind(ABC, Generic[AnyTable]):
         """Return which readings were copied from others, in sentences without a first capital or remedy."""
         return []
 
-    def coarse_readings(self, table: AnyTable) -> Coarse | None:
+    def coarse_readings(self, table: AnyTable) -> CoarseReadings | None:
         """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
         return None
 
@@ -237,7 +237,7 @@ class PlannedKind(Kind[AnyTable]):
         """
 
     @abstractmethod
-    def file_rows(self, table: AnyTable, description: Description) -> Page:
+    def file_rows(self, table: AnyTable, description: Description) -> FileRows:
         """Return the headings and rows of the file that is written."""
 
     def design_contradiction(self, design: Any, description: Description) -> str:
@@ -296,6 +296,6 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
 
 def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
     """Return what is wrong with a column in a row of a table, behind the value that stands there."""
-    error = DatasetError(f"{table.origin.place(i)}, column {column!r}: {value}{what}")
+    error = DatasetError(f"{table.origin.describe_row(i)}, column {column!r}: {value}{what}")
     error.fault_key, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
     return error

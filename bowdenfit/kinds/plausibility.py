@@ -30,7 +30,7 @@ FACTOR = 10.0  # between what is simulated and what was measured, at most
 SCATTER = 0.1  # of log ratios of forces about their stroke's mean, at most
 
 
-CHANCE = 1e-6  # that readings agree which are no copies, below which they are said to be
+FALSE_ALARM = 1e-6  # that readings agree which are no copies, below which they are said to be
 _LEAST_FREEDOM = 3  # of the scatter that is compared with the last digit
 _FINE = 3.0  # last digits in the scatter, below which readings are alike because they are rounded alike
 NO_NOISE = 1e-5  # scatter as part of the readings, below which they were computed and not measured
@@ -41,7 +41,7 @@ _POWERS = range(6, -10, -1)  # of ten, that a last digit may be
 _WHOLE = 1e-9  # as part of a multiple of a last digit, by which it may be off
 
 
-def beyond(loss: np.ndarray, what: str) -> str:
+def explain_impossible_loss(loss: np.ndarray, what: str) -> str:
     """Why friction exponents are none of a cable's, in words; empty if they may be.
 
     Args:
@@ -53,18 +53,18 @@ def beyond(loss: np.ndarray, what: str) -> str:
     return f"{what} is above 99 %" if np.any(loss < _LEAST_LOSS) else ""
 
 
-def parts(group: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
+def split_by_group(group: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
     """The values of each group."""
     return [values[group == label] for label in np.unique(group)]
 
 
-def within_factor(real: float, made: float) -> bool:
+def is_within_factor(real: float, made: float) -> bool:
     """Whether a simulated quantity is within a factor of ten of the measured one."""
     return bool(real / FACTOR <= made <= real * FACTOR)
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedReadings:
     """Readings of a table, as they are compared with each other.
 
     Args:
@@ -91,49 +91,51 @@ class Compared:
         return np.nan_to_num(np.column_stack([self.settings, self.read]), nan=-1.0)
 
 
-def without_runs(origin: RowOrigin, settings: np.ndarray, read: np.ndarray, along: Vector, curve: Any = 0) -> Compared:
+def compare_without_runs(
+    origin: RowOrigin, settings: np.ndarray, read: np.ndarray, along: Vector, curve: Any = 0
+) -> ComparedReadings:
     """A table that has no runs; its settings and readings may be one column.
 
     Args:
         origin: Where its rows were read.
-        settings, read, along, curve: As of `Compared`; all rows lie on one curve if that is omitted.
+        settings, read, along, curve: As of `ComparedReadings`; all rows lie on one curve if that is omitted.
     """
     n = len(along)
     none, curves = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
-    return Compared(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, curves)
+    return ComparedReadings(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, curves)
 
 
-def places_along(rows: ForceRows) -> Vector:
+def route_or_wrap_angle(rows: ForceRows) -> Vector:
     """Where rows were read: on the route, or at which wrap angle where there is none."""
     return rows.route if np.isfinite(rows.route).all() else np.nansum(rows.own.angle, axis=1)
 
 
-def copies(compared: Compared) -> list[str]:
+def describe_copies(compared: ComparedReadings) -> list[str]:
     """Which readings are copies of others, in sentences without a first capital or remedy; none where chance may do it."""
     rows = compared.rows
     parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
-    alike, repeated = _alike(rows, parts), _repeated(rows, parts)
+    alike, repeated = _find_equal_runs(rows, parts), _find_repeated_rows(rows, parts)
     if not alike and not repeated:
         return []
-    chances, sentences = _chances(compared), []
+    chances, sentences = _agreement_probabilities(compared), []
     for same in alike:
         first, *others = (compared.names[k] for k in same)
         one = parts[same[0]]
-        if _log_chance(chances, compared.read[one]) + 2 * np.log(len(parts)) < np.log(CHANCE):
+        if _log_agreement_probability(chances, compared.read[one]) + 2 * np.log(len(parts)) < np.log(FALSE_ALARM):
             hold = "holds" if len(others) == 1 else "hold"
             sentences.append(
                 f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
             )
     for times, those in repeated.items():
         where = np.concatenate([parts[k] for k in those])
-        if (1 - 1 / times) * _log_chance(chances, compared.read[where]) < np.log(CHANCE):
+        if (1 - 1 / times) * _log_agreement_probability(chances, compared.read[where]) < np.log(FALSE_ALARM):
             whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
             often = _MULTIPLES.get(times, f"{times} times")
             sentences.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
     return sentences
 
 
-def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
+def _find_equal_runs(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
     """Runs that hold the same rows, in whatever order, two or more each time."""
     known: dict[bytes, list[int]] = defaultdict(list)
     for k, where in parts.items():
@@ -141,7 +143,7 @@ def _alike(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
     return [same for same in known.values() if len(same) > 1]
 
 
-def _repeated(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
+def _find_repeated_rows(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
     """Runs in which every row stands equally often, by how often that is, if more than once."""
     runs_by_count: dict[int, list[int]] = defaultdict(list)
     for k, where in parts.items():
@@ -151,12 +153,12 @@ def _repeated(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[i
     return runs_by_count
 
 
-def _log_chance(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
+def _log_agreement_probability(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
     """Logarithm of the chance that as many other readings are the same."""
     return float(np.sum(np.isfinite(read).sum(axis=0) * np.log(chances)))
 
 
-def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
+def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " readings"]:
     """Chance that two readings of the same agree to the last digit, by column; 1 where that is not known.
 
     By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
@@ -169,7 +171,7 @@ def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
         for curve in np.unique(compared.curve[known]):
             here = known & (compared.curve == curve)
             points = np.unique(np.column_stack([compared.along[here], read[here]]), axis=0)
-            residual, left = _about_a_polynomial(*points.T)
+            residual, left = _residuals_of_polynomial(*points.T)
             squares, freedom = squares + residual, freedom + left
         values = np.unique(read[known])
         if freedom < _LEAST_FREEDOM or len(values) < 2:
@@ -181,7 +183,7 @@ def _chances(compared: Compared) -> Float[np.ndarray, " readings"]:
     return probabilities
 
 
-def _about_a_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
+def _residuals_of_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
     """Sum of squares about a polynomial of x, and its degrees of freedom."""
     n_different = len(np.unique(x))
     degree = min(_DEGREE, n_different - 2) if n_different > 3 else n_different - 1
@@ -192,7 +194,7 @@ def _about_a_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Coarse:
+class CoarseReadings:
     """What is known of such a table.
 
     Args:
@@ -210,7 +212,9 @@ class Coarse:
     log_sd: float
 
 
-def coarse(file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, unit: str = "") -> Coarse | None:
+def find_coarse_readings(
+    file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, unit: str = ""
+) -> CoarseReadings | None:
     """What is known of a table whose repeated readings are all alike; None of any other.
 
     Args:
@@ -230,7 +234,7 @@ def coarse(file: str, settings: Float[np.ndarray, "rows settings"], read: Vector
     if last_digit == 0:
         return None
     log_sd = float(np.sqrt(np.mean((last_digit / different) ** 2) / 12))
-    return Coarse(file, f"{last_digit:g} {unit}".strip(), last_digit / 12**0.5, len(different), log_sd)
+    return CoarseReadings(file, f"{last_digit:g} {unit}".strip(), last_digit / 12**0.5, len(different), log_sd)
 
 
 def _last_digit(values: Vector) -> float:

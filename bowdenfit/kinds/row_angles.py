@@ -40,7 +40,7 @@ class RowAngles:
         }
 
 
-def row_angles(description: Description, table: ForceRows, angles: AngleTable | None) -> RowAngles:
+def collect_row_angles(description: Description, table: ForceRows, angles: AngleTable | None) -> RowAngles:
     """The wrap angles of a table's rows, before any parameter is known.
 
     A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;
@@ -59,7 +59,7 @@ def row_angles(description: Description, table: ForceRows, angles: AngleTable | 
             continue
         angle, angle_sd = table.own.column(contact.wrap_angle.column)
         if contact.wrap_angle.curve and angles is not None:
-            angle, angle_sd = _outside_curves(
+            angle, angle_sd = _complete_outside_curves(
                 description, contact.wrap_angle.column, table.route, angle, angle_sd, angles
             )
         has = ~np.isnan(angle)
@@ -69,7 +69,7 @@ def row_angles(description: Description, table: ForceRows, angles: AngleTable | 
     return RowAngles(np.nan_to_num(table.route), own, is_own, sd, noisy)
 
 
-def _outside_curves(
+def _complete_outside_curves(
     description: Description, column: str, route: np.ndarray, angle: np.ndarray, sd: np.ndarray, angles: AngleTable
 ) -> tuple[np.ndarray, np.ndarray]:
     """Own angles completed from the angle table for rows outside the range of the curves."""

@@ -33,7 +33,7 @@ _STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in 
 
 
 ENDS = tuple(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque"))
-Page = tuple[list[str], list[list[str]]]
+FileRows = tuple[list[str], list[list[str]]]
 """Headings and rows."""
 _DIGITS = 5
 STROKE_NAMES = {1: "pull", -1: "return"}
@@ -60,7 +60,7 @@ class RowOrigin(Part):
         """Rows of a file that is written with one line of headings."""
         return cls((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
-    def place(self, i: int) -> str:
+    def describe_row(self, i: int) -> str:
         """Row i in words."""
         return f"{self.files[self.file[i]]}, row {self.row[i]}"
 
@@ -176,10 +176,10 @@ def read_route(table: RawTable, columns: Mapping[str, Column], route: Route | No
     """Route variable of every row; NaN without a route."""
     if route is None:
         return np.full(len(table.rows), np.nan)
-    return rounded(require_column(table, columns, route.variable, f"{route.variable}_{route.unit}").numbers())
+    return round_lengths(require_column(table, columns, route.variable, f"{route.variable}_{route.unit}").numbers())
 
 
-def rounded(values: Iterable[float]) -> Vector:
+def round_lengths(values: Iterable[float]) -> Vector:
     """Values to 12 digits, so that one length is one number whatever unit each table gives it in."""
     return np.array([float(f"{value:.12g}") for value in values])
 
@@ -205,7 +205,7 @@ def _own_angle(column: Column, cell: Cell) -> float:
     return read_angle(cell, column)
 
 
-def provenance_of(table: RawTable) -> RowOrigin:
+def origin_of_rows(table: RawTable) -> RowOrigin:
     """Where the rows of one file stand."""
     rows = np.array([row[0].row for row in table.rows])
     return RowOrigin((table.file,), np.zeros(len(rows), dtype=int), rows)
@@ -239,7 +239,7 @@ def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Seq
                 )
 
 
-def end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
+def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
     """The column of one end, "input" or "output".
 
     Args:
@@ -257,11 +257,11 @@ def end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_l
     return columns[torque] if torque in columns else require_column(table, columns, force, named)
 
 
-def forces_of(values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def convert_to_forces(values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Forces at one end [N], from what its column holds.
 
     Args:
-        values: Numbers of `end_column`, in N or N mm.
+        values: Numbers of `find_end_column`, in N or N mm.
         table, columns: Where they were read.
         end: "input" or "output".
         pulleys: Their radii.
@@ -282,7 +282,7 @@ def route_cells(route: float, description: Description) -> list[str]:
     return [f"{route:g}"] if description.route else []
 
 
-def fixed(values: Iterable[float], decimals: int) -> list[str]:
+def format_fixed(values: Iterable[float], decimals: int) -> list[str]:
     """Cells of a column: so many decimals, and more where its largest value would else have fewer than five digits."""
     column = np.array(list(values), dtype=float)
     largest = float(np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
@@ -290,18 +290,18 @@ def fixed(values: Iterable[float], decimals: int) -> list[str]:
     return [f"{value:.{max(decimals, enough)}f}" for value in column]
 
 
-def in_words(values: np.ndarray, unit: str) -> str:
+def describe_range(values: np.ndarray, unit: str) -> str:
     """The range of values, or their one value."""
     low, high = float(values.min()), float(values.max())
     least, most = significant(low, 4), significant(high, 4)
     return f"{least} {unit}" if low == high else f"{least} to {most} {unit}"
 
 
-def signs(strokes: Sequence[Stroke]) -> list[int]:
+def stroke_signs(strokes: Sequence[Stroke]) -> list[int]:
     """+1 for each pull, -1 for each return."""
     return [_SIGNS[stroke] for stroke in strokes]
 
 
-def radians(degrees: Sequence[float]) -> Vector:
+def convert_to_radians(degrees: Sequence[float]) -> Vector:
     """Wrap angles as tables have them."""
     return np.deg2rad(np.array(degrees, dtype=float))

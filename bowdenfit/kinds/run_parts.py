@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds.runs import RunsTerm, run_sums, with_cells
+from bowdenfit.kinds.runs import RunsTerm, pad_cells, sum_runs
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.term import Term
 from bowdenfit.types import Labels
@@ -28,13 +28,13 @@ class RunParts:
 
     Args:
         labels: Each in words.
-        said: Of each, what is the same wherever it is the same event: count of readings, mean log ratio, mean load [N].
+        event_keys: What identifies the same event in every fit: count of readings, mean log ratio, mean load [N].
         run: Run of each.
         data: Arrays of the term without each part, stacked with the parts first.
     """
 
     labels: tuple[str, ...]
-    said: np.ndarray
+    event_keys: np.ndarray
     run: Labels
     data: dict[str, Any]
 
@@ -44,7 +44,7 @@ def has_rows(term: Term) -> bool:
     return isinstance(term, RunsTerm) and term.rows is not None
 
 
-def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
+def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
     """The parts of a term's runs; None where whole runs, or readings as they are, are all that can be left out.
 
     Args:
@@ -56,7 +56,7 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
     """
     if unit == "run" or not isinstance(term, RunsTerm) or term.rows is None:
         return None
-    part, names = _parts(term, term.rows, unit)
+    part, names = _assign_parts(term, term.rows, unit)
     counts, runs = np.bincount(part), np.unique(term.rows.run, return_inverse=True)[1]
     of_part = np.zeros(len(counts), dtype=int)
     of_part[part] = runs
@@ -69,7 +69,7 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
         )
     cells_per_run = len(term.data["mean"]) // len(term.labels)
     left = [
-        with_cells(run_sums(term.cable, _chosen(term.rows, part != i)), len(term.labels), cells_per_run)
+        pad_cells(sum_runs(term.cable, _select_rows(term.rows, part != i)), len(term.labels), cells_per_run)
         for i in range(len(counts))
     ]
     ratio, load = (np.bincount(part, values) / counts for values in (term.rows.log_ratio, term.rows.input_force))
@@ -77,13 +77,13 @@ def run_parts(term: Term, unit: LeaveOut) -> RunParts | None:
     return RunParts(names, np.column_stack([counts, ratio, load]), of_part, stacked)
 
 
-def _chosen(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
+def _select_rows(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
     """Some of the readings."""
     arrays = {name: value[kept] for name, value in vars(rows).items() if isinstance(value, np.ndarray)}
     return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
 
 
-def _parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:
+def _assign_parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:
     """The part of each reading, and each part in words."""
     run = np.unique(rows.run, return_inverse=True)[1]
     level = np.arange(len(run)) if unit == "reading" else _load_levels(rows, run)

@@ -14,8 +14,8 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.row_angles import resolve_angles
-from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, InsideRuns, SlidingRows, inside_runs
-from bowdenfit.kinds.term import rounded_up
+from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, InsideRuns, SlidingRows, list_readings_inside_runs
+from bowdenfit.kinds.term import round_up_count
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
@@ -82,22 +82,22 @@ class RunsTerm:
     def padded(self) -> dict[str, Any]:
         """See `LogDensity.padded`: each run's cells followed by weightless copies of its first."""
         runs = len(self.labels)
-        return with_cells(self.data, runs, rounded_up(len(self.data["mean"]) // runs))
+        return pad_cells(self.data, runs, round_up_count(len(self.data["mean"]) // runs))
 
     @property
     def inside(self) -> InsideRuns | None:
         """Readings one by one, with the cell of each among the residuals inside runs."""
         if self.rows is None:
             return None
-        cell, first = _cells(self.cable, self.rows)
+        cell, first = _assign_cells(self.cable, self.rows)
         runs, run = np.unique(self.rows.run, return_inverse=True)
         of_cell = np.searchsorted(runs, self.rows.run[first])
         position = np.arange(len(first)) - np.searchsorted(of_cell, of_cell)
         most = len(self.data["mean"]) // len(runs)
         ratio = self.cable.description.sensors.noise_ratio
-        return inside_runs((of_cell * most + position)[cell], run, self.rows, ratio)
+        return list_readings_inside_runs((of_cell * most + position)[cell], run, self.rows, ratio)
 
-    def _shown(
+    def _shown_log_ratio(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
     ) -> tuple[Float[Array, " cells"], Float[Array, " cells"], Float[Array, " cells"]]:
         """Log ratio that the load cells show, and its derivatives by the friction exponent and by the log of the load."""
@@ -125,7 +125,7 @@ class RunsTerm:
         angles, variance = resolve_angles(self.cable, values, data)
         friction = self.cable.friction_exponent(values, angles, data["group"])
         exponent = friction * self.cable.friction.rate(values, data["velocity"])
-        shown, slope, by_load = self._shown(values, data, exponent)
+        shown, slope, by_load = self._shown_log_ratio(values, data, exponent)
         if weights is not values:  # else a drag that makes mountings count for less would seem to fit better
             slope = jax.lax.stop_gradient(slope)
         deviation = data["mean"] - shown
@@ -211,9 +211,9 @@ class _Deviations:
     inside: Array
 
 
-def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
+def sum_runs(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
     """Readings reduced to cells, cells to runs: all that the likelihood needs, whatever the number of readings."""
-    cell, first = _cells(cable, rows)
+    cell, first = _assign_cells(cable, rows)
     weight = rows.weight(cable.description.sensors.noise_ratio)
     cell_weight = np.bincount(cell, weight)
 
@@ -243,20 +243,20 @@ def run_sums(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
         "velocity": mean(rows.velocity),
         "drift": mean(rows.drift),
     }
-    return _rectangular(cells, run) | {
-        "n": np.bincount(row_run, rows.worth),
+    return _pad_runs(cells, run) | {
+        "n": np.bincount(row_run, rows.n_effective),
         "run_weight": run_weight,
         "run_mean": np.bincount(run, cell_weight * cell_mean) / run_weight,
         "scatter": np.bincount(row_run, weight * ratio**2),
-        "log_weights": np.bincount(row_run, rows.worth * np.log(weight / rows.worth)),
+        "log_weights": np.bincount(row_run, rows.n_effective * np.log(weight / rows.n_effective)),
     }
 
 
-def with_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, Any]:
+def pad_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, Any]:
     """The same sums with more cells for each run, which have no weight.
 
     Args:
-        data: What `run_sums` gave.
+        data: What `sum_runs` gave.
         runs: Number of runs.
         cells_per_run: Number of cells for each.
     """
@@ -268,7 +268,7 @@ def with_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str,
     return data | long | {name: np.where(filled, long[name], 0.0) for name in _WEIGHTS if name in long}
 
 
-def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
+def _pad_runs(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
     """Cells, in order of their runs, padded to equally many a run with weightless copies of the run's first."""
     starts, counts = np.searchsorted(run, np.arange(run[-1] + 1)), np.bincount(run)
     position = np.arange(np.max(counts))[None, :]
@@ -278,27 +278,27 @@ def _rectangular(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.
     return padded | {name: np.where(filled, padded[name], 0.0) for name in _WEIGHTS}
 
 
-def _cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
+def _assign_cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
     """The cell of each reading, and the first reading of each cell."""
     keys = [rows.run, rows.stroke, *(rows.angles[name] for name in ROW_ARRAYS)]
     if cable.friction.depends_on_rate:
-        keys.append(_bins(_steps(rows.velocity), rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
+        keys.append(_bin_values(_round_speeds(rows.velocity), rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
     on_load = cable.friction.depends_on_load or cable.description.fits_offsets
     if on_load or np.any(rows.drift):
         bins = _LOAD_BINS if on_load else _DELAY_BINS
-        keys.append(_bins(rows.input_force + rows.output_force, rows.run * 2 + (rows.stroke > 0), bins))
+        keys.append(_bin_values(rows.input_force + rows.output_force, rows.run * 2 + (rows.stroke > 0), bins))
     design = np.column_stack([np.nan_to_num(key) for key in keys])
     _, first, cell = np.unique(design, axis=0, return_index=True, return_inverse=True)
     return cell.ravel(), first
 
 
-def _steps(velocity: Vector) -> Vector:
+def _round_speeds(velocity: Vector) -> Vector:
     """Speeds in steps of a few percent; NaN where they are not known."""
     speed = np.abs(velocity)
     return np.exp(_ALIKE * np.round(np.log(np.where(speed > 0, speed, np.nan)) / _ALIKE))
 
 
-def _bins(values: Vector, group: Labels, most: int) -> Labels:
+def _bin_values(values: Vector, group: Labels, most: int) -> Labels:
     """Bins of equal counts within each group; values that are few or all alike keep to themselves."""
     bins = np.zeros(len(values), dtype=int)
     for name in np.unique(group):

@@ -45,10 +45,10 @@ class SlidingRows:
         run: Number of the run.
         velocity: Velocity; NaN where it is not known.
         drift: s d(log F_out)/dt, by which a delay of the output channel shifts the log ratio [1/s]; 0 without a clock.
-        worth: How many independent readings each counts for [1].
+        n_effective: How many independent readings each counts for [1].
         angles: `ROW_ARRAYS` of every row.
-        tells: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2]; by the forces if
-            omitted.
+        information: Information of one such reading on its log ratio at unit noise of the output cell [N^2]; computed from
+            the forces if omitted.
     """
 
     input_force: Vector
@@ -58,9 +58,9 @@ class SlidingRows:
     run: Labels
     velocity: Vector
     drift: Vector
-    worth: Vector
+    n_effective: Vector
     angles: Mapping[str, np.ndarray]
-    tells: Vector | None = None
+    information: Vector | None = None
 
     def weight(self, noise_ratio: float) -> Vector:
         """Information on the log ratio at unit noise of the output cell [N^2].
@@ -68,9 +68,9 @@ class SlidingRows:
         Args:
             noise_ratio: Noise of the input cell over that of the output cell [1].
         """
-        if self.tells is not None:
-            return self.worth * self.tells
-        return np.asarray(self.worth / (noise_ratio**2 / self.input_force**2 + 1 / self.output_force**2))
+        if self.information is not None:
+            return self.n_effective * self.information
+        return np.asarray(self.n_effective / (noise_ratio**2 / self.input_force**2 + 1 / self.output_force**2))
 
 
 @dataclass(frozen=True)
@@ -112,10 +112,10 @@ def expected_forces(
     few = np.zeros(len(distance), dtype=bool)
     for rows in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):
         if offsets and len(rows) >= _FEWEST_TO_SHIFT:
-            bend[rows], more = _shift(along[rows], distance[rows])
+            bend[rows], more = _fit_straight_line(along[rows], distance[rows])
             freedom -= more
         elif len(rows) >= _FEWEST_TO_BEND:
-            bend[rows], more = _bend(along[rows], distance[rows])
+            bend[rows], more = _fit_parabola(along[rows], distance[rows])
             freedom -= more
         elif np.any(np.abs(np.log(output_force[rows] / (slope * input_force)[rows])) > _FAR_OFF):
             few[rows] = True
@@ -150,7 +150,7 @@ def _slopes(
     return np.asarray(np.where(difference < 0, steep, flat))
 
 
-def _shift(along: Vector, distance: Vector) -> tuple[Vector, int]:
+def _fit_straight_line(along: Vector, distance: Vector) -> tuple[Vector, int]:
     """What is left over as a straight line along the line, and its further coefficients."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
@@ -159,7 +159,7 @@ def _shift(along: Vector, distance: Vector) -> tuple[Vector, int]:
     return columns @ np.linalg.lstsq(columns, distance, rcond=None)[0], 1
 
 
-def _bend(along: Vector, distance: Vector) -> tuple[Vector, int]:
+def _fit_parabola(along: Vector, distance: Vector) -> tuple[Vector, int]:
     """What is left over as a parabola along the line, and its coefficients; nothing where that may be noise."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
@@ -195,7 +195,7 @@ class InsideRuns:
     at: Mapping[str, Vector]
 
 
-def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float) -> InsideRuns:
+def list_readings_inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float) -> InsideRuns:
     """Readings as they were taken; of very many, neighbors in one cell together.
 
     Args:
@@ -204,7 +204,7 @@ def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float
         rows: The readings.
         noise_ratio: Noise of the input cell over that of the output cell [1].
     """
-    weight, worth, log_ratio, at = rows.weight(noise_ratio), rows.worth, rows.log_ratio, _places(run, rows)
+    weight, n_effective, log_ratio, at = rows.weight(noise_ratio), rows.n_effective, rows.log_ratio, _covariates(run, rows)
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], cell[order])
     together = (np.arange(len(cell)) - first) // max(1, -(-len(cell) // _MOST))
@@ -222,11 +222,11 @@ def inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float
     covariates = {label: mean(values) for label, values in at.items()}
     return InsideRuns(
         cell[one], run[one], total, ratio - of_cell[cell[one]], ratio,
-        float(np.sum(weight * (log_ratio - ratio[group]) ** 2)), float(np.sum(worth)), covariates,
+        float(np.sum(weight * (log_ratio - ratio[group]) ** 2)), float(np.sum(n_effective)), covariates,
     )  # fmt: skip
 
 
-def _places(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
+def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     """Load, stroke, speed, order inside the run and wrap angle of every reading; with a clock, what a zero of the output that
     drifts by a newton from the middle of the run to its end adds to the log ratio.
     """

@@ -146,7 +146,7 @@ class LoopTable(Part):
     origin: RowOrigin
 
 
-def one_angle_warning(measurements: Measurements) -> list[str]:
+def warn_of_single_angle(measurements: Measurements) -> list[str]:
     """Return a warning where stretch and preload are all read at one wrap angle, which tells no lengthening."""
     tables = measurements.table(StretchTable), measurements.table(PreloadTable)
     different = np.unique(np.concatenate([table.wrap_angle for table in tables if table is not None]))

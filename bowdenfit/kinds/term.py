@@ -27,7 +27,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.noise import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.candidate import CandidateKind
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import ForceRows
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -152,7 +152,7 @@ class Truth:
 
     def wrap_angles(self, rows: ForceRows) -> tuple[Array, Array]:
         """Wrap angle [rad] of each row and contact without its error, and the error's variance [rad^2]."""
-        data = row_angles(self.cable.description, rows, self.angles).data
+        data = collect_row_angles(self.cable.description, rows, self.angles).data
         return resolve_angles(self.cable, self.values, {name: jnp.asarray(array) for name, array in data.items()})
 
     def simulate(self, term: Any, key: Array) -> Array:
@@ -170,12 +170,12 @@ class TermKind(ABC, Generic[AnyTable]):
 
     Attributes:
         candidate: The measurement that could be made next for such a table; None where another kind offers it.
-        tells_mountings: Whether its readings tell how mountings scatter.
+        shows_mounting_scatter: Whether its readings tell how mountings scatter.
         chooses_rows: Whether descriptions choose which rows are readings.
     """
 
     candidate: CandidateKind | None = None
-    tells_mountings: bool = False
+    shows_mounting_scatter: bool = False
     chooses_rows: bool = False
 
     @property
@@ -227,7 +227,7 @@ class TermKind(ABC, Generic[AnyTable]):
         """Return how many readings of a term entered, in words; empty where `Kind.count_readings` says it."""
         return ""
 
-    def places(self, table: AnyTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: AnyTable, term: Term) -> Mapping[str, np.ndarray]:
         """Return loads, wrap angles and the like of a term's readings, by axis label."""
         return {}
 
@@ -316,24 +316,24 @@ class IndependentReadings(ABC):
         return self.data["reading"]
 
 
-def first_less(reading: Float[Array, " read"], expected: Float[Array, " rows"]) -> Float[Array, " read"]:
+def deviations_of_readings(reading: Float[Array, " read"], expected: Float[Array, " rows"]) -> Float[Array, " read"]:
     """Readings less what is expected of the first rows; 0 where there is no reading."""
     of_read = expected[: reading.shape[0]]
     return jnp.where(jnp.isnan(reading), 0.0, reading - of_read)
 
 
-def last_less(bound: Float[Array, " bounds"], expected: Float[Array, " rows"]) -> Float[Array, " bounds"]:
+def deviations_of_bounds(bound: Float[Array, " bounds"], expected: Float[Array, " rows"]) -> Float[Array, " bounds"]:
     """Bounds less what is expected of the last rows; 0 where there is no bound."""
     of_bounds = expected[expected.shape[0] - bound.shape[0] :]
     return jnp.where(jnp.isnan(bound), 0.0, bound - of_bounds)
 
 
-def joined(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
+def join_contributions(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
     """What each reading and bound contributes, one after the other; nothing where there is none."""
     return jnp.concatenate([jnp.where(jnp.isnan(known), 0.0, contributed) for known, contributed in parts])
 
 
-def rounded_up(count: int) -> int:
+def round_up_count(count: int) -> int:
     """The next of few counts: each to eight, then four to every doubling, at most a quarter more than asked for."""
     step = 1 << max(0, (count - 1).bit_length() - 3)
     return -(-count // step) * step

@@ -31,10 +31,10 @@ from bowdenfit.cable.load_cells import (
 )
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds import each_table, kind_of
+from bowdenfit.kinds import find_kind, iterate_tables
 from bowdenfit.kinds.angles.term import AngleTerms
 from bowdenfit.kinds.candidate import CandidateKind
-from bowdenfit.kinds.descriptions import measured_groups
+from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.displacement.term import DisplacementTerms
 from bowdenfit.kinds.efficiencies.term import EfficiencyTerms
 from bowdenfit.kinds.forces.term import ForceTerms
@@ -74,16 +74,16 @@ _ORDER = (
 Readings = dict[str, dict[str, jax.Array]]
 
 
-def measured_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[Any], Any]]:
+def iterate_term_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[Any], Any]]:
     """Every table with what its kind adds to the likelihood, in the order of the kinds."""
-    for kind, table in each_table(measurements):
+    for kind, table in iterate_tables(measurements):
         yield TERMS[kind.name], table
 
 
-def parameters_asked_for(cable: Cable, measurements: Measurements) -> list[Parameter]:
+def collect_parameters(cable: Cable, measurements: Measurements) -> list[Parameter]:
     """The parameters that the kinds of a data set ask for, each declared once."""
-    kinds = list(measured_kinds(measurements))
-    circumstances = Circumstances(cable, measurements, any(kind.tells_mountings for kind, _ in kinds))
+    kinds = list(iterate_term_kinds(measurements))
+    circumstances = Circumstances(cable, measurements, any(kind.shows_mounting_scatter for kind, _ in kinds))
     needed = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
     needed |= {p.name: p for p in gain_error(cable.description)}
     return sorted(needed.values(), key=lambda p: _ORDER.index(p.name) if p.name in _ORDER else len(_ORDER))
@@ -95,34 +95,34 @@ def candidate_kinds() -> dict[str, CandidateKind]:
     return {candidate.name: candidate for candidate in sorted(kinds, key=lambda candidate: candidate.order)}
 
 
-def term_kind(readings: str) -> TermKind[Any]:
+def find_term_kind(readings: str) -> TermKind[Any]:
     """The kind whose readings have a name in results.
 
     Raises:
         KeyError: None has.
     """
-    kind = kind_of(readings)
+    kind = find_kind(readings)
     return TERMS[kind.name if kind is not None else readings]
 
 
-def measured_cable(description: Description, measurements: Measurements) -> Cable:
+def make_measured_cable(description: Description, measurements: Measurements) -> Cable:
     """Return the cable of a description; nominal angles, reference force and speed are measured ones where none is stated.
 
     Raises:
         DescriptionError: A curve family, contact law or friction model is unknown, or velocities are of two kinds.
     """
-    tables = list(each_table(measurements))
+    tables = list(iterate_tables(measurements))
     friction = [(kind, table) for kind, table in tables if isinstance(kind, FrictionKind)]
-    forces = _positive([kind.forces(table) for kind, table in friction])
-    tensions = _positive([kind.tensions(table) for kind, table in tables if isinstance(kind, RopeKind)])
-    speeds = _positive([kind.speeds(table) for kind, table in friction])
-    unit = _velocity_unit([kind.velocity_unit(table) for kind, table in friction])
-    groups = measured_groups(description, measurements)
+    forces = _concatenate_positive([kind.forces(table) for kind, table in friction])
+    tensions = _concatenate_positive([kind.tensions(table) for kind, table in tables if isinstance(kind, RopeKind)])
+    speeds = _concatenate_positive([kind.speeds(table) for kind, table in friction])
+    unit = _common_velocity_unit([kind.velocity_unit(table) for kind, table in friction])
+    groups = order_groups(description, measurements)
     conditions = make_conditions(description, forces, tensions, speeds, unit, groups)
-    return make_cable(description, _own_angles(description, friction), conditions)
+    return make_cable(description, _mean_own_angles(description, friction), conditions)
 
 
-def _own_angles(description: Description, friction: Sequence[tuple[FrictionKind[Any], Any]]) -> dict[str, float]:
+def _mean_own_angles(description: Description, friction: Sequence[tuple[FrictionKind[Any], Any]]) -> dict[str, float]:
     """Return the mean of the measured angles in each column of a contact without a nominal angle [rad]."""
     rows = [kind.conditions(table).own for kind, table in friction]
     sources, means = [c.wrap_angle for c in description.contact], {}
@@ -132,7 +132,7 @@ def _own_angles(description: Description, friction: Sequence[tuple[FrictionKind[
     return means
 
 
-def _velocity_unit(stated: Sequence[str]) -> str:
+def _common_velocity_unit(stated: Sequence[str]) -> str:
     units = {unit for unit in stated if unit}
     if len(units) > 1:
         raise DescriptionError(
@@ -141,13 +141,13 @@ def _velocity_unit(stated: Sequence[str]) -> str:
     return units.pop() if units else ""
 
 
-def _positive(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _concatenate_positive(parts: Sequence[np.ndarray]) -> np.ndarray:
     """Return all values that are positive and finite."""
     values = np.concatenate([np.zeros(0), *parts])
     return values[np.isfinite(values) & (values > 0)]
 
 
-def drawn_readings(
+def draw_readings(
     cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float = 1.0
 ) -> Readings:
     """New readings by kind of table, of a function that JAX can compile.
@@ -160,26 +160,26 @@ def drawn_readings(
         scale: Factor on all noise.
     """
     truth = Truth(cable, tables.table(AngleTable), values, key, scale)
-    return {kind.name: kind.draw(table, truth) for kind, table in measured_kinds(tables)}
+    return {kind.name: kind.draw(table, truth) for kind, table in iterate_term_kinds(tables)}
 
 
-def slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:
+def any_slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:
     """Whether a bench could not have taken some of the readings as it says it did."""
     return any(np.any(np.asarray(of.get("slipped", False))) for of in readings.values())
 
 
-def with_drawn_readings(
+def replace_table_readings(
     description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
 ) -> Measurements:
-    """The tables with what `drawn_readings` gave; remarks on how tables were read do not hold for them.
+    """The tables with what `draw_readings` gave; remarks on how tables were read do not hold for them.
 
     Raises:
         DatasetError: The strokes of a recording cannot be found.
     """
-    return Measurements(tuple(drawn_tables(description, tables, readings)))
+    return Measurements(tuple(iterate_replaced_tables(description, tables, readings)))
 
 
-def drawn_tables(
+def iterate_replaced_tables(
     description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
 ) -> Iterator[Any]:
     """The same one by one: most that a bench would not hand in are known before the strokes of recordings are looked for.
@@ -187,6 +187,6 @@ def drawn_tables(
     Raises:
         DatasetError: The strokes of a recording cannot be found.
     """
-    for kind, table in measured_kinds(tables):
+    for kind, table in iterate_term_kinds(tables):
         arrays = {field: np.asarray(array) for field, array in readings[kind.name].items()}
         yield kind.with_readings(description, table, arrays)

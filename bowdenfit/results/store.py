@@ -15,7 +15,7 @@ from bowdenfit.errors import DescriptionError, StoreError
 from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
-from bowdenfit.kinds import KINDS, each_table
+from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
@@ -143,7 +143,7 @@ def _fit_text(page: Mapping[str, Any], measurements: Measurements) -> str:
 
 
 def _measurements_page(measurements: Measurements) -> dict[str, Any]:
-    tables = {kind.name: table for kind, table in each_table(measurements)}
+    tables = {kind.name: table for kind, table in iterate_tables(measurements)}
     page: dict[str, Any] = serialize({**dict.fromkeys(KINDS), **tables, "remarks": measurements.remarks})
     return page
 

@@ -12,7 +12,7 @@ from bowdenfit.cable.drive import LEAST_EXPONENT, LoopDrive, RopeDrive, make_dri
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.terms import measured_cable as cable_of
+from bowdenfit.kinds.terms import make_measured_cable as cable_of
 from bowdenfit.physics.friction import force_from_scale, force_scale
 from bowdenfit.recordings.preparation.play import play
 

@@ -10,7 +10,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.overview import describe_products_with_preload
 from bowdenfit.questions.check.data_set_words import warnings_of
@@ -81,7 +81,7 @@ def estimates_of(tables, design, truth, seeds):
     """Least-squares estimates and true values [shown units] of several seeds, and the last data set."""
     objective, found = None, []
     for seed in seeds:
-        data, values = measured(cable_with(tables), seed, design=design_of(**design), once=True, **(TRUTH | truth))
+        data, values = measured(cable_with(tables), seed, design=make_design(**design), once=True, **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
         objective = objective or make_objective(posterior)
         start = find_maximum_posterior(posterior, objective).z
@@ -122,7 +122,7 @@ def test_good_tables_leave_nothing_unidentified():
 
 def test_the_summary_says_which_values_fit_as_well():
     tables, design, truth, *_ = CASES["a loop that is always slack"]
-    data, _ = measured(cable_with(tables), 0, design=design_of(**design), once=True, **(TRUTH | truth))
+    data, _ = measured(cable_with(tables), 0, design=make_design(**design), once=True, **(TRUTH | truth))
     text = " ".join(details_text(bf.fit(data, mcmc=False, seed=1)).split())
     assert "preload is not identified by least squares: values from" in text
     assert "fit about as well" in text
@@ -132,7 +132,7 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
     sampler = {"n_walkers": 32, "target_ess": 100, "target_r_hat": 1.1, "max_steps": 400}
     prior = {"preload": {"prior": {"lognormal": {"median": 20.0, "log_sd": 1.0}}}}  # else it may as well be slack
     data, _ = measured(
-        cable_with(("loop",), sampler=sampler, prior=prior), 0, design=design_of(**FREE), once=True, **TRUTH
+        cable_with(("loop",), sampler=sampler, prior=prior), 0, design=make_design(**FREE), once=True, **TRUTH
     )
     fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
     (sentence,) = describe_products_with_preload(fit)
@@ -146,7 +146,7 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
 
 def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
     description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
-    data, _ = measured(description, 0, design=design_of(**FREE), once=True, **TRUTH)
+    data, _ = measured(description, 0, design=make_design(**FREE), once=True, **TRUTH)
     assert any('model = "stretch"' in said for said in warnings_of(data))
 
 

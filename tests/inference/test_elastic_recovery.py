@@ -25,7 +25,7 @@ from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.tables import AngleTable, Measurements, StretchTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
@@ -132,7 +132,7 @@ def test_over_twenty_loops_nine_in_ten_intervals_hold_the_truth(laboratory):
 
     That takes 12 hits or fewer of 20, so by chance one of the ten does in fewer than four of a thousand seeds.
     """
-    ranks = laboratory.ranks(plausible(), design_of(**SHORT), range(20))
+    ranks = laboratory.ranks(plausible(), make_design(**SHORT), range(20))
     p = p_values(ranks)
     assert set(p) == set(TRUTH) - {"mu_stretch"}
     assert all(value > 0.001 for value in p.values()), table(ranks)
@@ -147,7 +147,7 @@ def test_over_two_hundred_loops_ranks_are_uniform():
     Twenty tests with the binomial ones; the smallest p times their number is below 0.001 once in a thousand seeds.
     """
     laboratory = Laboratory(sampler=QUICK)
-    ranks = laboratory.ranks(plausible(), design_of(**SHORT), range(1000, 1200))
+    ranks = laboratory.ranks(plausible(), make_design(**SHORT), range(1000, 1200))
     p = list(p_values(ranks).values())
     p += [stats.kstest([each[name] for each in ranks], "uniform").pvalue for name in ranks[0]]
     assert min(p) * len(p) > 0.001, (table(ranks), p)
@@ -165,7 +165,7 @@ def test_the_same_test_rejects_a_model_without_the_unloading_branch(laboratory):
     """The negative control: friction that holds the stretch back while the load comes down, taken for noise."""
     wrong = Laboratory(all_on_the_way_up, QUICK)
     wrong.fits = laboratory.fits
-    p = p_values(wrong.ranks(plausible(), design_of(**SHORT), range(6)))
+    p = p_values(wrong.ranks(plausible(), make_design(**SHORT), range(6)))
     assert p["sigma_L"] < 0.001
     assert p["lengthening"] < 0.001
 
@@ -214,7 +214,7 @@ def stretched_on_body(on_body):
     def joined(friction: str | None) -> Dataset:
         description = parse_description(raw | ({"stretch": {"friction": friction}} if friction else {}))
         truth = {name: TRUTH[name] for name in ROPE} | ({friction: 0.085} if friction else {})
-        design = design_of(angles=(450.0, 500.0), efficiencies=(470.0,), **ELASTIC)
+        design = make_design(angles=(450.0, 500.0), efficiencies=(470.0,), **ELASTIC)
         values = draw_true_values(description, empty_tables(description, design), truth, jax.random.key(1), run_once=True)
         rows = simulate_design(description, design, values, jax.random.key(2), run_once=True).measurements.table(StretchTable)
         return Dataset(description, alone.measurements.with_tables(rows), {})

@@ -20,7 +20,7 @@ from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.solver import minimize
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.terms import drawn_readings
+from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import replace_readings
 
@@ -99,7 +99,7 @@ def _experiments(description, n: int) -> Iterator[Dataset]:
     """One cable measured again and again, by one program."""
     dataset, truth = measured(description, noise=False, once=True)
     one_cable, values = build_model(dataset).cable, {name: jnp.asarray(value) for name, value in truth.items()}
-    draw = jax.jit(lambda key: drawn_readings(one_cable, dataset.measurements, values, key))
+    draw = jax.jit(lambda key: draw_readings(one_cable, dataset.measurements, values, key))
     for seed in range(n):
         yield replace_readings(dataset, draw(jax.random.key(seed)))
 

@@ -14,7 +14,7 @@ from bowdenfit.inference.levenberg_marquardt import LevenbergMarquardt, RadiusSe
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.solver import minimize
-from bowdenfit.kinds.term import rounded_up
+from bowdenfit.kinds.term import round_up_count
 from bowdenfit.model import build_model
 
 
@@ -28,7 +28,7 @@ def _of_itself(given, start, steps: int):
 
     Rows of zeros change nothing but the rounding of singular values, which hundreds of steps along a bent valley add up.
     """
-    method, none = LevenbergMarquardt(1e-14, 1e-13, 0.3), jnp.zeros(rounded_up(len(given.y)) - len(given.y))
+    method, none = LevenbergMarquardt(1e-14, 1e-13, 0.3), jnp.zeros(round_up_count(len(given.y)) - len(given.y))
 
     def residuals(b, _):
         return jnp.concatenate([given.model(b, given.x) - given.y, none])
@@ -148,7 +148,7 @@ def test_the_search_goes_where_the_sum_of_squares_falls_as_predicted_and_back_wh
 def test_tables_that_differ_by_a_few_rows_are_stepped_by_one_program():
     """The certified minima above are those of such tables: the 33 rows of mgh17 are stepped as 40."""
     rows, before = 33, levenberg_marquardt._compile_step.cache_info().misses
-    assert rounded_up(rows) == 40
+    assert round_up_count(rows) == 40
     for count in range(rows, 41):
         levenberg_marquardt.compile_stepper(count, 2)
     assert levenberg_marquardt._compile_step.cache_info().misses <= before + 1

@@ -26,7 +26,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import parse_description
-from bowdenfit.kinds.recordings.reader import RecordingsTable, _File, _prepared, _recording
+from bowdenfit.kinds.recordings.reader import RecordingsTable, _File, _make_recording, _prepare_files
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.bench import (
@@ -143,8 +143,8 @@ def prepared(description: Description, cable: Cable) -> Dataset:
         _File(as_read(recording, entry.file), entry, settings, sd, "", None)
         for entry, recording in zip(description.recording, cable.recorded, strict=True)
     ]
-    parts, delay_sd = _prepared(files)
-    each = tuple(_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
+    parts, delay_sd = _prepare_files(files)
+    each = tuple(_make_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
     return Dataset(description, Measurements((Recordings(description.angle_columns, each, "", delay_sd),)), {})
 
 

@@ -9,12 +9,12 @@ import pytest
 from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.recordings.blocks import drift_of
-from bowdenfit.kinds.recordings.simulation import recorded_again
-from bowdenfit.kinds.recordings.term import recordings_term
+from bowdenfit.kinds.recordings.blocks import output_drift
+from bowdenfit.kinds.recordings.simulation import replace_forces
+from bowdenfit.kinds.recordings.term import make_recordings_term
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.terms import drawn_readings
+from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
 from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import play
@@ -36,18 +36,18 @@ def bench():
         stated = json.loads((folder / "truth.json").read_text())["truth"]
         truth = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters}
         recordings, angles = tables.table(Recordings), tables.table(AngleTable)
-        draw = jax.jit(lambda named, key: drawn_readings(model.cable, tables, named, key)["recordings"])
+        draw = jax.jit(lambda named, key: draw_readings(model.cable, tables, named, key)["recordings"])
 
         def made(seed: int, **values: float) -> Recordings:
             named = {name: jnp.asarray(value) for name, value in (truth | values).items()}
             drawn = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
-            return recorded_again(dataset.description, recordings, drawn)
+            return replace_forces(dataset.description, recordings, drawn)
 
         def terms(**values: float) -> tuple[dict[str, jax.Array], list[RunsTerm]]:
-            again = [recordings_term(model.cable, made(seed, **values), angles) for seed in range(TIMES)]
+            again = [make_recordings_term(model.cable, made(seed, **values), angles) for seed in range(TIMES)]
             return {name: jnp.asarray(value) for name, value in (truth | values).items()}, again
 
-        yield recordings_term(model.cable, recordings, angles), terms, made
+        yield make_recordings_term(model.cable, recordings, angles), terms, made
 
 
 def most_likely_noise(named: dict[str, jax.Array], term: RunsTerm) -> float:
@@ -93,9 +93,9 @@ def test_drifts_hold_less_noise_than_the_change_from_block_to_block(bench):
         for i, (one, other) in enumerate(zip(noisy, quiet, strict=True)):
             change = np.gradient(np.log(np.maximum(one.blocks.output_force, 1.0)), one.blocks.time)
             mine = (one.strokes.stroke == 1) & one.strokes.used_sliding & other.strokes.used_sliding
-            true = drift_of(other)
+            true = output_drift(other)
             np.testing.assert_allclose(true, np.gradient(np.log(other.blocks.output_force), other.blocks.time))
-            by_blocks[seed, i], by_drifts[seed, i] = np.var((change - true)[mine]), np.var((drift_of(one) - true)[mine])
+            by_blocks[seed, i], by_drifts[seed, i] = np.var((change - true)[mine]), np.var((output_drift(one) - true)[mine])
     shares = by_drifts.sum(axis=0) / by_blocks.sum(axis=0)
     assert max(shares) < 0.5
     assert np.mean(shares) < 0.3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.plausibility import coarse
+from bowdenfit.kinds.plausibility import find_coarse_readings
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import COARSE
@@ -41,18 +41,18 @@ TRUE_MU = 0.118  # 20 N become 13.8 N
     ],
 )
 def test_readings_of_the_same_that_are_alike_tell_their_last_digit(read, last_digit):
-    found = coarse("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
+    found = find_coarse_readings("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
     assert (found and found.last_digit) == last_digit
 
 
 def test_readings_at_different_settings_need_not_be_alike():
     """Three of the six were read before; the logarithm of 10 is open by more than that of 20."""
     settings, read = np.array([[20.0, np.nan]] * 3 + [[40.0, np.nan]] * 3), np.array([10.0] * 3 + [20.0] * 3)
-    found = coarse("forces.csv", settings, read)
+    found = find_coarse_readings("forces.csv", settings, read)
     assert found.different == 2
     assert found.log_sd == pytest.approx(np.sqrt((1 / 1 + 1 / 4) / 2 / 12))  # the last digit is that of tens
     settings[1] = 30.0
-    assert coarse("forces.csv", settings[:4], read[:4]) is None
+    assert find_coarse_readings("forces.csv", settings[:4], read[:4]) is None
 
 
 def _fit(folder, digits, noise, runs=8):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.plausibility import Compared, copies
+from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies
 from bowdenfit.questions.check.copied import describe_copied_readings
 from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.summary.brief import summary_text
@@ -100,7 +100,7 @@ def simulated(generator):
 def compared(rows):
     run = rows[:, 0].astype(int)
     names = tuple(f"run {k}" for k in range(run.max() + 1))
-    return Compared("forces.csv", run, names, rows[:, 1:2], rows[:, 2:], rows[:, 2], 3 * run + rows[:, 1].astype(int))
+    return ComparedReadings("forces.csv", run, names, rows[:, 1:2], rows[:, 2:], rows[:, 2], 3 * run + rows[:, 1].astype(int))
 
 
 def test_readings_that_are_only_alike_are_never_called_copies_and_most_copies_are_found():
@@ -111,13 +111,13 @@ def test_readings_that_are_only_alike_are_never_called_copies_and_most_copies_ar
     generator, found = np.random.default_rng(7), {"pasted": [], "saved": []}
     for _ in range(400):
         rows, fineness = simulated(generator)
-        assert copies(compared(rows)) == []
+        assert describe_copies(compared(rows)) == []
         if len(rows) >= 30 and fineness > 5:
             first = rows[rows[:, 0] == 0].copy()
-            found["pasted"].append(bool(copies(compared(np.vstack([rows, rows])))))
+            found["pasted"].append(bool(describe_copies(compared(np.vstack([rows, rows])))))
             if len(first) >= 10:
                 first[:, 0] = rows[:, 0].max() + 1
-                found["saved"].append(bool(copies(compared(np.vstack([rows, first])))))
+                found["saved"].append(bool(describe_copies(compared(np.vstack([rows, first])))))
     assert all(len(hits) > 30 and np.mean(hits) > 0.9 for hits in found.values()), found
 
 
@@ -126,4 +126,4 @@ def test_readings_without_noise_are_no_copies():
     loads = np.repeat(np.array(LOADS), 4)
     for out in (0.7 * loads * (1 + 0.001 * loads), np.round(0.7 * loads)):
         one = np.column_stack([np.zeros(20), np.ones(20), loads, out])
-        assert copies(compared(np.vstack([one, one + np.eye(4)[0]]))) == []
+        assert describe_copies(compared(np.vstack([one, one + np.eye(4)[0]]))) == []

@@ -6,7 +6,7 @@ from cables import CONTACTS, cable
 from elastic_cables import elastic_cable
 
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.descriptions import design_of, read_design
+from bowdenfit.kinds.descriptions import make_design, read_design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.questions.simulate.tables import empty_tables
@@ -40,7 +40,7 @@ def test_a_plan_says_the_wrap_angles_of_its_runs():
 
 
 def test_loads_of_a_stretched_rope_grow_whatever_their_order():
-    design = design_of(stretch={"loads": (30, 10), "wrap_angles": (0,), "unloading": True})
+    design = make_design(stretch={"loads": (30, 10), "wrap_angles": (0,), "unloading": True})
     table = empty_tables(elastic_cable(("stretch",), kind="single"), design).table(StretchTable)
     assert table.load.tolist() == [10, 30, 10]
     assert table.unloading.tolist() == [False, False, True]

@@ -6,8 +6,8 @@ from catheters import TRUTH, Catheter, bench, cycles
 from spoiling import copied, spoil
 
 import bowdenfit as bf
-from bowdenfit.kinds.displacement.table import DisplacementTable, in_order
-from bowdenfit.kinds.rows import fixed, in_words
+from bowdenfit.kinds.displacement.table import DisplacementTable, follow_motor
+from bowdenfit.kinds.rows import describe_range, format_fixed
 from bowdenfit.questions.check.data_set_words import describe_data_set
 
 NAMES = ("cable.toml", "displacement.csv")
@@ -198,19 +198,19 @@ def test_of_a_long_table_some_rows_are_used_and_all_turns(catheter):
 
 def test_turns_are_remembered_and_forgotten_once_they_are_passed():
     at = np.array([0, 10, 20, 30, 20, 10, 15, 20, 25, 22, 25, 29, 31, 30, 0, -5], dtype=float)
-    motion = in_order(at, np.zeros(len(at), dtype=int))
+    motion = follow_motor(at, np.zeros(len(at), dtype=int))
     assert motion.turns.at.tolist() == [0, 30, 10, 25, 22, 31]
     came_after = motion.turns.at[motion.after].tolist()
     #                     pull, back from 30, pull from 10, back from 25, pull from 22, from 10 again, from 0, back from 31
     assert came_after == [0, 0, 0, 0, 30, 30, 10, 10, 10, 25, 10, 10, 0, 31, 0, 0]
     assert motion.slides.tolist() == [False] * 14 + [True] * 2
     assert motion.first.sum() == 4
-    jitter = in_order(np.array([0, 10, 20.05, 20, 20.06, 30, 20], dtype=float), np.zeros(7, dtype=int))
+    jitter = follow_motor(np.array([0, 10, 20.05, 20, 20.06, 30, 20], dtype=float), np.zeros(7, dtype=int))
     assert jitter.turns.at.tolist() == [0, 30]
 
 
 def test_forces_of_any_size_are_written_with_their_digits():
     """Files of `simulate`, and the rows that `check` shows."""
-    assert fixed([12.3456, 2.0], 3) == ["12.346", "2.000"]
-    assert fixed([0.0, 2.5242e-5, np.nan], 4) == ["0.000000000", "0.000025242", "nan"]
-    assert in_words(np.array([9079.0, 226412.0]), "N") == "9079 to 226400 N"
+    assert format_fixed([12.3456, 2.0], 3) == ["12.346", "2.000"]
+    assert format_fixed([0.0, 2.5242e-5, np.nan], 4) == ["0.000000000", "0.000025242", "nan"]
+    assert describe_range(np.array([9079.0, 226412.0]), "N") == "9079 to 226400 N"

@@ -14,8 +14,8 @@ from bowdenfit.dataset import Dataset, load_dataset, read_dataset
 from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.forces.term import HeldForcesTerm, sliding_rows
-from bowdenfit.kinds.row_angles import row_angles
+from bowdenfit.kinds.forces.term import HeldForcesTerm, make_sliding_rows
+from bowdenfit.kinds.row_angles import collect_row_angles
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.sliding_rows import SlidingRows
@@ -63,8 +63,8 @@ def _readings(seed: int, n: int, run: int = 0, strokes=(1, -1)) -> list[tuple[in
 
 def _as_read(model: Model, table: ForceTable) -> SlidingRows:
     """Rows with the forces that they together say there were; `test_expected_forces.py` is about those."""
-    angles = row_angles(model.description, table, None).data
-    return sliding_rows(model.description, table, angles, np.arange(len(table.run)))
+    angles = collect_row_angles(model.description, table, None).data
+    return make_sliding_rows(model.description, table, angles, np.arange(len(table.run)))
 
 
 def _integrated(read: SlidingRows, exponents, tau: float, sigma: float, gain: float = 0.0, run: int = 0) -> float:

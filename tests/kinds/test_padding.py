@@ -11,7 +11,7 @@ from conftest import ROOT
 import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.term import rounded_up
+from bowdenfit.kinds.term import round_up_count
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import resimulate
 
@@ -76,7 +76,7 @@ def test_tables_with_other_angles_too_small_to_detect_are_padded_to_one_shape():
 
 def test_counts_are_rounded_up_to_few_and_by_a_quarter_at_most():
     counts = range(1, 2000)
-    rounded = [rounded_up(count) for count in counts]
+    rounded = [round_up_count(count) for count in counts]
     assert rounded[:12] == [1, 2, 3, 4, 5, 6, 7, 8, 10, 10, 12, 12]
     assert all(count <= more <= 1.25 * count for count, more in zip(counts, rounded, strict=True))
     assert len(set(rounded)) < 45

@@ -17,14 +17,14 @@ from bowdenfit.inference.least_squares import LeastSquares, find_maximum_posteri
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import runs as runs_of_model
-from bowdenfit.kinds.recordings.blocks import first_of_groups
-from bowdenfit.kinds.recordings.reader import recorded_angles
-from bowdenfit.kinds.recordings.whole_recordings import WholeRecordingsTerm, pad_recordings
-from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.recordings.blocks import group_starts
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
+from bowdenfit.kinds.recordings.whole_recordings import WholeRecordingsTerm, stack_rope_recordings
+from bowdenfit.kinds.row_angles import collect_row_angles
+from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.terms import measured_cable
+from bowdenfit.kinds.terms import make_measured_cable
 from bowdenfit.model import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import (
@@ -70,7 +70,7 @@ def _cable(**more) -> Cable:
     """A cable of one contact, whose wrap angle comes with the readings."""
     tables = {"recordings": {"files": "*.csv"}}
     description = cable(1, tables, contact=[CONTACT], reference_force=REFERENCE_FORCE, **more)
-    return measured_cable(description.model_copy(update={"route": None}), Measurements())
+    return make_measured_cable(description.model_copy(update={"route": None}), Measurements())
 
 
 def _law(rows: SlidingRows, values, m):
@@ -101,11 +101,11 @@ def _integrated(rows: SlidingRows, expected, values) -> float:
 
     def log_joint(m):
         each = stats.norm.logpdf(rows.log_ratio, expected(m), spread)
-        return np.sum(rows.worth * each) + stats.norm.logpdf(m, 0.0, tau)
+        return np.sum(rows.n_effective * each) + stats.norm.logpdf(m, 0.0, tau)
 
     grid = np.linspace(-6 * tau, 6 * tau, 241)
     peak = grid[np.argmax([log_joint(m) for m in grid])]
-    width = 12 / np.sqrt(np.sum(rows.worth / spread**2) / 4 + 1 / tau**2) + 0.1 * tau
+    width = 12 / np.sqrt(np.sum(rows.n_effective / spread**2) / 4 + 1 / tau**2) + 0.1 * tau
     top = log_joint(peak)
     area, _ = integrate.quad(
         lambda m: np.exp(log_joint(m) - top), peak - width, peak + width, epsabs=0, epsrel=1e-12, limit=400
@@ -132,7 +132,7 @@ def _rows(seed: int, n: int, values, strokes=(1, -1), angles=(2.5,), m: float = 
 
 
 def _runs_term(cable: Cable, rows: SlidingRows) -> RunsTerm:
-    return RunsTerm(cable, run_sums(cable, rows), tuple(str(run) for run in np.unique(rows.run)))
+    return RunsTerm(cable, sum_runs(cable, rows), tuple(str(run) for run in np.unique(rows.run)))
 
 
 GAIN, OFFSET = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01}, {"offset_sd": {"value": 1, "unit": "N"}}
@@ -184,7 +184,7 @@ def test_a_reading_worth_three_is_three_readings():
     worth = np.random.default_rng(4).integers(1, 4, 12).astype(float)
     copied = np.repeat(np.arange(12), worth.astype(int))
     several = SlidingRows(*(getattr(rows, name)[copied] for name in
-        ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "worth")),
+        ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "n_effective")),
         {name: array[copied] for name, array in rows.angles.items()})  # fmt: skip
     at = _cable(sensors=GAIN)
     found = _of_term(_runs_term(at, replace(rows, worth=worth)), "log_likelihood", values)
@@ -261,8 +261,8 @@ def _model(recordings, likelihood="whole", saturation="left out", **more) -> Mod
 def _whole(model: Model, recordings, censored=False) -> WholeRecordingsTerm:
     """The play operator run at every evaluation, also where sums would do."""
     of_all = Recordings(("angle",), tuple(recordings), "mm/s")
-    angles = row_angles(model.description, recorded_angles(of_all), None).data
-    return WholeRecordingsTerm(model.cable, pad_recordings(of_all, angles, censored, 1.0), of_all.runs)
+    angles = collect_row_angles(model.description, angles_of_recordings(of_all), None).data
+    return WholeRecordingsTerm(model.cable, stack_rope_recordings(of_all, angles, censored, 1.0), of_all.runs)
 
 
 NOISY = LoadCellFaults(input_noise=0.2, output_noise=0.2)
@@ -444,14 +444,14 @@ def test_least_squares_of_faultless_recordings_returns_what_they_were_made_with(
 
 def test_joining_the_blocks_of_a_long_recording_keeps_the_ends_of_its_phases():
     state = np.repeat([0, 1, 0, -1, 0, 1], [3, 50, 2, 41, 1, 30])
-    starts = first_of_groups(state, 30)
+    starts = group_starts(state, 30)
     groups = np.split(np.arange(len(state)), starts[1:])
     assert all(len(set(state[group])) == 1 for group in groups)
     edges = np.flatnonzero(np.diff(state) != 0)
     for end in (*edges, *(edges + 1)):
         assert [end] in [list(group) for group in groups]
     assert len(groups) < 60
-    np.testing.assert_array_equal(first_of_groups(state, len(state)), np.arange(len(state)))
+    np.testing.assert_array_equal(group_starts(state, len(state)), np.arange(len(state)))
 
 
 @pytest.mark.extended
@@ -459,5 +459,5 @@ def test_a_joined_recording_gives_the_same_coefficient(monkeypatch):
     recordings = [_recorded(angle, faults=NOISY) for angle in (1.0, 2.0, 3.0)]
     whole = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
     monkeypatch.setattr("bowdenfit.kinds.recordings.blocks.MOST_BLOCKS", 80)
-    first_of_groups = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
-    assert first_of_groups.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)
+    group_starts = _fitted(_model(recordings, "whole", friction_model="drag")).estimates["mu"]
+    assert group_starts.value == pytest.approx(whole.value, abs=0.3 * whole.standard_error)

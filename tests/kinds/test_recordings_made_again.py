@@ -9,10 +9,10 @@ import pytest
 from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.recordings.simulation import errors_shared, recorded_again
-from bowdenfit.kinds.recordings.term import recordings_term
+from bowdenfit.kinds.recordings.simulation import number_shared_errors, replace_forces
+from bowdenfit.kinds.recordings.term import make_recordings_term
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.terms import drawn_readings
+from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
 from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.recording import Recordings
@@ -25,7 +25,7 @@ TIMES = 12
 @pytest.mark.parametrize("correlation", [1.0, 1.16, 1.3, 1.63, 1.95, 2.0, 2.4, 5.5])
 def test_means_of_errors_that_blocks_share_scatter_as_those_of_fewer_readings(correlation):
     """Exactly: variance of the mean of N blocks over that of N independent ones is the mean of squares of the groups."""
-    shared = errors_shared(4000, correlation)
+    shared = number_shared_errors(4000, correlation)
     assert np.all(np.diff(shared) >= 0)
     assert np.sum(np.bincount(shared) ** 2) / 4000 == pytest.approx(correlation, rel=2e-3)
 
@@ -55,13 +55,13 @@ def pulls():
         model, tables = build_model(dataset), dataset.measurements
         stated = json.loads((folder / "truth.json").read_text())["truth"]
         recordings, angles = tables.table(Recordings), tables.table(AngleTable)
-        draw = jax.jit(lambda named, key: drawn_readings(model.cable, tables, named, key)["recordings"])
+        draw = jax.jit(lambda named, key: draw_readings(model.cable, tables, named, key)["recordings"])
 
         def pull(seed: int, **values: float) -> float:
             page = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
             named = {name: jnp.asarray(value) for name, value in page.items()}
             drawn = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
-            term = recordings_term(model.cable, recorded_again(dataset.description, recordings, drawn), angles)
+            term = make_recordings_term(model.cable, replace_forces(dataset.description, recordings, drawn), angles)
 
             def log_likelihood(delay: jax.Array) -> jax.Array:
                 return jnp.sum(term.log_likelihood(named | {"delay_error": delay}, term.data))

@@ -58,7 +58,7 @@ def test_a_ring_down_is_read_in_radians_and_from_its_release_on(tmp_path):
     table = load_dataset(tmp_path).measurements.table(RingDownTable)
     np.testing.assert_allclose(table.reading, angle, atol=1e-8)
     np.testing.assert_allclose(table.time, time, atol=1e-6)
-    n, half = table.half_swings(0)
+    n, half = table.measure_half_swings(0)
     assert n >= 8 and half == pytest.approx(np.pi * np.sqrt(J / K), rel=0.03)
     assert (table.inertia, table.inertia_sd, table.is_torque) == (1e-3, 2e-5, False)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds import KINDS, each_table, readings_called
+from bowdenfit.kinds import KINDS, find_readings, iterate_tables
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.kind import FrictionKind, Kind, PlannedKind, RopeKind
 from bowdenfit.kinds.term import TermKind
@@ -45,7 +45,7 @@ def test_no_two_kinds_call_their_readings_alike():
 @pytest.mark.parametrize(("kind", "readings"), READINGS, ids=lambda value: getattr(value, "name", value))
 def test_every_table_is_called_as_the_description_calls_it(kind, readings):
     assert readings.table.split()[-1] == kind
-    assert readings_called(readings.name) is readings
+    assert find_readings(readings.name) is readings
 
 
 @pytest.mark.parametrize(("kind", "readings"), READINGS, ids=lambda value: getattr(value, "name", value))
@@ -58,5 +58,5 @@ def test_readings_say_all_that_sentences_and_figures_need(kind, readings):
 @pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-bench", "synthetic-haptic-loop"])
 def test_every_term_is_named_by_its_kind(name):
     dataset = load_dataset(Path(__file__).parents[2] / "datasets" / name)
-    named = {readings.name for kind, _ in each_table(dataset.measurements) for readings in kind.readings}
+    named = {readings.name for kind, _ in iterate_tables(dataset.measurements) for readings in kind.readings}
     assert {term.name for term in build_model(dataset).terms} <= named

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from catheters import Catheter, cycles
 
-from bowdenfit.kinds.displacement.table import in_order
+from bowdenfit.kinds.displacement.table import follow_motor
 from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 
 CATHETERS = {
@@ -25,7 +25,7 @@ MOTIONS = {
 
 def forces_by_turns(catheter, displacements):
     """Forces at the motor, each from the turn before it."""
-    motion = in_order(displacements, np.zeros(len(displacements), dtype=int))
+    motion = follow_motor(displacements, np.zeros(len(displacements), dtype=int))
     tendon = Tendon(jnp.asarray(catheter.exponent), 1 / catheter.spring, RopeStretch(jnp.asarray(catheter.rope)))
     turns, states = motion.turns, []
     for k in range(len(turns.at)):

@@ -23,13 +23,13 @@ from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.angles.term import detection_limit
-from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.recordings.simulation import refuse_saturated
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.terms import drawn_readings
+from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
@@ -70,7 +70,7 @@ def drawn_anew(dataset: Dataset, values: dict[str, float], scale: float = 1.0) -
     cable, tables = build_model(dataset).cable, dataset.measurements
 
     def readings(values, key):
-        return drawn_readings(cable, tables, values, key, scale)
+        return draw_readings(cable, tables, values, key, scale)
 
     arguments = {name: jnp.asarray(value) for name, value in values.items()}, jax.random.key(1)
     return replace_readings(dataset, compile_program(readings, *arguments, run_once=True)(*arguments))
@@ -144,11 +144,11 @@ def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_wer
 def held_at(forces: tuple[float, ...]) -> Dataset:
     """Forces that were read while nothing slid, on a cable of one known angle."""
     description = cable(1, ("forces",), contact=[CONTACTS[2]])
-    table = empty_tables(description, design_of(runs=(450.0,), input_forces=forces, strokes=("pull",))).table(
+    table = empty_tables(description, make_design(runs=(450.0,), input_forces=forces, strokes=("pull",))).table(
         ForceTable
     )
     held = replace(table, stroke=np.zeros(len(forces), dtype=int), output_force=np.full(len(forces), forces[0]))
-    return Dataset(description, empty_tables(description, design_of()).with_tables(held), {})
+    return Dataset(description, empty_tables(description, make_design()).with_tables(held), {})
 
 
 def test_held_readings_slip_as_often_as_their_likelihood_says():
@@ -160,13 +160,13 @@ def test_held_readings_slip_as_often_as_their_likelihood_says():
     assert isinstance(term, HeldForcesTerm)
     probability = np.exp(np.asarray(term.log_likelihood(named, jax.tree.map(jnp.asarray, term.data))))
     draw = jax.jit(
-        jax.vmap(lambda key: drawn_readings(model.cable, dataset.measurements, named, key)["forces"]["slipped"])
+        jax.vmap(lambda key: draw_readings(model.cable, dataset.measurements, named, key)["forces"]["slipped"])
     )
     held = np.sum(~np.asarray(draw(jax.random.split(jax.random.key(2), 2000))), axis=0)
     assert 0.05 < probability[1] < 0.95
     for count, p in zip(held, probability, strict=True):
         assert stats.binomtest(int(count), 2000, float(p)).pvalue > 1e-4
-    drawn = drawn_readings(model.cable, dataset.measurements, named, jax.random.key(1))
+    drawn = draw_readings(model.cable, dataset.measurements, named, jax.random.key(1))
     forces = replace_readings(dataset, drawn).measurements.table(ForceTable)
     np.testing.assert_array_equal(forces.input_force, dataset.measurements.table(ForceTable).input_force)
 
@@ -427,7 +427,7 @@ def angles_alone(undetected: str) -> Dataset:
     normal = {"free_angle_a": (-1.1, 0.2), "free_angle_b": (-1.2, 0.3)}
     prior = {name: {"prior": {"normal": {"mean": mean, "sd": sd}}} for name, (mean, sd) in normal.items()}
     prior |= {"sigma_theta": {"prior": {"lognormal": {"median": 2.0, "log_sd": 0.3}}}}
-    return designed(cable(1, {"angles": angles}, prior=prior), design_of(angles=DESIGN.angles))
+    return designed(cable(1, {"angles": angles}, prior=prior), make_design(angles=DESIGN.angles))
 
 
 @pytest.mark.slow

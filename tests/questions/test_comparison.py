@@ -22,7 +22,7 @@ from bowdenfit.inference.comparison import (
 from bowdenfit.inference.leave_one_out import REFIT, LooDensity, LooRefits, leave_one_out
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.psis import Affine, find_best_map, match_moments, reliable_k
-from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare import comparison_figure
@@ -45,7 +45,7 @@ NO_RUN_EFFECT = {"tau": {"fixed": 0.0}}
 def outlier():
     """Eight efficiencies of one contact, the last far from the others: two parameters, so that integrals are exact."""
     description = cable(1, ("efficiencies",), contact=[EDGE])
-    dataset, _ = measured(description, 3, design=design_of(efficiencies=tuple(np.linspace(400.0, 600.0, 8))))
+    dataset, _ = measured(description, 3, design=make_design(efficiencies=tuple(np.linspace(400.0, 600.0, 8))))
     efficiency = dataset.measurements.table(EfficiencyTable).efficiency.copy()
     efficiency[-1] *= 0.93
     table = replace(dataset.measurements.table(EfficiencyTable), efficiency=efficiency)
@@ -307,7 +307,7 @@ def test_one_reading_that_makes_most_of_a_difference_is_named():
 def mountings():
     """Twelve mountings of one cable, which differ by 3 %."""
     description = cable(1, ("forces",), contact=[EDGE])
-    design = design_of(runs=tuple(np.linspace(400.0, 600.0, 12)), input_forces=(20.0, 40.0, 60.0, 80.0))
+    design = make_design(runs=tuple(np.linspace(400.0, 600.0, 12)), input_forces=(20.0, 40.0, 60.0, 80.0))
     return measured(description, 6, design=design, tau=0.03)[0]
 
 

@@ -21,7 +21,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import LoopTable
-from bowdenfit.kinds.terms import drawn_readings
+from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.questions.figures import collect_figure_data
@@ -237,7 +237,7 @@ def simulated(plan):
         if preload not in programs:
             values = draw_true_values(plan.description, tables, plan.truth | {"preload": preload}, jax.random.key(0))
             named = {name: jnp.asarray(value) for name, value in values.items()}
-            programs[preload] = jax.jit(lambda key: drawn_readings(cable, tables, named, key))
+            programs[preload] = jax.jit(lambda key: draw_readings(cable, tables, named, key))
         return replace_readings(dataset, programs[preload](jax.random.key(seed)))
 
     return measured

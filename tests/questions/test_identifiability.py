@@ -8,7 +8,7 @@ from cables import LENGTHS, cable, measured
 
 import bowdenfit as bf
 from bowdenfit.inference.identifiability import analyze_covariance
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.questions.identify.verb import identify
 
 pytestmark = pytest.mark.extended
@@ -184,7 +184,7 @@ def test_tables_that_contradict_each_other_are_not_trusted(tmp_path, run):
 
 def test_readings_of_a_plan_are_judged_with_its_curves():
     """Three coefficients and forces at one length only: one sum is determined, the coefficients are not."""
-    design = design_of(angles=LENGTHS, runs=(430.0,) * 6, input_forces=(20.0, 60.0))
+    design = make_design(angles=LENGTHS, runs=(430.0,) * 6, input_forces=(20.0, 60.0))
     data, _ = measured(cable(3), 1, design=design)
     found = identify(data).groups["friction"]
     assert found.undetermined is not None

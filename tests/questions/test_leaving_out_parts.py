@@ -16,8 +16,8 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.leave_one_out import LooDensity
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds.run_parts import run_parts
-from bowdenfit.kinds.runs import run_sums
+from bowdenfit.kinds.run_parts import split_runs
+from bowdenfit.kinds.runs import sum_runs
 from bowdenfit.model import build_model
 from bowdenfit.questions.compare.words import comparison_text
 
@@ -43,19 +43,19 @@ def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, fr
     with jax.enable_x64(True):
         posterior = LogDensity(build_model(load_dataset(bench(tmp_path, runs=3), [f'friction_model="{friction}"'])))
         (term,) = posterior.model.terms
-        parts = run_parts(term, unit)
+        parts = split_runs(term, unit)
         readings = LooDensity(posterior, parts={term.name: parts})
         z = 0.5 * np.random.default_rng(2).standard_normal((5, posterior.model.space.size))
         assert len(parts.labels) == (3 * 2 * 8 if unit == "load" else 180)
         i = len(parts.labels) // 2
         kept = _without(term.rows, i, unit)
-        others = replace(term, data=run_sums(term.cable, kept), rows=kept)
+        others = replace(term, data=sum_runs(term.cable, kept), rows=kept)
         found, _ = readings.evaluate(z, i)
         for density, each in zip(found, z, strict=True):
             values = posterior.model.space.constrain(jnp.asarray(each))
             exact = jnp.sum(others.log_likelihood(values, others.data)) - 0.5 * each @ each
             assert density == pytest.approx(float(exact), abs=1e-8)
-        assert parts.said[i, 0] == len(term.rows.run) - len(kept.run)
+        assert parts.event_keys[i, 0] == len(term.rows.run) - len(kept.run)
 
 
 def _without(rows, i, unit):
@@ -98,4 +98,4 @@ def test_too_many_readings_are_refused_with_what_to_do_instead(tmp_path):
     with jax.enable_x64(True):
         (term,) = build_model(load_dataset(bench(tmp_path, runs=10))).terms
         with pytest.raises(UsageError, match="--leave-out load"):
-            run_parts(term, "reading")
+            split_runs(term, "reading")

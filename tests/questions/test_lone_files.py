@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.file_kind import file_kind
+from bowdenfit.kinds.file_kind import guess_file_kind
 from bowdenfit.kinds.forces.table import ForceTable, count_loads
 from bowdenfit.recordings.recording import Recordings
 
@@ -60,14 +60,14 @@ def test_sixty_trials_are_a_table_at_six_loads_and_the_command_fits_them(run, tm
 
 def test_more_than_two_hundred_rows_do_not_make_a_recording(tmp_path):
     path = write(tmp_path, ("No.", "Fin (N)", "Fout (N)"), (range(500), *trials(500)))
-    assert file_kind(path).kind == "forces" and not file_kind(path).other
+    assert guess_file_kind(path).kind == "forces" and not guess_file_kind(path).other
     assert len(bf.read(path, wrap_angle=(180, "deg")).measurements.table(ForceTable).run) == 500
 
 
 def test_an_index_is_no_clock(tmp_path):
     time, force, output = recorded()
     path = write(tmp_path, ("Index", "Fin (N)", "Fout (N)"), (range(len(time)), force, output))
-    found = file_kind(path)
+    found = guess_file_kind(path)
     assert (found.kind, found.other) == ("forces", "recordings")
     with pytest.raises(bf.DatasetError, match=r"could be a table of readings or a recording.*--channel time=RATE"):
         bf.read(path, wrap_angle=(180, "deg"))
@@ -84,7 +84,7 @@ def test_a_time_column_makes_a_recording(run, tmp_path):
 
 def test_tensions_called_t1_and_t2_are_no_clocks(tmp_path):
     path = write(tmp_path, ("T1 (N)", "T2 (N)"), trials())
-    assert file_kind(path).kind == "forces"
+    assert guess_file_kind(path).kind == "forces"
     time, force, output = recorded()
     path = write(tmp_path, ("t", "T1", "T2"), (time, force, output))
     (table,) = bf.read(path, wrap_angle=(180, "deg"), channels=["input_force=T1:N", "output_force=T2:N"]).measurements.tables
@@ -107,7 +107,7 @@ def test_few_rows_with_a_slow_clock_could_be_either_and_each_command_works(run, 
 
 def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
     path = write(tmp_path, ("time (s)", "run", "F_in (N)", "F_out (N)"), (20.0 * np.arange(60), range(60), *trials()))
-    found = file_kind(path)
+    found = guess_file_kind(path)
     assert (found.kind, found.other) == ("forces", "")
     assert "run" in found.why
 
@@ -116,7 +116,7 @@ def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
 def test_samples_of_a_fast_clock_are_not_taken_for_readings_whatever_stands_beside_them(tmp_path, beside):
     time, force, output = recorded()
     columns = ("time (s)", beside, "Cell A (N)", "Cell B (N)"), (time, 50.0 + 0 * time, force, output)
-    assert file_kind(write(tmp_path, *columns)).kind == "recordings"
+    assert guess_file_kind(write(tmp_path, *columns)).kind == "recordings"
     with pytest.raises(bf.DatasetError, match="could be a table of readings or a recording"):
         bf.read(write(tmp_path, *columns), wrap_angle=(180, "deg"))
 
@@ -124,10 +124,10 @@ def test_samples_of_a_fast_clock_are_not_taken_for_readings_whatever_stands_besi
 def test_samples_without_a_clock_are_not_readings_because_they_have_a_direction_and_sorted_readings_are(tmp_path):
     _, force, output = recorded()
     path = write(tmp_path, ("direction", "F_in (N)", "F_out (N)"), (["pull"] * len(force), force, output))
-    assert file_kind(path).other == "recordings"
+    assert guess_file_kind(path).other == "recordings"
     force, load = trials(300)
     order = np.argsort(load)
-    found = file_kind(write(tmp_path, ("F_in (N)", "F_out (N)"), (force[order], load[order])))
+    found = guess_file_kind(write(tmp_path, ("F_in (N)", "F_out (N)"), (force[order], load[order])))
     assert (found.kind, found.other) == ("forces", "")
 
 
@@ -135,7 +135,7 @@ def test_a_stated_rate_makes_a_recording(tmp_path):
     time, force, output = recorded()
     path = write(tmp_path, ("F_in (N)", "F_out (N)"), (force, output))
     path.write_text("Sampling rate: 50 Hz\n" + path.read_text())
-    assert file_kind(path).kind == "recordings"
+    assert guess_file_kind(path).kind == "recordings"
 
 
 def test_rows_have_the_wrap_angles_of_their_column_and_no_other(tmp_path, run):

@@ -22,7 +22,7 @@ from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
 from bowdenfit.inference.log_density import LogDensity as Density
 from bowdenfit.kinds.candidate import Candidate
-from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.kind import Design
@@ -263,7 +263,7 @@ def test_long_runs_are_joined_into_few_readings_that_count_for_more():
     design = other_design(input_forces=tuple(np.linspace(20.0, 90.0, 100)))
     run = typical_run(empty_tables(cable(1), design))
     assert len(run.input_force) == 24
-    assert run.worth.sum() == 200
+    assert run.n_effective.sum() == 200
     assert typical_run(empty_tables(cable(1, ("angles", "efficiencies")), DESIGN)) is None
 
 
@@ -272,7 +272,7 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
     run = typical_run(dataset.measurements)
     assert run.noise == "sigma_block"
     assert set(run.stroke) == {-1.0, 1.0}
-    assert len(run.input_force) == 24 < run.worth.sum()
+    assert len(run.input_force) == 24 < run.n_effective.sum()
     found = list_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
     assert {c.kind for c in found} == {"angle", "force"}
     assert Candidate("force", 430.0) in found
@@ -290,7 +290,7 @@ def test_by_default_candidates_are_what_the_tables_can_hold(fit):
 def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
     clamp = {"name": "housing", "friction": "mu", "wrap_angle": {"column": "clamp_angle"}}
     description = cable(1, ("forces",), contact=[clamp], route=None)
-    design = design_of(runs=(0.0,) * 3, input_forces=(20.0, 60.0), own_angles={"clamp_angle": (30.0, 90.0, 180.0)})
+    design = make_design(runs=(0.0,) * 3, input_forces=(20.0, 60.0), own_angles={"clamp_angle": (30.0, 90.0, 180.0)})
     dataset = Dataset(description, empty_tables(description, design), {})
     fit = pretended(dataset, {"mu": 0.1, "tau": 0.01, "sigma_F": 0.5}, n=3200)
     assert [format_candidate(c) for c in list_candidates(fit)] == ["force@30deg", "force@90deg", "force@180deg"]
@@ -302,7 +302,7 @@ def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
 
 def test_elastic_cables_have_stretch_preload_and_loop_readings():
     description = elastic_cable()
-    dataset = Dataset(description, empty_tables(description, design_of(**ELASTIC)), {})
+    dataset = Dataset(description, empty_tables(description, make_design(**ELASTIC)), {})
     fit = pretended(dataset, ELASTIC_TRUTH, n=3200)  # in shown units, which here are the internal ones
     names = [format_candidate(c) for c in list_candidates(fit)]
     assert {name.partition("@")[0] for name in names} == {"stretch", "preload", "loop"}
@@ -554,7 +554,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     The refits are by the package's own sampler, whose draws give a variance to 5 % or so; the best candidate, which is so by
     far, must be that of the refits too.
     """
-    design = design_of(angles=(420.0, 470.0, 500.0, 540.0, 590.0), efficiencies=(440.0, 500.0, 560.0))
+    design = make_design(angles=(420.0, 470.0, 500.0, 540.0, 590.0), efficiencies=(440.0, 500.0, 560.0))
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), 3, design=design)
     laboratory, density = Laboratory(), Density(build_model(dataset))
     z = laboratory.draws(density, 1)

@@ -13,7 +13,7 @@ import bowdenfit as bf
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compare_predictions
 from bowdenfit.inference.interval import Interval
-from bowdenfit.kinds.descriptions import design_of
+from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import collect_figure_data
@@ -238,7 +238,7 @@ def pulls_only():
     description = cable(
         1, ("forces",), contact=[contact], sensors={"input_gain_error_sd": 0, "output_gain_error_sd": 0.05}
     )
-    design = design_of(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=("pull",))
+    design = make_design(runs=(400.0,) * 8, input_forces=(20.0, 40.0, 60.0), strokes=("pull",))
     dataset, values = measured(description, 4, design=design)
     return bf.fit(dataset, seed=2), values
 

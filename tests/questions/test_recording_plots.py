@@ -419,11 +419,11 @@ def test_without_draws_there_are_lines_and_no_intervals():
 
 
 def test_recorded_efficiencies_are_drawn_like_those_of_runs():
-    from bowdenfit.kinds import readings_called
+    from bowdenfit.kinds import find_readings
     from bowdenfit.kinds.recordings.blocks import RECORDED
 
-    assert readings_called(RECORDED).are_runs
-    assert readings_called(RECORDED).axis == readings_called("run_efficiency").axis
+    assert find_readings(RECORDED).are_runs
+    assert find_readings(RECORDED).axis == find_readings("run_efficiency").axis
     route = np.array([450.0, 500.0])
     points = EfficiencyPoints(True, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool))
     assert {"a", "b"} <= {text for text, _ in words(drawn("residuals", {"residuals": Residuals((points,))}))}

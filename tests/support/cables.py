@@ -7,7 +7,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.kind import Design
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
@@ -34,7 +34,7 @@ TRUTH = {
 }  # fmt: skip
 LENGTHS = tuple(np.linspace(400.0, 600.0, 11))
 RUN_LENGTHS = (400.0, 430.0, 460.0, 490.0, 520.0, 550.0, 580.0, 600.0)
-DESIGN = design_of(
+DESIGN = make_design(
     angles=LENGTHS,
     efficiencies=(410.0, 450.0, 490.0, 530.0, 570.0),
     runs=RUN_LENGTHS,
@@ -45,7 +45,7 @@ DESIGN = design_of(
 
 def other_design(**measured_otherwise: Any) -> Design:
     """The usual design, but for what is said."""
-    return design_of(**dict(DESIGN) | measured_otherwise)
+    return make_design(**dict(DESIGN) | measured_otherwise)
 
 
 def cable(n_contacts: int, tables: tuple[str, ...] | dict[str, Any] = ("angles", "forces"), **more: Any) -> Description:

@@ -6,7 +6,7 @@ import jax
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
-from bowdenfit.kinds.descriptions import design_of, parse_description
+from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
@@ -70,7 +70,7 @@ def bench(
     Of the stated ones only those count that the cable has and that are not fixed. `once` is that of `simulate`.
     """
     of_truth, of_readings = jax.random.split(jax.random.key(seed))
-    measured = design_of(**design)
+    measured = make_design(**design)
     empty = empty_tables(description, measured)
     free = {p.name for p in build_model(Dataset(description, empty, {})).space.free}
     wanted = {name: value for name, value in truth.items() if name in free}

@@ -10,7 +10,7 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.terms import drawn_readings, drawn_tables
+from bowdenfit.kinds.terms import draw_readings, iterate_replaced_tables
 from bowdenfit.model import build_model
 
 
@@ -29,8 +29,8 @@ def measured_again(folder: Path, count: int, changes: list[str] | None = None, *
         stated = json.loads((folder / "truth.json").read_text())["truth"]
         truth = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
         named = {name: jnp.asarray(value) for name, value in truth.items()}
-        draw = jax.jit(lambda key: drawn_readings(model.cable, tables, named, key))
+        draw = jax.jit(lambda key: draw_readings(model.cable, tables, named, key))
         for seed in range(count):
             drawn = jax.tree.map(np.asarray, draw(jax.random.key(seed)))
-            again = Measurements(tuple(drawn_tables(dataset.description, tables, drawn)))
+            again = Measurements(tuple(iterate_replaced_tables(dataset.description, tables, drawn)))
             yield Dataset(dataset.description, again, {})

@@ -13,14 +13,14 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings
-from bowdenfit.kinds.plausibility import copies, without_runs
+from bowdenfit.kinds.plausibility import compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
     LARGEST_ANGLE,
-    Page,
+    FileRows,
     RowOrigin,
-    provenance_of,
+    origin_of_rows,
     read_angle,
-    rounded,
+    round_lengths,
     route_column,
     route_heading,
 )
@@ -67,8 +67,8 @@ class AngleKind(PlannedKind[AngleTable]):
         angle_columns = [require_column(table, columns, name, f"{name}_deg") for name in contacts]
         cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in angle_columns]
         pairs = np.array(cells, dtype=float).reshape(len(angle_columns), len(table.rows), 2)
-        route_values, angle, limit = rounded(lengths.numbers()), pairs[..., 0].T, pairs[..., 1].T
-        made = AngleTable(route_values, tuple(contacts), angle, limit, provenance_of(table))
+        route_values, angle, limit = round_lengths(lengths.numbers()), pairs[..., 0].T, pairs[..., 1].T
+        made = AngleTable(route_values, tuple(contacts), angle, limit, origin_of_rows(table))
         return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
 
     @override
@@ -129,7 +129,7 @@ class AngleKind(PlannedKind[AngleTable]):
 
     @override
     def copied_readings(self, table: AngleTable) -> list[str]:
-        return copies(without_runs(table.origin, table.route, table.angle, table.route))
+        return describe_copies(compare_without_runs(table.origin, table.route, table.angle, table.route))
 
     @override
     def why_implausible(self, measured: AngleTable, simulated: AngleTable) -> str:
@@ -140,7 +140,7 @@ class AngleKind(PlannedKind[AngleTable]):
         return "too few angles are detected" if np.any(detected < np.minimum(enough, _FEWEST)) else ""
 
     @override
-    def file_rows(self, table: AngleTable, description: Description) -> Page:
+    def file_rows(self, table: AngleTable, description: Description) -> FileRows:
         shown, limits = np.rad2deg(table.angle), np.rad2deg(table.limit)
         cells = [
             [f"<{limits[i, k]:g}" if np.isnan(angle) else f"{angle:.1f}" for k, angle in enumerate(row)]

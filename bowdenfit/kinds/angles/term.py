@@ -17,7 +17,15 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation
 from bowdenfit.kinds.tables import AngleSettings, AngleTable
-from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth, first_less, joined, last_less
+from bowdenfit.kinds.term import (
+    Circumstances,
+    Term,
+    TermKind,
+    Truth,
+    deviations_of_bounds,
+    deviations_of_readings,
+    join_contributions,
+)
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 
@@ -64,23 +72,23 @@ class AnglesTerm:
         parts = [curve.wrap_angle(values, data["route"][column]) for column, curve in curves.items()]
         return jnp.concatenate(parts)[data["order"]]
 
-    def _split(
+    def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " detected"], Float[Array, " undetected"]]:
         """Standardized deviations: of the detected readings, and of the limits of the undetected ones."""
         theta, sigma = self._expected(values, data), values[ANGLE_NOISE]
-        return first_less(data["angle"], theta) / sigma, last_less(data["limit"], theta) / sigma
+        return deviations_of_readings(data["angle"], theta) / sigma, deviations_of_bounds(data["limit"], theta) / sigma
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Log likelihood of each reading."""
-        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
+        (deviation, u), law = self._deviations(values, data), noise_law(self.cable.description)
         read = law.log_density(deviation) - jnp.log(values[ANGLE_NOISE])
-        return joined((data["angle"], read), (data["limit"], law.log_cdf(u)))
+        return join_contributions((data["angle"], read), (data["limit"], law.log_cdf(u)))
 
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Standardized residuals; sqrt(-2 log likelihood) for undetected angles."""
-        (deviation, u), law = self._split(values, data), noise_law(self.cable.description)
-        return joined((data["angle"], law.residual(deviation)), (data["limit"], law.bound_residual(u)))
+        (deviation, u), law = self._deviations(values, data), noise_law(self.cable.description)
+        return join_contributions((data["angle"], law.residual(deviation)), (data["limit"], law.bound_residual(u)))
 
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " readings"]:
         """Expected readings [deg]."""
@@ -96,7 +104,7 @@ class AnglesTerm:
         return np.rad2deg(np.concatenate([self.data["angle"], np.full(len(self.data["limit"]), np.nan)]))
 
 
-def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
+def make_angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     """The term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
     settings, route, published = (
@@ -128,7 +136,7 @@ def angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
     return AnglesTerm(cable, data, tuple(readings[i][2] for i in order))
 
 
-def drawn_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> dict[str, Array]:
+def draw_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> dict[str, Array]:
     """Draw wrap angles and detection limits of an angle table [rad].
 
     Args:
@@ -169,7 +177,7 @@ def detection_limit(description: Description, table: AngleTable) -> float:
     return float(limits[0]) if len(limits) else -np.inf
 
 
-def _undetected(description: Description) -> str:
+def _treatment_of_undetected(description: Description) -> str:
     """Return how angles too small to detect enter: "censored", "zero" or "dropped"."""
     settings = description.table(AngleSettings)
     if description.geometry == "published":
@@ -186,7 +194,7 @@ class AngleCandidates(CandidateKind):
     unknown = "no contact of this cable has a curve that an angle could tell of."
     along_route = True
     angles = "none"
-    tells_curves = True
+    measures_curves = True
     heading = "Wrap angles"
 
     @override
@@ -194,7 +202,7 @@ class AngleCandidates(CandidateKind):
         return bool(at.cable.curves)
 
     @override
-    def measured(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: Cable) -> str:
         return "the wrap angles" if len(cable.curves) > 1 else "the wrap angle"
 
     @override
@@ -208,7 +216,7 @@ class AngleCandidates(CandidateKind):
         route, _, origin = at.rows(candidates)
         shape = (len(candidates), len(columns))
         table = AngleTable(route, columns, np.full(shape, np.deg2rad(30)), np.full(shape, np.nan), origin)
-        term = angles_term(at.cable, table)
+        term = make_angles_term(at.cable, table)
         # Every row is detected, so readings are curve by curve; a curve may hold over a part of the range only.
         read_at = np.concatenate([term.data["route"][column] for column in columns])
         limit = settings.detection_limit.to("angle") if settings and settings.detection_limit else 0.0
@@ -225,7 +233,7 @@ class AngleTerms(TermKind[AngleTable]):
 
     @override
     def terms(self, cable: Cable, table: AngleTable, angles: AngleTable | None) -> tuple[AnglesTerm]:
-        return (angles_term(cable, table),)
+        return (make_angles_term(cable, table),)
 
     @override
     def parameters(self, table: AngleTable, at: Circumstances) -> list[Parameter]:
@@ -247,7 +255,7 @@ class AngleTerms(TermKind[AngleTable]):
 
     @override
     def draw(self, table: AngleTable, truth: Truth) -> dict[str, Array]:
-        return drawn_angles(table, truth)
+        return draw_angles(table, truth)
 
     @override
     def check_drawable(self, description: Description, table: AngleTable) -> None:
@@ -265,14 +273,14 @@ class AngleTerms(TermKind[AngleTable]):
         }
         if censored:
             return f"{entered} wrap angles and {censored} too small to detect (known to be below the limit)"
-        return f"{entered} wrap angles{how[_undetected(description)]}"
+        return f"{entered} wrap angles{how[_treatment_of_undetected(description)]}"
 
     @override
     def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
         how = {"censored": "below the limit", "zero": "zeros", "dropped": "dropped"}
         ways = [
-            f"{name}: {'zeros, in the published regions' if one.geometry == 'published' else how[_undetected(one)]}"
-            for name, one in descriptions.items()
+            f"{name}: {'zeros, in the published regions' if d.geometry == 'published' else how[_treatment_of_undetected(d)]}"
+            for name, d in descriptions.items()
         ]
         return (
             "angles too small to detect, and angles where a curve does not hold, are not the same readings in all fits "
@@ -284,4 +292,4 @@ class AngleTerms(TermKind[AngleTable]):
         if description.geometry == "published":
             return ""
         words = {"censored": "", "zero": "undetected angles as zeros", "dropped": "undetected angles dropped"}
-        return words[_undetected(description)]
+        return words[_treatment_of_undetected(description)]

@@ -12,11 +12,20 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity
-from bowdenfit.kinds.displacement.reader import early, read_displacement
-from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, in_order
+from bowdenfit.kinds.displacement.reader import find_early_rows, read_displacement
+from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, follow_motor
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
-from bowdenfit.kinds.plausibility import Compared, copies, within_factor
-from bowdenfit.kinds.rows import OwnAngles, Page, RowOrigin, fixed, in_words, radians, route_cells, route_heading
+from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor
+from bowdenfit.kinds.rows import (
+    FileRows,
+    OwnAngles,
+    RowOrigin,
+    convert_to_radians,
+    describe_range,
+    format_fixed,
+    route_cells,
+    route_heading,
+)
 from bowdenfit.kinds.table_files import RUN, STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Vector
@@ -86,8 +95,9 @@ class DisplacementKind(
         left = f"; {unused} of {len(table.used)} rows are not used" if unused else ""
         count, returning = self.count_readings(table), int(table.used.sum()) - pulling
         return [
-            f"{table.origin.files[0]}: {count} ({pulling} pulling, {returning} returning), {in_words(table.force, 'N')} over "
-            f"{in_words(table.displacement, 'mm')}, pull and return {where}; far end: {_far_end(description)}{left}"
+            f"{table.origin.files[0]}: {count} ({pulling} pulling, {returning} returning), "
+            f"{describe_range(table.force, 'N')} over {describe_range(table.displacement, 'mm')}, "
+            f"pull and return {where}; far end: {_far_end(description)}{left}"
         ]
 
     @override
@@ -133,20 +143,20 @@ class DisplacementKind(
     def copied_readings(self, table: DisplacementTable) -> list[str]:
         files, names = listed(table.origin.files), tuple(f"run {name}" for name in table.run_names)
         moved, force = table.displacement[:, None], table.force[:, None]
-        return copies(Compared(files, table.run, names, moved, force, table.displacement, table.run))
+        return describe_copies(ComparedReadings(files, table.run, names, moved, force, table.displacement, table.run))
 
     @override
     def why_implausible(self, measured: DisplacementTable, simulated: DisplacementTable) -> str:
         """Return that forces are of another size than the measured, or that one is below nothing."""
         if np.any(simulated.force < _NEGATIVE * max(simulated.force.max(), 0.0)):
             return "a force is negative"
-        close = within_factor(np.ptp(measured.force), np.ptp(simulated.force))
+        close = is_within_factor(np.ptp(measured.force), np.ptp(simulated.force))
         return "" if close else "the force is far from the measured one"
 
     @override
-    def file_rows(self, table: DisplacementTable, description: Description) -> Page:
+    def file_rows(self, table: DisplacementTable, description: Description) -> FileRows:
         names = table.own.names
-        displacements, forces = fixed(table.displacement, 4), fixed(table.force, 4)
+        displacements, forces = format_fixed(table.displacement, 4), format_fixed(table.force, 4)
         rows = [
             [
                 *route_cells(table.route[i], description),
@@ -169,7 +179,7 @@ class DisplacementKind(
     @override
     def empty_table(self, design: DisplacementDesign, description: Description, file: str) -> DisplacementTable:
         """Return a table in the order in which the motor moves up and down."""
-        moved, angles = design.displacement, radians(design.displacement.wrap_angles)
+        moved, angles = design.displacement, convert_to_radians(design.displacement.wrap_angles)
         up = np.array(sorted(set(moved.displacements)), dtype=float)
         path = np.append(np.tile(np.concatenate([up, up[-2:0:-1]]), moved.cycles), up[:1])
         runs, names = max(len(angles), 1), description.angle_columns
@@ -181,8 +191,8 @@ class DisplacementKind(
         labels = tuple(f"{angle:.4g} deg" for angle in np.rad2deg(angles)) or ("all",)
         every, nowhere = np.ones(len(x), dtype=bool), np.full(len(x), np.nan)
         origin = RowOrigin.below_heading(file, len(x))
-        table = DisplacementTable(nowhere, 1.0 + x, x, in_order(x, run), run, labels, every, own, origin, False)
-        return replace(table, used=~early(table))
+        table = DisplacementTable(nowhere, 1.0 + x, x, follow_motor(x, run), run, labels, every, own, origin, False)
+        return replace(table, used=~find_early_rows(table))
 
 
 def _far_end(description: Description) -> str:

@@ -16,11 +16,11 @@ import numpy as np
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.csv_table import RawTable, read_csv
-from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, in_order, sliding
+from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, follow_motor, history_of_sliding_rope
 from bowdenfit.kinds.rows import (
     OwnAngles,
     check_spelling,
-    provenance_of,
+    origin_of_rows,
     read_own_angles,
     read_route,
     read_strokes,
@@ -62,7 +62,7 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     columns = find_columns(table, wanted, source.columns, _UNUSED)
     check_spelling(table, columns, others)
     force_column, x_column = (
-        _one_of(table, columns, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
+        _require_either_name(table, columns, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
     )
     if "output_force" in columns:
         raise DatasetError(
@@ -74,18 +74,20 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     strokes = read_strokes(columns, len(force), held="")
     table.faults.refuse()
     _check_tensions(force, force_column)
-    stroke = _check_moving(strokes, columns)
+    stroke = _check_strokes(strokes, columns)
     how = settings.rows or ("sliding" if stroke is not None else "in order")
     if how == "sliding" and stroke is None:
         raise DatasetError(
             f"{table.file} has no stroke column, so nobody knows which way the rope slides in a row; add one (pull or return), "
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
-    run, names = _runs(columns.get("run"), at, own)
+    run, names = _assign_runs(columns.get("run"), at, own)
     motion = (
-        sliding(stroke, displacement, run) if how == "sliding" and stroke is not None else in_order(displacement, run)
+        history_of_sliding_rope(stroke, displacement, run)
+        if how == "sliding" and stroke is not None
+        else follow_motor(displacement, run)
     )
-    every, origin = np.ones(len(force), dtype=bool), provenance_of(table)
+    every, origin = np.ones(len(force), dtype=bool), origin_of_rows(table)
     rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
     if not any(name.startswith(ZERO) for name in source.description.prior):
         _check_runs(rows)
@@ -94,7 +96,7 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     return TableFromFiles(rows, {path.name: path}, tuple(remarks), (table.account,))
 
 
-def _one_of(table: RawTable, columns: Mapping[str, Column], name: str, unit: str) -> Column:
+def _require_either_name(table: RawTable, columns: Mapping[str, Column], name: str, unit: str) -> Column:
     """A column by either of its names."""
     present = [spelling for spelling in _NAMES[name] if spelling in columns]
     if len(present) > 1:
@@ -114,7 +116,7 @@ def _check_tensions(values: Vector, column: Column) -> None:
         )
 
 
-def _check_moving(strokes: Labels, columns: Mapping[str, Column]) -> Labels | None:
+def _check_strokes(strokes: Labels, columns: Mapping[str, Column]) -> Labels | None:
     """The strokes, of which none is held; None without a column."""
     if "stroke" not in columns:
         return None
@@ -124,7 +126,7 @@ def _check_moving(strokes: Labels, columns: Mapping[str, Column]) -> Labels | No
     return strokes
 
 
-def _runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
+def _assign_runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
     """One run is what the column calls so, at one route value and one set of wrap angles."""
     labels = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
     conditions = [
@@ -149,7 +151,7 @@ def _check_runs(table: DisplacementTable) -> None:
     n = np.bincount(table.run)
     single_rows = np.flatnonzero(n[table.run] == 1).tolist()
     if single_rows:
-        which = few([f"{table.origin.place(i)} ({table.run_names[table.run[i]]})" for i in single_rows])
+        which = few([f"{table.origin.describe_row(i)} ({table.run_names[table.run[i]]})" for i in single_rows])
         raise DatasetError(
             f"{which}: a run of one reading, which tells nothing, since where its displacement begins is fitted; the "
             "usual causes are a slipped digit in its wrap angle, another label than the rows beside it, and angles that "
@@ -208,7 +210,7 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
         )
     else:
         ignored = " Its stroke column is not needed." if has_strokes else ""
-        unknown = early(table)
+        unknown = find_early_rows(table)
         used &= ~unknown
         remarks.append(
             f"{file}: rows are taken in the order in which they stand, and turns of the motor as the displacement shows them."
@@ -241,25 +243,25 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
     return replace(table, used=used), remarks
 
 
-def early(table: DisplacementTable) -> Flags:
+def find_early_rows(table: DisplacementTable) -> Flags:
     """Rows of the first stroke of each run in which the force may depend on what was before it."""
     unknown = np.zeros(len(table.run), dtype=bool)
     for run in range(len(table.run_names)):
         rows = np.flatnonzero((table.run == run) & table.motion.first)
         back = np.flatnonzero((table.run == run) & (table.motion.stroke == -table.motion.stroke[rows[0]]))
-        may = _before_half(table, rows) if len(back) < 2 else _before_all_slides(table, rows, back)
+        may = _is_before_middle(table, rows) if len(back) < 2 else _is_before_full_slip(table, rows, back)
         last = np.flatnonzero(may)
         unknown[rows[: last[-1] + 1 if len(last) else 0]] = True
     return unknown
 
 
-def _before_half(table: DisplacementTable, rows: np.ndarray) -> Flags:
+def _is_before_middle(table: DisplacementTable, rows: np.ndarray) -> Flags:
     """Rows of a stroke before its middle, where no other stroke tells more."""
     x = table.displacement[rows]
     return np.asarray(table.motion.stroke[rows[0]] * (x - (x[0] + x[-1]) / 2) < 0)
 
 
-def _before_all_slides(table: DisplacementTable, rows: np.ndarray, back: np.ndarray) -> Flags:
+def _is_before_full_slip(table: DisplacementTable, rows: np.ndarray, back: np.ndarray) -> Flags:
     """Rows of a stroke before all of the rope is known to slide, by the way back."""
     way, x, force = int(table.motion.stroke[rows[0]]), table.displacement, table.force
     order = back[np.argsort(x[back], kind="stable")]
@@ -272,7 +274,7 @@ def _before_all_slides(table: DisplacementTable, rows: np.ndarray, back: np.ndar
     )
     ratios = (there / np.maximum(here, 1e-12 * force.max())) ** way
     if beyond or shared[0] >= shared[-1] or not np.median(ratios) > 1:
-        return _before_half(table, rows)
+        return _is_before_middle(table, rows)
     most, turned_at = np.median(ratios) ** 2, float(np.interp(first, x[order], force[order]))
     turned_at = max(turned_at, _LEAST_SHARE * force.max())
     depends = force[rows] < turned_at * most if way > 0 else force[rows] > turned_at / most

@@ -37,7 +37,7 @@ class Turns:
 
 
 @dataclass(frozen=True, repr=False)
-class Motion(Part):
+class StrokeHistory(Part):
     """How the motor moved at each reading.
 
     Args:
@@ -55,14 +55,14 @@ class Motion(Part):
     turns: Turns
 
 
-def sliding(stroke: Labels, displacement: Vector, run: Labels) -> Motion:
+def history_of_sliding_rope(stroke: Labels, displacement: Vector, run: Labels) -> StrokeHistory:
     """Readings of which each is known to be taken while all of the rope slides."""
     n, start = len(stroke), np.zeros(1, dtype=int)
     turns = Turns(displacement[:1], np.ones(1, dtype=int), start, run[:1], start)
-    return Motion(stroke, np.zeros(n, dtype=int), np.ones(n, dtype=bool), np.zeros(n, dtype=bool), turns)
+    return StrokeHistory(stroke, np.zeros(n, dtype=int), np.ones(n, dtype=bool), np.zeros(n, dtype=bool), turns)
 
 
-def in_order(displacement: Vector, run: Labels) -> Motion:
+def follow_motor(displacement: Vector, run: Labels) -> StrokeHistory:
     """Readings in the order in which they were taken, run by run.
 
     A run starts as if the motor had come to its first displacement the other way, all of the rope sliding. Turns are
@@ -78,7 +78,7 @@ def in_order(displacement: Vector, run: Labels) -> Motion:
     for number in np.unique(run):
         rows = np.flatnonzero(run == number)
         x = displacement[rows]
-        ends = _extremes(x, least)
+        ends = _find_turns(x, least)
         way = 1 if len(ends) < 2 or x[ends[1]] >= x[ends[0]] else -1
         memory.begin(float(x[0]), -way, int(number))
         for k, (start, stop) in enumerate(pairwise(ends)):
@@ -89,10 +89,10 @@ def in_order(displacement: Vector, run: Labels) -> Motion:
                 memory.pass_by(float(x[i]), way)
                 stroke[rows[i]], slides[rows[i]], first[rows[i]] = way, not memory.open, k == 0
                 after[rows[i]] = memory.open[-1] if memory.open else 0
-    return Motion(stroke, after, slides.astype(bool), first.astype(bool), memory.turns())
+    return StrokeHistory(stroke, after, slides.astype(bool), first.astype(bool), memory.turns())
 
 
-def _extremes(x: Vector, least: float) -> list[int]:
+def _find_turns(x: Vector, least: float) -> list[int]:
     """First and last reading, and those between at which the displacement turned by more than jitter."""
     ends, far = [0], 0
     way = 0
@@ -113,7 +113,7 @@ class _Memory:
 
     def __init__(self) -> None:
         self.open: list[int] = []
-        self._said: list[tuple[float, int, int, int, int]] = []
+        self._turns: list[tuple[float, int, int, int, int]] = []
 
     def begin(self, at: float, stroke: int, run: int) -> None:
         """A run."""
@@ -126,19 +126,19 @@ class _Memory:
 
     def pass_by(self, at: float, way: int) -> None:
         """The motor moves on to a displacement: what it passes is forgotten."""
-        while len(self.open) > 1 and way * (at - self._said[self.open[-2]][0]) >= 0:
+        while len(self.open) > 1 and way * (at - self._turns[self.open[-2]][0]) >= 0:
             self.open = self.open[:-2]
 
     def _add(self, at: float, stroke: int, run: int) -> None:
-        number = len(self._said)
+        number = len(self._turns)
         after = self.open[-1] if self.open else number
-        depth = self._said[after][4] + 1 if self.open else 0
-        self._said.append((at, stroke, after, run, depth))
+        depth = self._turns[after][4] + 1 if self.open else 0
+        self._turns.append((at, stroke, after, run, depth))
         self.open.append(number)
 
     def turns(self) -> Turns:
         """All of them."""
-        at, *others = zip(*self._said, strict=True)
+        at, *others = zip(*self._turns, strict=True)
         return Turns(np.array(at), *(np.array(values, dtype=int) for values in others))
 
 
@@ -173,7 +173,7 @@ class DisplacementTable(Part):
     route: Vector
     force: Vector
     displacement: Vector
-    motion: Motion
+    motion: StrokeHistory
     run: Labels
     run_names: tuple[str, ...]
     used: Flags

@@ -16,7 +16,7 @@ from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
 from bowdenfit.cable.load_cells import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_scatter
 from bowdenfit.kinds.tables import AngleTable, StretchTable
@@ -33,28 +33,28 @@ Values = Mapping[str, Array]
 Data = Mapping[str, Any]
 
 
-def order_of(table: DisplacementTable) -> np.ndarray:
+def rows_by_run(table: DisplacementTable) -> np.ndarray:
     """The rows that are used, in order of their runs."""
     rows = np.flatnonzero(table.used)
     return rows[np.argsort(table.run[rows], kind="stable")]
 
 
-def readings(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
+def reading_arrays(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
     """Arrays of some rows, ordered by run."""
     run, motion = table.run[rows], table.motion
     return {
         "displacement": table.displacement[rows],
         "stroke": motion.stroke[rows].astype(float),
-        "after": places_of(motion.turns)[motion.after[rows]],
+        "after": rank_by_depth(motion.turns)[motion.after[rows]],
         "slides": motion.slides[rows],
         "run": run,
         "start": np.searchsorted(run, run),
     }
 
 
-def turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
+def split_turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
     """Turns by depth, each with the place of the one before it among those of lower depth."""
-    rank = places_of(turns)
+    rank = rank_by_depth(turns)
     at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": rank[turns.after], "run": turns.run}
     return tuple(
         {name: values[turns.depth == depth] for name, values in at.items()}
@@ -66,10 +66,10 @@ def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | 
     """Wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
-    return row_angles(cable.description, RowConditions(table.route[first], own), angles).data
+    return collect_row_angles(cable.description, RowConditions(table.route[first], own), angles).data
 
 
-def places_of(turns: Turns) -> np.ndarray:
+def rank_by_depth(turns: Turns) -> np.ndarray:
     """Place of each turn where they are ordered by depth."""
     rank = np.empty(len(turns.depth), dtype=int)
     rank[np.argsort(turns.depth, kind="stable")] = np.arange(len(turns.depth))
@@ -126,7 +126,9 @@ class DisplacementTerm:
         exponent = self.cable.friction_exponent(values, angles)
         return exponent, self.cable.exponent_variance(values, angles, variance)
 
-    def shown(self, values: Values, data: Data, exponent: Float[Array, " runs"], beside: Array | float = 0.0) -> Array:
+    def load_cell_force(
+        self, values: Values, data: Data, exponent: Float[Array, " runs"], beside: Array | float = 0.0
+    ) -> Array:
         """Force that the motor's load cell shows at each reading [N].
 
         Args:
@@ -138,7 +140,7 @@ class DisplacementTerm:
         exponent = jnp.maximum(exponent, LEAST_EXPONENT)
         zero = jnp.stack([values[name] for name in self.zeros])
         compliance = 0.0 if self.stop else 1 / values[END_SPRING]
-        rope = _rope(values)
+        rope = _make_rope(values)
 
         def tendon(run: Array) -> Tendon:
             return Tendon(exponent[run], compliance, rope)
@@ -148,51 +150,51 @@ class DisplacementTerm:
         known = Turn(travel, *tendon(first["run"]).sliding(travel, first["stroke"]))
         for turns in later:
             travel = turns["at"] - zero[turns["run"]]
-            force, mean = tendon(turns["run"]).sliding_after_turn(_taken(known, turns["after"]), travel, turns["stroke"])
+            force, mean = tendon(turns["run"]).sliding_after_turn(_select_turns(known, turns["after"]), travel, turns["stroke"])
             parts = ((known.travel, travel), (known.force, force), (known.mean, mean))
             known = Turn(*(jnp.concatenate(part) for part in parts))
         travel, at = data["displacement"] + beside - zero[data["run"]], tendon(data["run"])
         sliding = at.sliding(travel, data["stroke"])[0]
-        since = at.sliding_after_turn(_taken(known, data["after"]), travel, data["stroke"])[0]
+        since = at.sliding_after_turn(_select_turns(known, data["after"]), travel, data["stroke"])[0]
         return LoadCells.of(values).shown_input(jnp.where(data["slides"], sliding, since))
 
-    def _readings(self, values: Values, data: Data, weights: Values) -> "_Readings":
+    def _linearize(self, values: Values, data: Data, weights: Values) -> "_Linearization":
         exponent, angle_variance = self.exponents(values, data)
-        mean, slope = jax.jvp(lambda at: self.shown(values, data, at), (exponent,), (jnp.ones_like(exponent),))
+        mean, slope = jax.jvp(lambda at: self.load_cell_force(values, data, at), (exponent,), (jnp.ones_like(exponent),))
         if weights is not values:
             exponent, angle_variance = self.exponents(weights, data)
-            slope = jax.jvp(lambda at: self.shown(weights, data, at), (exponent,), (jnp.ones_like(exponent),))[1]
+            slope = jax.jvp(lambda at: self.load_cell_force(weights, data, at), (exponent,), (jnp.ones_like(exponent),))[1]
         variance = weights[FORCE_NOISE] ** 2
         if DISPLACEMENT_NOISE in weights:
-            more, less = (self.shown(weights, data, exponent, s * weights[DISPLACEMENT_NOISE]) for s in (1.0, -1.0))
+            more, less = (self.load_cell_force(weights, data, exponent, s * weights[DISPLACEMENT_NOISE]) for s in (1.0, -1.0))
             variance = variance + ((more - less) / 2) ** 2
         of_runs = weights[RUN_SCATTER] ** 2 + angle_variance
-        return _Readings(
+        return _Linearization(
             mean, data["force"] - mean, slope, jnp.broadcast_to(variance, mean.shape), of_runs, data["run"]
         )
 
-    def _one_by_one(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
+    def _predict_sequentially(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         """Mean and standard deviation of each reading by those before it in its run."""
-        linear = self._readings(values, data, values)
-        information = _before(linear.slope**2 / linear.variance, data["start"])
-        score = _before(linear.slope * linear.deviation / linear.variance, data["start"])
+        linear = self._linearize(values, data, values)
+        information = _sum_before(linear.slope**2 / linear.variance, data["start"])
+        score = _sum_before(linear.slope * linear.deviation / linear.variance, data["start"])
         of_run = linear.of_runs[data["run"]]
         left = of_run / (1 + of_run * information)
         return linear.mean + linear.slope * left * score, jnp.sqrt(linear.variance + linear.slope**2 * left)
 
     def expected(self, values: Values, data: Data) -> Float[Array, " rows"]:
         """Expected forces in the mounting of each run, as its readings together show it [N]."""
-        linear = self._readings(values, data, values)
+        linear = self._linearize(values, data, values)
         return linear.mean + linear.slope * linear.mounting[0][data["run"]]
 
     def log_likelihood(self, values: Values, data: Data) -> Float[Array, " rows"]:
         """Log likelihood of each reading, given those before it in its run."""
-        return noise_law(self.cable.description).log_density(data["force"], *self._one_by_one(values, data))
+        return noise_law(self.cable.description).log_density(data["force"], *self._predict_sequentially(values, data))
 
     def residuals(self, values: Values, data: Data) -> Float[Array, " rows_and_runs"]:
         """Standardized residuals of readings in their run, and of runs; weights follow the parameters, undifferentiated."""
         law, weights = noise_law(self.cable.description), jax.lax.stop_gradient(dict(values))
-        linear = self._readings(values, data, weights)
+        linear = self._linearize(values, data, weights)
         mounting, variance = linear.mounting
         slope, sd = (jax.lax.stop_gradient(array) for array in (linear.slope, jnp.sqrt(linear.variance)))
         inside = (linear.deviation - slope * mounting[data["run"]]) / sd
@@ -202,12 +204,12 @@ class DisplacementTerm:
 
     def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " rows"]:
         """Forces as the bench would give them, each after the readings before it [N]."""
-        mean, sd = self._one_by_one(values, data)
+        mean, sd = self._predict_sequentially(values, data)
         return mean + sd * scatter(key, mean.shape, self.cable.description)
 
-    def mounted(self, values: Values, data: Data) -> Float[Array, " runs"]:
+    def mounted_exponents(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Friction exponent of each run with what its readings say of its mounting."""
-        linear = self._readings(values, data, values)
+        linear = self._linearize(values, data, values)
         mounting, variance = linear.mounting
         return self.exponents(values, data)[0] + mounting * linear.of_runs / (linear.of_runs + variance)
 
@@ -215,7 +217,7 @@ class DisplacementTerm:
         """What friction makes of each force [N], to first order."""
 
         def effect(at: Values, data: Data) -> Float[Array, " rows"]:
-            return self._readings(at, data, at).slope * self.exponents(at, data)[0][data["run"]]
+            return self._linearize(at, data, at).slope * self.exponents(at, data)[0][data["run"]]
 
         return np.asarray(
             jax.jit(effect)(dict(values), self.data)
@@ -228,7 +230,7 @@ class DisplacementTerm:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class _Readings:
+class _Linearization:
     """Of readings: mean without mountings, deviation, change of the mean with the exponent, variance; variance of runs."""
 
     mean: Array
@@ -246,7 +248,7 @@ class _Readings:
         return none.at[self.run].add(self.slope * self.deviation / self.variance) / information, 1 / information
 
 
-def _rope(values: Values) -> RopeStretch:
+def _make_rope(values: Values) -> RopeStretch:
     """As a table of stretch has it, or linear."""
     if ROPE_GIVE in values:
         return RopeStretch(values[END_SPRING] / jnp.maximum(values[ROPE_GIVE], _LEAST_GIVE))
@@ -255,27 +257,27 @@ def _rope(values: Values) -> RopeStretch:
     return RopeStretch(values[STIFFNESS], (values[BEDDING_STRETCH], values[BEDDING_LOAD]))
 
 
-def _taken(turns: Turn, which: Array) -> Turn:
+def _select_turns(turns: Turn, which: Array) -> Turn:
     return Turn(turns.travel[which], turns.force[which], turns.mean[which])
 
 
-def _before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " rows"]:
+def _sum_before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " rows"]:
     """Sum over the readings of the same run before each; `start` is the first of its run."""
     total = jnp.cumsum(terms) - terms
     return total - total[start]
 
 
-def displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
+def make_displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
     """The term of a table of force against displacement."""
-    rows = order_of(table)
+    rows = rows_by_run(table)
     settings = cable.description.table(DisplacementSettings)
     stop = settings is not None and settings.end == "stop"
-    data = {"turns": turns_by_depth(table.motion.turns), "angles": angles_of_runs(cable, table, angles)}
-    data |= {"force": table.force[rows], **readings(table, rows)}
-    return DisplacementTerm(cable, data, tuple(table.origin.place(int(i)) for i in rows), zero_names(table), stop)
+    data = {"turns": split_turns_by_depth(table.motion.turns), "angles": angles_of_runs(cable, table, angles)}
+    data |= {"force": table.force[rows], **reading_arrays(table, rows)}
+    return DisplacementTerm(cable, data, tuple(table.origin.describe_row(int(i)) for i in rows), zero_names(table), stop)
 
 
-def _level(table: DisplacementTable) -> Scale:
+def _force_per_displacement(table: DisplacementTable) -> Scale:
     """Range of forces over that of displacements."""
     force, x = table.force[table.used], table.displacement[table.used]
     ranges = [float(np.ptp(values)) if len(values) else 0.0 for values in (force, x)]
@@ -283,7 +285,7 @@ def _level(table: DisplacementTable) -> Scale:
     return Scale(together, "range of forces over that of displacements", "N/mm")
 
 
-def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+def _zero_parameters(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     """Where each run has no force."""
     share, parameters = at.defaults.displacement_zero_ranges, []
     for run, name in enumerate(zero_names(table)):
@@ -296,9 +298,9 @@ def _zeros(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     return parameters
 
 
-def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
+def _stiffness_parameters(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     """Spring and rope; of a rope that nothing is said of how it gives beside the spring, which may be next to nothing."""
-    by, settings = _level(table), at.description.table(DisplacementSettings)
+    by, settings = _force_per_displacement(table), at.description.table(DisplacementSettings)
     prior, rests = LogNormal(by.value, at.defaults.end_stiffness_log_sd), str(by)
     spring = Parameter(
         END_SPRING, r"$K$", "stiffness of the spring at the far end", "elastic", prior, "N/mm", scaled_by=rests
@@ -319,7 +321,7 @@ def _stiffness(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
     return [spring, linear if ROPE_STIFFNESS in at.description.prior else give]
 
 
-def _offset(table: DisplacementTable, at: Circumstances) -> Parameter:
+def _offset_parameter(table: DisplacementTable, at: Circumstances) -> Parameter:
     """What the cell shows of no force: a force that is off by little looks like friction, and the loop tells it."""
     stated = [p for p in offsets(at) if p.name == INPUT_OFFSET]
     if stated:
@@ -335,11 +337,11 @@ class DisplacementTerms(TermKind[DisplacementTable]):
     """Force against displacement in the likelihood."""
 
     name = "displacement"
-    tells_mountings = True
+    shows_mounting_scatter = True
 
     @override
     def terms(self, cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> tuple[DisplacementTerm]:
-        return (displacement_term(cable, table, angles),)
+        return (make_displacement_term(cable, table, angles),)
 
     @override
     def parameters(self, table: DisplacementTable, at: Circumstances) -> list[Parameter]:
@@ -351,31 +353,31 @@ class DisplacementTerms(TermKind[DisplacementTable]):
             HalfCauchy(part * range_x.value), "mm", scaled_by=range_x.describe_share(part),
         )  # fmt: skip
         return [
-            *_stiffness(table, at),
-            *_zeros(table, at),
+            *_stiffness_parameters(table, at),
+            *_zero_parameters(table, at),
             run_scatter(at),
             force_noise(at, at.noise.meaning("standard deviation of a force reading")),
             *([] if table.sliding else [jitter]),
-            _offset(table, at),
+            _offset_parameter(table, at),
         ]
 
     @override
     def draw(self, table: DisplacementTable, truth: Truth) -> dict[str, Array]:
         """Draw forces of every row with noise in cell and displacement; those of a run share its mounting and angles."""
         of_run, of_force, of_x = jax.random.split(jax.random.fold_in(truth.key, 7), 3)
-        term, values, scale = displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
-        data = jax.tree.map(jnp.asarray, term.data | readings(table, np.arange(len(table.run))))
+        term, values, scale = make_displacement_term(truth.cable, table, truth.angles), truth.values, truth.scale
+        data = jax.tree.map(jnp.asarray, term.data | reading_arrays(table, np.arange(len(table.run))))
         exponent, angle_variance = term.exponents(values, data)
         mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
         shape = table.force.shape
         beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
-        force = term.shown(values, data, exponent + scale * mounting, beside)
+        force = term.load_cell_force(values, data, exponent + scale * mounting, beside)
         return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
 
     @override
-    def places(self, table: DisplacementTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: DisplacementTable, term: Term) -> Mapping[str, np.ndarray]:
         """Return displacement, how far the motor has moved since its turn, and wrap angle of each reading."""
-        rows = order_of(table)
+        rows = rows_by_run(table)
         angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
         turns, after = table.motion.turns.at, table.motion.after[rows]
         moved = np.where(
@@ -385,4 +387,4 @@ class DisplacementTerms(TermKind[DisplacementTable]):
 
     @override
     def on_way_back(self, table: DisplacementTable) -> np.ndarray:
-        return table.motion.stroke[order_of(table)] < 0
+        return table.motion.stroke[rows_by_run(table)] < 0

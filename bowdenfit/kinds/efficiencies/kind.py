@@ -10,13 +10,21 @@ from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiencies
-from bowdenfit.kinds.plausibility import GAIN_ERROR, Coarse, beyond, coarse, copies, places_along, without_runs
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
+from bowdenfit.kinds.plausibility import (
+    GAIN_ERROR,
+    CoarseReadings,
+    compare_without_runs,
+    describe_copies,
+    explain_impossible_loss,
+    find_coarse_readings,
+    route_or_wrap_angle,
+)
 from bowdenfit.kinds.rows import (
+    FileRows,
     OwnAngles,
-    Page,
     RowOrigin,
-    provenance_of,
+    origin_of_rows,
     read_own_angles,
     read_route,
     route_cells,
@@ -61,7 +69,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
 
     name = "efficiencies"
     table = EfficiencyTable
-    readings = (efficiencies("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),)
+    readings = (efficiency_readings("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),)
     methods_sentence = (
         "The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings."
     )
@@ -87,15 +95,15 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         sd, spread = [0.0] * len(table.rows), columns.get("efficiency_sd")
         if spread is not None:
             beside = {cell.row: cell for cell in column.cells}
-            sd = spread.read_cells(lambda c: 0.0 if c.blank else _efficiency_sd(c, spread, beside[c.row], column), 0.0)
+            sd = spread.read_cells(lambda c: 0.0 if c.blank else _read_efficiency_sd(c, spread, beside[c.row], column), 0.0)
         errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
-        efficiency = column.read_cells(lambda cell: _efficiency(cell, column, errors[cell.row]), np.nan)
+        efficiency = column.read_cells(lambda cell: _read_efficiency(cell, column, errors[cell.row]), np.nan)
         rows = EfficiencyTable(
             read_route(table, columns, route),
             np.array(efficiency),
             np.array(sd),
             read_own_angles(table, columns, contacts),
-            provenance_of(table),
+            origin_of_rows(table),
         )
         return TableFromFiles(rows, {path.name: path}, _remark_fractions(column, rows), (table.account,))
 
@@ -116,22 +124,22 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
     @override
     def copied_readings(self, table: EfficiencyTable) -> list[str]:
         settings = np.column_stack([table.route, table.own.angle])
-        return copies(without_runs(table.origin, settings, table.efficiency, places_along(table)))
+        return describe_copies(compare_without_runs(table.origin, settings, table.efficiency, route_or_wrap_angle(table)))
 
     @override
-    def coarse_readings(self, table: EfficiencyTable) -> Coarse | None:
+    def coarse_readings(self, table: EfficiencyTable) -> CoarseReadings | None:
         """Look at tables where no scatter is stated."""
         if np.any(table.sd > 0):
             return None
         settings = np.column_stack([table.route, table.own.angle])
-        return coarse(listed(table.origin.files), settings, table.efficiency)
+        return find_coarse_readings(listed(table.origin.files), settings, table.efficiency)
 
     @override
     def why_implausible(self, measured: EfficiencyTable, simulated: EfficiencyTable) -> str:
-        return beyond(-np.log(simulated.efficiency), "an efficiency")
+        return explain_impossible_loss(-np.log(simulated.efficiency), "an efficiency")
 
     @override
-    def file_rows(self, table: EfficiencyTable, description: Description) -> Page:
+    def file_rows(self, table: EfficiencyTable, description: Description) -> FileRows:
         values = zip(table.route, table.efficiency, strict=True)
         rows = [[*route_cells(length, description), f"{eta:.5f}"] for length, eta in values]
         return [*route_heading(description), "efficiency"], rows
@@ -146,36 +154,36 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
 def _remark_fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]:
     """Return a remark on efficiencies in percent that look like fractions; a fit's verdict says it later and without names."""
     small = np.flatnonzero(table.efficiency <= _FRACTION)
-    if not len(small) or not any(_in_percent(cell, column) for cell in column.cells):
+    if not len(small) or not any(_is_in_percent(cell, column) for cell in column.cells):
         return ()
     first = int(small[0])
     few = counted(len(small), "efficiency is", "efficiencies are")
     which = "every efficiency is" if len(small) == len(table.efficiency) else few
     return (
-        f"{table.origin.place(first)}: {which} at most 1 %; the usual cause is a fraction under a heading that says "
+        f"{table.origin.describe_row(first)}: {which} at most 1 %; the usual cause is a fraction under a heading that says "
         "percent: call the column efficiency, or write percentages.",
     )
 
 
-def _ratio(cell: Cell, column: Column) -> float:
+def _read_ratio(cell: Cell, column: Column) -> float:
     """Return a number, or a percentage where the heading or the cell says so [1]."""
     percentage = cell.percentage()
     return column.value(cell) if percentage is None else percentage
 
 
-def _in_percent(cell: Cell, column: Column) -> bool:
+def _is_in_percent(cell: Cell, column: Column) -> bool:
     return column.factor != 1 or cell.percentage() is not None
 
 
-def _efficiency(cell: Cell, column: Column, sd: float) -> float:
+def _read_efficiency(cell: Cell, column: Column, sd: float) -> float:
     """Return an efficiency; noise may show one above 1, as it may show more force out than in."""
-    value = _ratio(cell, column)
+    value = _read_ratio(cell, column)
     if value <= 0:
         raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")
     if value > 1 + GAIN_ERROR + _SDS * sd:
         usual = (
             "the usual cause is that input and output force were swapped"
-            if _in_percent(cell, column)
+            if _is_in_percent(cell, column)
             else "if it is in percent, name the column efficiency_percent"
         )
         noise = "" if sd else ", or state its standard deviation in efficiency_sd if noise did that"
@@ -183,14 +191,14 @@ def _efficiency(cell: Cell, column: Column, sd: float) -> float:
     return value
 
 
-def _efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
+def _read_efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:
     """Return the standard deviation of an efficiency [1]."""
-    value = _ratio(cell, column)
+    value = _read_ratio(cell, column)
     if not 0 < value <= 1:
         raise cell.refuse(
             f"a standard deviation of {cell.shown} is not possible for an efficiency; write one up to 1 (100 %)."
         )
-    if _in_percent(efficiency, efficiency_column) and not _in_percent(cell, column):
+    if _is_in_percent(efficiency, efficiency_column) and not _is_in_percent(cell, column):
         raise cell.refuse(
             f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
             "efficiency_sd_percent, or write 1 % for 0.01."

@@ -16,9 +16,9 @@ from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, one_reading_each
+from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, simulate_rows
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.shared_parameters import run_scatter
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, TermKind, Truth
@@ -97,13 +97,13 @@ class EfficienciesTerm:
         return np.exp(-self.data["loss"])
 
 
-def efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
+def make_efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
     """The term of an efficiency table."""
-    rows = row_angles(cable.description, table, angles)
+    rows = collect_row_angles(cable.description, table, angles)
     data = rows.data | {"loss": -np.log(table.efficiency), "log_sd": table.sd / table.efficiency}
     route = cable.description.route
     labels = tuple(
-        f"{length:g} {route.unit}" if route else table.origin.place(i) for i, length in enumerate(table.route)
+        f"{length:g} {route.unit}" if route else table.origin.describe_row(i) for i, length in enumerate(table.route)
     )
     return EfficienciesTerm(cable, data, labels)
 
@@ -127,7 +127,7 @@ class EfficiencyCandidates(CandidateKind):
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
         route, own, origin = at.rows(candidates)
         table = EfficiencyTable(route, np.full(len(candidates), 0.8), np.zeros(len(candidates)), own, origin)
-        return one_reading_each(efficiencies_term(at.cable, table, at.angles))
+        return simulate_rows(make_efficiencies_term(at.cable, table, at.angles))
 
 
 class EfficiencyTerms(TermKind[EfficiencyTable]):
@@ -135,11 +135,11 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
 
     name = "efficiencies"
     candidate = EfficiencyCandidates()
-    tells_mountings = True
+    shows_mounting_scatter = True
 
     @override
     def terms(self, cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> tuple[EfficienciesTerm]:
-        return (efficiencies_term(cable, table, angles),)
+        return (make_efficiencies_term(cable, table, angles),)
 
     @override
     def parameters(self, table: EfficiencyTable, at: Circumstances) -> list[Parameter]:
@@ -147,7 +147,7 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
 
     @override
     def draw(self, table: EfficiencyTable, truth: Truth) -> dict[str, Array]:
-        term = efficiencies_term(truth.cable, table, truth.angles)
+        term = make_efficiencies_term(truth.cable, table, truth.angles)
         return {"efficiency": truth.simulate(term, jax.random.split(truth.key, 3)[1])}
 
     @override
@@ -162,7 +162,7 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
     def check(self, table: EfficiencyTable, space: ParameterSpace) -> None:
         """Refuse mountings that are all alike where nothing else makes a row scatter."""
         if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
-            row = table.origin.place(int(np.argmin(table.sd > 0)))
+            row = table.origin.describe_row(int(np.argmin(table.sd > 0)))
             raise DescriptionError(
                 f"cable.toml: {RUN_SCATTER} is fixed at 0, but {row} has no standard deviation of its own, so that "
                 "nothing would make it scatter and no model could be right; state the sd of every efficiency, or leave "

@@ -69,7 +69,7 @@ class LogGains:
     cell: Labels
 
 
-def beyond_noise(excess: Vector, readings: LogGains, stated: float | None) -> tuple[Flags, Flags]:
+def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tuple[Flags, Flags]:
     """Which rows noise does not explain, and which rows of cells, or of the whole table, whose mean it does not explain.
 
     Args:
@@ -82,45 +82,45 @@ def beyond_noise(excess: Vector, readings: LogGains, stated: float | None) -> tu
     limit = FALSE_ALARM / (n + len(total) + 1)
     of_cell = np.bincount(cell, weight * excess) / np.sqrt(total)
     if stated is not None:
-        single = _chance(excess * np.sqrt(weight) / stated, np.full(n, np.inf)) < limit
-        return single, (_chance(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
+        single = _p_value(excess * np.sqrt(weight) / stated, np.full(n, np.inf)) < limit
+        return single, (_p_value(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
     if n - len(total) < _FEWEST:
-        return _without_repeats(excess, log_gain, limit)
+        return _flag_gains_without_repeats(excess, log_gain, limit)
     # Where pulling and returning are not told apart, gains and losses of a run are: each half scatters less.
     halves = np.unique(2 * cell + (log_gain > 0), return_inverse=True)[1].ravel()
     single, together = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for group, factor in ((cell, 1.0), (halves, _TRUNCATED)):
-        _, noise, freedom = _scatter(replace(readings, cell=group))
+        _, noise, freedom = _residual_scatter(replace(readings, cell=group))
         if np.min(freedom) >= _FEWEST - 1:
-            single |= _chance(excess * np.sqrt(weight) / noise / factor, freedom) < limit
-            together |= _chance(of_cell[cell] / noise / factor, freedom) < limit
+            single |= _p_value(excess * np.sqrt(weight) / noise / factor, freedom) < limit
+            together |= _p_value(of_cell[cell] / noise / factor, freedom) < limit
     return single, together
 
 
-def _without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Flags, Flags]:
+def _flag_gains_without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Flags, Flags]:
     """The same of readings that stand alone, with the usual noise beside what their differences show."""
     n, freedom = len(excess), _USUAL_FREEDOM + len(excess) - 1.0
     known = _USUAL_FREEDOM * _USUAL_NOISE**2
     squares = (log_gain - log_gain.mean()) ** 2
     others = np.sum(squares) - squares * (n / (n - 1.0) if n > 1 else 1.0)
     left = np.full(n, max(freedom - 1, _USUAL_FREEDOM))
-    single = _chance(excess / np.sqrt((known + np.maximum(others, 0.0)) / left), left) < limit
+    single = _p_value(excess / np.sqrt((known + np.maximum(others, 0.0)) / left), left) < limit
     of_table = excess.mean() * np.sqrt(n * freedom / (known + np.sum(squares)))
-    return single, np.full(n, _chance(np.array([of_table]), np.array([freedom]))[0] < limit)
+    return single, np.full(n, _p_value(np.array([of_table]), np.array([freedom]))[0] < limit)
 
 
-def standing_out(readings: LogGains) -> Flags:
+def flag_outliers(readings: LogGains) -> Flags:
     """Which readings lie off the others of their cell by a factor of two and far beyond their noise."""
     if len(readings.cell) - np.max(readings.cell) - 1 < _FEWEST:
         return np.zeros(len(readings.cell), dtype=bool)
-    off, noise, freedom = _scatter(readings)
+    off, noise, freedom = _residual_scatter(readings)
     limit = _RARER * FALSE_ALARM / len(readings.cell)
     return np.asarray(
-        (np.abs(off) > np.log(2)) & (_chance(np.abs(off) * np.sqrt(readings.weight) / noise, freedom) < limit)
+        (np.abs(off) > np.log(2)) & (_p_value(np.abs(off) * np.sqrt(readings.weight) / noise, freedom) < limit)
     )
 
 
-def _scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
+def _residual_scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
     """Of each row, its deviation from a straight line in one over the load; noise that all other rows show, its freedom.
 
     The line takes what zeros and hidden tension do at low loads out of the noise.
@@ -145,7 +145,7 @@ def _scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
     return residual, np.sqrt(others / left), left
 
 
-def _chance(t: Vector, freedom: Vector) -> Vector:
+def _p_value(t: Vector, freedom: Vector) -> Vector:
     """Probability of a larger Student's t; of a larger normal deviate where the freedom is infinite."""
     from scipy.special import ndtr, stdtr
 
@@ -163,9 +163,10 @@ def check_following(table: ForceTable) -> None:
         if _does_not_follow(table, rows, stroke):
             force_in, force_out = table.input_force[rows], table.output_force[rows]
             raise DatasetError(
-                f"{table.origin.place(rows[0])} and on: while {how}, output_force does not follow input_force, which goes from "
-                f"{force_in.min():.4g} to {force_in.max():.4g} N while the output is {force_out.mean():.4g} N give or take "
-                f"{force_out.std():.2g} N, and of that the input explains little; a rope passes on more where more goes in. "
+                f"{table.origin.describe_row(rows[0])} and on: while {how}, output_force does not follow input_force, "
+                f"which goes from {force_in.min():.4g} to {force_in.max():.4g} N while the output is "
+                f"{force_out.mean():.4g} N give or take {force_out.std():.2g} N, "
+                "and of that the input explains little; a rope passes on more where more goes in. "
                 "The usual causes are a dead load cell, a column that is no force (a position, a time), and rows of one column "
                 "that belong beside others of the other; map the right columns in cable.toml, or leave these rows out."
             )
@@ -189,7 +190,7 @@ def _does_not_follow(table: ForceTable, rows: np.ndarray, stroke: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Gained:
+class ForceGains:
     """Rows in which a rope would have gained force.
 
     Args:
@@ -237,30 +238,30 @@ def check_gains(table: ForceTable, description: Description) -> None:
     """
     if not np.any(table.stroke):
         return
-    found, heavy = gains(table, description), description.noise == "student"
-    if found is not None and (found.beyond_noise.any() or found.together.any()) and (found.wide or not heavy):
-        _refuse(table, found)
+    gains, heavy = find_gains(table, description), description.noise == "student"
+    if gains is not None and (gains.beyond_noise.any() or gains.together.any()) and (gains.wide or not heavy):
+        _refuse_gains(table, gains)
     rows, readings = _log_gains(table, description)
-    if not heavy and (out := standing_out(readings)).any():
+    if not heavy and (out := flag_outliers(readings)).any():
         row = int(rows[np.argmax(out)])
         raise DatasetError(
-            f"{table.origin.place(row)}: output_force {table.output_force[row]:.4g} N at input_force "
+            f"{table.origin.describe_row(row)}: output_force {table.output_force[row]:.4g} N at input_force "
             f"{table.input_force[row]:.4g} N is off the other readings of its run and stroke by a factor of more than two, "
             f"which noise hardly does: the usual cause is {_TYPED}."
         )
 
 
-def gains(table: ForceTable, description: Description) -> Gained | None:
+def find_gains(table: ForceTable, description: Description) -> ForceGains | None:
     """Gains of force beyond what load cells explain; None where there are none."""
     rows, readings = _log_gains(table, description)
-    excess = readings.log_gain - _allowed(table.input_force[rows], table.output_force[rows], description)
+    excess = readings.log_gain - _allowed_gain(table.input_force[rows], table.output_force[rows], description)
     if not np.any(excess > 0):
         return None
-    single, together = beyond_noise(excess, readings, description.sensors.largest_force_noise)
+    single, together = flag_gains(excess, readings, description.sensors.largest_force_noise)
     force_in, force_out = table.input_force[rows], table.output_force[rows]
     large = np.abs(force_out - force_in) > _LARGE_GAIN * max(force_in.max(), force_out.max())
     single |= (excess > np.log(_ANY_GAIN)) & large
-    return Gained(rows, table.stroke[rows], readings.log_gain, excess, single & (excess > 0), together & (excess > 0))
+    return ForceGains(rows, table.stroke[rows], readings.log_gain, excess, single & (excess > 0), together & (excess > 0))
 
 
 def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, LogGains]:
@@ -272,7 +273,7 @@ def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, Log
     return rows, LogGains(-stroke * np.log(force_in / force_out), force_in + force_out, weight, cell)
 
 
-def _allowed(force_in: Vector, force_out: Vector, description: Description) -> Vector:
+def _allowed_gain(force_in: Vector, force_out: Vector, description: Description) -> Vector:
     """What errors of gain and zero of the load cells may add to the log ratio."""
     sensors, zero = description.sensors, _ZERO_ERROR * max(force_in.max(), force_out.max())
     of_gain = GAIN_ERROR if sensors.gain_sd is None else _SDS * sensors.gain_sd
@@ -281,28 +282,29 @@ def _allowed(force_in: Vector, force_out: Vector, description: Description) -> V
     return of_gain + zero * np.sqrt(1 / force_in**2 + 1 / force_out**2)
 
 
-def _refuse(table: ForceTable, found: Gained) -> NoReturn:
-    is_single = found.beyond_noise.any() and not found.wide
-    wrong = found.beyond_noise if is_single else found.beyond_noise | found.together
-    i = int(np.argmax(np.where(wrong, found.excess, -np.inf)))
-    row, (how, what) = int(found.rows[i]), _STROKES[int(found.stroke[i])]
+def _refuse_gains(table: ForceTable, gains: ForceGains) -> NoReturn:
+    is_single = gains.beyond_noise.any() and not gains.wide
+    wrong = gains.beyond_noise if is_single else gains.beyond_noise | gains.together
+    i = int(np.argmax(np.where(wrong, gains.excess, -np.inf)))
+    row, (how, what) = int(gains.rows[i]), _STROKES[int(gains.stroke[i])]
     force_in, force_out = table.input_force[row], table.output_force[row]
-    many = f"{int(np.sum(found.excess > 0))} of {len(found.rows)}"
+    many = f"{int(np.sum(gains.excess > 0))} of {len(gains.rows)}"
+    cause = _describe_cause_of_table(gains) if gains.wide else _describe_cause_of_row(table, gains, row)
     raise DatasetError(
-        f"{table.origin.place(row)}: output_force {force_out:.4g} N at input_force {force_in:.4g} N, "
+        f"{table.origin.describe_row(row)}: output_force {force_out:.4g} N at input_force {force_in:.4g} N, "
         f"{percent(force_out / force_in, 0)} while {how}; friction never lets {what} out than in, and noise hardly shows it. "
-        f"So it is in {many} rows: the usual cause is {_cause(found) if found.wide else _exception(table, found, row)}."
+        f"So it is in {many} rows: the usual cause is {cause}."
     )
 
 
-def _cause(found: Gained) -> str:
+def _describe_cause_of_table(gains: ForceGains) -> str:
     """The usual cause of a mistake of a whole table, by which strokes show it, and its remedy."""
-    strokes = [stroke for stroke in (1, -1) if np.any(found.stroke == stroke)]
-    wrong = [stroke for stroke in strokes if found.share(stroke) > _MOSTLY]
-    units = _units(found, wrong[0]) if wrong else ""
+    strokes = [stroke for stroke in (1, -1) if np.any(gains.stroke == stroke)]
+    wrong = [stroke for stroke in strokes if gains.share(stroke) > _MOSTLY]
+    units = _find_mistaken_units(gains, wrong[0]) if wrong else ""
     if units and (len(strokes) == 1 or wrong != strokes):
         return f"the unit in one heading, {units} mistaken; correct the heading"
-    if found.mixed:
+    if gains.mixed:
         return "rows in which the rope slides back and that are not marked so; add a column stroke with pull and return"
     if wrong == strokes:
         also = " or pull and return" if len(strokes) > 1 else ""
@@ -317,20 +319,20 @@ def _cause(found: Gained) -> str:
     )
 
 
-def _units(found: Gained, stroke: int) -> str:
+def _find_mistaken_units(gains: ForceGains, stroke: int) -> str:
     """The units by which a table's efficiencies would be possible, in words; empty if by none."""
-    ratio = float(np.exp(np.median(found.log_gain[found.stroke == stroke])))
+    ratio = float(np.exp(np.median(gains.log_gain[gains.stroke == stroke])))
     if ratio < _NO_SWAP:
         return ""
     return " or ".join(units for units, factor in _FACTORS.items() if _LEAST < ratio / factor < _MOST)
 
 
-def _exception(table: ForceTable, found: Gained, row: int) -> str:
+def _describe_cause_of_row(table: ForceTable, gains: ForceGains, row: int) -> str:
     """The usual cause where most of the table is as it should be, and its remedy."""
-    same = (table.run[found.rows] == table.run[row]) & (found.stroke == table.stroke[row])
-    if np.sum(same) > 1 and np.mean(found.excess[same] > 0) > _MOSTLY:
+    same = (table.run[gains.rows] == table.run[row]) & (gains.stroke == table.stroke[row])
+    if np.sum(same) > 1 and np.mean(gains.excess[same] > 0) > _MOSTLY:
         name = shown(table.run_names[table.run[row]])
-        if np.max(found.log_gain[same]) < _SLIGHT:
+        if np.max(gains.log_gain[same]) < _SLIGHT:
             return (
                 f"load cells that differ in gain, which shows first where the cable bends least, as in the run {name}, or one "
                 "that was not zeroed; state input_gain_error_sd and output_gain_error_sd under [sensors], or correct the run"

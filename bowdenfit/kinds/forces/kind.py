@@ -12,29 +12,29 @@ from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
-from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiencies
+from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiency_readings
 from bowdenfit.kinds.plausibility import (
     SCATTER,
-    Coarse,
-    Compared,
-    beyond,
-    coarse,
-    copies,
-    parts,
-    places_along,
-    without_runs,
+    CoarseReadings,
+    ComparedReadings,
+    compare_without_runs,
+    describe_copies,
+    explain_impossible_loss,
+    find_coarse_readings,
+    route_or_wrap_angle,
+    split_by_group,
 )
 from bowdenfit.kinds.rows import (
     STROKE_NAMES,
+    FileRows,
     OwnAngles,
-    Page,
     RowOrigin,
     Stroke,
-    fixed,
-    radians,
+    convert_to_radians,
+    format_fixed,
     route_cells,
     route_heading,
-    signs,
+    stroke_signs,
 )
 from bowdenfit.kinds.table_files import RUN, STROKE, InitQuestions, Source, TableFromFiles, WantedColumn, YesNoQuestion
 from bowdenfit.kinds.tables import Measurements
@@ -78,7 +78,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     table = ForceTable
     settings = ForceSettings
     readings = (
-        efficiencies("run_efficiency", "forces", "force runs", "run {}", are_runs=True),
+        efficiency_readings("run_efficiency", "forces", "force runs", "run {}", are_runs=True),
         Readings("held_ratio", "held forces", "held forces", "{}", "Input over output force"),
     )
     methods_sentence = "All readings of one mounting of the cable shared its error, which was integrated out."
@@ -175,16 +175,18 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         different = np.unique(np.column_stack([curve, forces]), axis=0)
         if len(different) == len(np.unique(curve)) and np.all(forces > 0):
             settings, loss = np.column_stack([stroke, forces]), np.log(table.input_force / table.output_force)
-            return copies(without_runs(table.origin, settings, loss, places_along(table), table.stroke))
+            return describe_copies(compare_without_runs(table.origin, settings, loss, route_or_wrap_angle(table), table.stroke))
         names = tuple(f"run {name}" for name in table.run_names)
-        return copies(Compared(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve))
+        return describe_copies(
+            ComparedReadings(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve)
+        )
 
     @override
-    def coarse_readings(self, table: ForceTable) -> Coarse | None:
+    def coarse_readings(self, table: ForceTable) -> CoarseReadings | None:
         """Look at the output force; the input force may be set."""
         stroke = table.stroke.astype(float)
         settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
-        return coarse(listed(table.origin.files), settings, table.output_force, "N")
+        return find_coarse_readings(listed(table.origin.files), settings, table.output_force, "N")
 
     @override
     def why_implausible(self, measured: ForceTable, simulated: ForceTable) -> str:
@@ -195,17 +197,17 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         if not slides.any():
             return ""
         ratio = (simulated.stroke * np.log(simulated.input_force / simulated.output_force))[slides]
-        strokes = parts(2 * simulated.run[slides] + (simulated.stroke[slides] > 0), ratio)
+        strokes = split_by_group(2 * simulated.run[slides] + (simulated.stroke[slides] > 0), ratio)
         if any(np.std(part) > SCATTER for part in strokes):
             return "forces scatter by more than a tenth"
-        of_runs = np.array([part.mean() for part in parts(simulated.run[slides], ratio)])
-        return beyond(of_runs, "the efficiency of a run")
+        of_runs = np.array([part.mean() for part in split_by_group(simulated.run[slides], ratio)])
+        return explain_impossible_loss(of_runs, "the efficiency of a run")
 
     @override
-    def file_rows(self, table: ForceTable, description: Description) -> Page:
+    def file_rows(self, table: ForceTable, description: Description) -> FileRows:
         measured = np.isfinite(table.own.angle).any(axis=0)
         angles = np.rad2deg(table.own.angle[:, measured])
-        inputs, outputs = fixed(table.input_force, 3), fixed(table.output_force, 3)
+        inputs, outputs = format_fixed(table.input_force, 3), format_fixed(table.output_force, 3)
         rows = [
             [
                 *route_cells(table.route[i], description),
@@ -233,11 +235,11 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     def empty_table(self, design: ForceDesign, description: Description, file: str) -> ForceTable:
         n_runs, n_forces, names = len(design.runs), len(design.input_forces), description.angle_columns
         run = np.repeat(np.arange(n_runs), len(design.strokes) * n_forces)
-        stroke = np.tile(np.repeat(signs(design.strokes), n_forces), n_runs)
+        stroke = np.tile(np.repeat(stroke_signs(design.strokes), n_forces), n_runs)
         force = np.tile(design.input_forces, n_runs * len(design.strokes))
         own = OwnAngles.none(names, len(run))
         for name in set(design.own_angles).intersection(names):
-            own.angle[:, names.index(name)] = radians(design.own_angles[name])[run]
+            own.angle[:, names.index(name)] = convert_to_radians(design.own_angles[name])[run]
         route = np.asarray(design.runs, dtype=float)[run]
         labels = tuple(str(i + 1) for i in range(n_runs))
         origin, velocity = RowOrigin.below_heading(file, len(run)), np.full(len(run), np.nan)

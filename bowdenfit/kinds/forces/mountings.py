@@ -38,7 +38,7 @@ class ForceSettings(Table):
     groups: Literal["called by words", "called by numbers"] = "called by words"
 
 
-def mountings(
+def find_mountings(
     labels: Sequence[str], group: Sequence[str], route: Vector, own: OwnAngles, limits: Route | None
 ) -> tuple[Labels, list[str]]:
     """The mounting of each row, and the name of each: a label at one length and one bend, in one group.
@@ -57,7 +57,7 @@ def mountings(
     for label in dict.fromkeys(labels):
         rows = named == label
         for k, (values, step) in enumerate(zip((route, *own.angle.T), steps, strict=True)):
-            cluster[rows, k] = _apart(values[rows], float(np.max(step[rows])))
+            cluster[rows, k] = _cluster_values(values[rows], float(np.max(step[rows])))
     groups = group or [""] * len(labels)
     keys = [(label, which, *where) for label, which, where in zip(labels, groups, cluster.tolist(), strict=True)]
     distinct = {key: i for i, key in enumerate(dict.fromkeys(keys))}
@@ -67,12 +67,14 @@ def mountings(
     names = []
     for i, (label, which, *_) in enumerate(distinct):
         details = [which] if in_groups[label] > 1 else []
-        details += [_where(run == i, route, own, limits)] if mountings_of[label, which] > 1 else []
+        details += [_describe_mounting(run == i, route, own, limits)] if mountings_of[label, which] > 1 else []
         names.append(f"{label} ({', '.join(details)})" if details else label)
     return run, names
 
 
-def numbered_anew(labels: Sequence[str], group: Sequence[str], n_mountings: int, file: str, route: Route | None) -> str:
+def remark_on_reused_labels(
+    labels: Sequence[str], group: Sequence[str], n_mountings: int, file: str, route: Route | None
+) -> str:
     """What is said of labels that come back elsewhere or in another group; empty where none does."""
     distinct = list(dict.fromkeys(labels))
     if n_mountings == len(distinct):
@@ -89,7 +91,7 @@ def numbered_anew(labels: Sequence[str], group: Sequence[str], n_mountings: int,
     )
 
 
-def each_row_apart(n_rows: int, file: str) -> str:
+def remark_on_one_row_runs(n_rows: int, file: str) -> str:
     """What it means that every row is a run of its own."""
     return (
         f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows tell a "
@@ -99,7 +101,7 @@ def each_row_apart(n_rows: int, file: str) -> str:
     )
 
 
-def _apart(values: Vector, step: float) -> Labels:
+def _cluster_values(values: Vector, step: float) -> Labels:
     """Groups of values that leave a gap between them."""
     known = np.nan_to_num(values, nan=-1e300)
     order = np.argsort(known, kind="stable")
@@ -108,7 +110,7 @@ def _apart(values: Vector, step: float) -> Labels:
     return group
 
 
-def _where(rows: np.ndarray, route: Vector, own: OwnAngles, limits: Route | None) -> str:
+def _describe_mounting(rows: np.ndarray, route: Vector, own: OwnAngles, limits: Route | None) -> str:
     """Length of a mounting, and its bends where there is none."""
     if limits is not None:
         return f"{np.mean(route[rows]):g} {limits.unit}"
@@ -141,7 +143,7 @@ def read_groups(
         return (), []
     names = tuple(" ".join(cell.text.split()) for cell in column.cells)
     distinct = list(dict.fromkeys(names))
-    wrong = _why_no_groups(column, distinct, may_be_numbers)
+    wrong = _explain_no_groups(column, distinct, may_be_numbers)
     if wrong and by_group:
         raise DatasetError(f"{file}: {wrong}")
     if wrong:
@@ -174,7 +176,7 @@ def group_numbers(groups: Sequence[str], names: Sequence[str], n_rows: int) -> L
     return np.array([groups.index(name) for name in names], dtype=int)
 
 
-def _why_no_groups(column: Column, distinct: Sequence[str], may_be_numbers: bool) -> str:
+def _explain_no_groups(column: Column, distinct: Sequence[str], may_be_numbers: bool) -> str:
     """Why a column does not name groups; empty where it does."""
     named = [cell for cell in column.cells if cell.text.strip()]
     heading, values = shown(column.heading), few([shown(name) for name in distinct if name], _NAMED)
@@ -201,6 +203,6 @@ def _is_number(cell: Cell) -> bool:
     return True
 
 
-def groups_in_words(groups: Sequence[str]) -> str:
+def describe_groups(groups: Sequence[str]) -> str:
     """'the groups new and old'"""
     return f"the groups {listed(list(groups))}"

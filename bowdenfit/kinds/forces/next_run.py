@@ -20,12 +20,12 @@ from bowdenfit.kinds.candidate import (
     CandidateKind,
     Simulation,
     Situation,
-    some_loads,
+    choose_loads,
 )
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.recordings.blocks import positive, worth_of
-from bowdenfit.kinds.recordings.reader import recorded_angles
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.recordings.blocks import effective_counts, is_under_tension
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.recording import Recordings
@@ -45,14 +45,14 @@ class RunDesign:
         input_force: Input forces [N].
         stroke: +1 pulling, -1 return.
         velocity: Velocity as in the tables; NaN where it is not known.
-        worth: How many independent readings each stands for [1].
+        n_effective: How many independent readings each stands for [1].
         noise: Parameter that is the standard deviation of one reading.
     """
 
     input_force: Vector
     stroke: Vector
     velocity: Vector
-    worth: Vector
+    n_effective: Vector
     noise: str = FORCE_NOISE
 
 
@@ -60,45 +60,45 @@ def typical_run(measurements: Measurements) -> RunDesign | None:
     """The design of the runs made so far: that of the run of median length; None where none slides."""
     forces, recordings = measurements.table(ForceTable), measurements.table(Recordings)
     if forces is not None and np.any(forces.stroke != 0):
-        return _of_table(forces)
+        return _run_of_table(forces)
     if recordings is not None and not recordings.loop:
-        return _of_recordings(recordings)
+        return _run_of_recordings(recordings)
     return None
 
 
-def _of_table(table: ForceTable) -> RunDesign:
+def _run_of_table(table: ForceTable) -> RunDesign:
     sliding = table.stroke != 0
     runs, counts = np.unique(table.run[sliding], return_counts=True)
     rows = sliding & (table.run == runs[np.argsort(counts, kind="stable")[len(runs) // 2]])
-    worth = np.ones(int(rows.sum()))
-    return _joined(table.input_force[rows], table.stroke[rows], table.velocity[rows], worth, FORCE_NOISE)
+    n_effective = np.ones(int(rows.sum()))
+    return _join_readings(table.input_force[rows], table.stroke[rows], table.velocity[rows], n_effective, FORCE_NOISE)
 
 
-def _of_recordings(recordings: Recordings) -> RunDesign | None:
-    used = [r.strokes.used_sliding & positive(r) for r in recordings.items]
+def _run_of_recordings(recordings: Recordings) -> RunDesign | None:
+    used = [r.strokes.used_sliding & is_under_tension(r) for r in recordings.items]
     order = [i for i in np.argsort([u.sum() for u in used], kind="stable") if used[i].any()]
     if not order:
         return None
     middle = order[len(order) // 2]
     recording, where = recordings.items[middle], used[middle]
     blocks, stroke = recording.blocks, recording.strokes.stroke
-    worth = worth_of(recording, np.flatnonzero(where))
-    return _joined(blocks.input_force[where], stroke[where], blocks.velocity[where], worth, BLOCK_NOISE)
+    n_effective = effective_counts(recording, np.flatnonzero(where))
+    return _join_readings(blocks.input_force[where], stroke[where], blocks.velocity[where], n_effective, BLOCK_NOISE)
 
 
-def _joined(force: Vector, stroke: Any, velocity: Vector, worth: Vector, noise: str) -> RunDesign:
+def _join_readings(force: Vector, stroke: Any, velocity: Vector, n_effective: Vector, noise: str) -> RunDesign:
     """Readings of like force joined, stroke by stroke."""
     groups = []
     for way in (1, -1):
         rows = np.flatnonzero(stroke == way)
         order = rows[np.argsort(force[rows], kind="stable")]
         groups += [part for part in np.array_split(order, _MOST) if len(part)]
-    means = [[np.average(v[g], weights=worth[g]) for g in groups] for v in (force, velocity)]
-    ways, total = [float(stroke[g[0]]) for g in groups], [worth[g].sum() for g in groups]
+    means = [[np.average(v[g], weights=n_effective[g]) for g in groups] for v in (force, velocity)]
+    ways, total = [float(stroke[g[0]]) for g in groups], [n_effective[g].sum() for g in groups]
     return RunDesign(np.array(means[0]), np.array(ways), np.array(means[1]), np.array(total), noise)
 
 
-def chosen_run(design: RunDesign, load: float, stroke: int) -> RunDesign:
+def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesign:
     """As many readings as a run has, all at one load and of one stroke.
 
     Args:
@@ -110,7 +110,7 @@ def chosen_run(design: RunDesign, load: float, stroke: int) -> RunDesign:
     return replace(design, input_force=force, stroke=np.full(len(force), float(stroke)) if stroke else design.stroke)
 
 
-def run_readings(
+def make_run_simulator(
     cable: Cable, design: RunDesign
 ) -> tuple[Callable[[Mapping[str, Array], Mapping[str, Any], Array], Array], int]:
     """Function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
@@ -133,7 +133,7 @@ def run_readings(
         mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
         output = cable.friction.output_force(values, force, shift, stroke)
-        cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.worth))
+        cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.n_effective))
         of_weight = noise * cable.description.sensors.noise_ratio
         read_in = cells.shown_input(force) + of_weight * jax.random.normal(of_input, output.shape)
         read_out = cells.shown_output(output) + noise * jax.random.normal(of_output, output.shape)
@@ -155,7 +155,7 @@ def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
     speed = np.log(np.maximum(np.abs(np.nan_to_num(design.velocity)), 1e-9))
     if cable.friction.depends_on_rate and np.ptp(speed) > np.log(_SPREAD):
         columns.append(speed)
-    weight = np.sqrt(design.worth) * design.input_force  # the noise of a log ratio falls with the force
+    weight = np.sqrt(design.n_effective) * design.input_force  # the noise of a log ratio falls with the force
     lines = np.column_stack(columns)
     lines[:, 1:] -= np.average(lines[:, 1:], axis=0, weights=weight**2)
     return np.asarray(np.linalg.pinv(lines * weight[:, None]) * weight).T
@@ -177,7 +177,7 @@ class ForceRunCandidates(CandidateKind):
         return typical_run(at.measurements) is not None
 
     @override
-    def measured(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: Cable) -> str:
         return f"a force run{f' of the group {cable.friction.groups[0]}' if cable.friction.groups else ''}"
 
     @override
@@ -186,7 +186,7 @@ class ForceRunCandidates(CandidateKind):
         forces, recordings = at.measurements.table(ForceTable), at.measurements.table(Recordings)
         if typical_run(at.measurements) is None:
             return []
-        own = forces.own if forces is not None else recorded_angles(recordings).own if recordings is not None else None
+        own = forces.own if forces is not None else angles_of_recordings(recordings).own if recordings is not None else None
         return at.along_cable(self.name, own)
 
     @override
@@ -195,7 +195,7 @@ class ForceRunCandidates(CandidateKind):
         run = typical_run(at.measurements)
         if run is None:
             return []
-        loads = some_loads(run.input_force, _LOADS)
+        loads = choose_loads(run.input_force, _LOADS)
         strokes = [0, *sorted({int(stroke) for stroke in run.stroke}, reverse=True)]
         return [(load, stroke) for load in loads for stroke in (strokes if len(strokes) > 2 else (0,))]
 
@@ -208,7 +208,7 @@ class ForceRunCandidates(CandidateKind):
         near = significant(float(np.mean(run.input_force)))
         loads = f"{significant(low)} to {significant(high)} N" if high > _SPREAD * low else f"{near} N"
         ways = " and ".join(STROKE_WORDS[way] for way in (1, -1) if np.any(run.stroke == way))
-        count = round(float(np.sum(run.worth)))
+        count = round(float(np.sum(run.n_effective)))
         return f"{count:,} {'reading' if count == 1 else 'readings'} at {loads}, {ways}"
 
     @override
@@ -224,8 +224,8 @@ class ForceRunCandidates(CandidateKind):
         for members in groups.values():
             alike = [candidates[i] for i in members]
             route, own, _ = at.rows(alike)
-            simulate, width = run_readings(at.cable, chosen_run(typical, alike[0].load, alike[0].stroke))
-            parts.append((simulate, row_angles(at.cable.description, RowConditions(route, own), at.angles).data))
+            simulate, width = make_run_simulator(at.cable, set_load_and_stroke(typical, alike[0].load, alike[0].stroke))
+            parts.append((simulate, collect_row_angles(at.cable.description, RowConditions(route, own), at.angles).data))
             for i in members:
                 columns[i] = tuple(range(start, start + width))
                 start += width

@@ -15,14 +15,21 @@ from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, 
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import read_table
-from bowdenfit.kinds.forces.mountings import GROUP, NO_GROUP, each_row_apart, mountings, numbered_anew, read_groups
+from bowdenfit.kinds.forces.mountings import (
+    GROUP,
+    NO_GROUP,
+    find_mountings,
+    read_groups,
+    remark_on_one_row_runs,
+    remark_on_reused_labels,
+)
 from bowdenfit.kinds.rows import (
     ENDS,
     OwnAngles,
     RowOrigin,
-    end_column,
-    forces_of,
-    provenance_of,
+    convert_to_forces,
+    find_end_column,
+    origin_of_rows,
     read_own_angles,
     read_route,
     read_strokes,
@@ -112,22 +119,22 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
             np.concatenate([t.origin.row for t in tables]),
         ),
         np.concatenate([t.velocity for t in tables]),
-        _one_velocity_unit(tables),
-        _groups(tables),
+        _common_velocity_unit(tables),
+        _concatenate_groups(tables),
     )
     remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
     accounts = tuple(account for *_, account in parts)
     return TableFromFiles(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
 
 
-def _groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
+def _concatenate_groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
     """Group of each row of all files; empty where none has groups."""
     if not any(t.group for t in tables):
         return ()
     return tuple(name for t in tables for name in (t.group or (NO_GROUP,) * len(t.run)))
 
 
-def _one_velocity_unit(tables: Sequence[ForceTable]) -> str:
+def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
     units = {t.velocity_unit: t.origin.files[0] for t in tables if t.velocity_unit}
     if len(units) > 1:
         raise DatasetError(
@@ -142,7 +149,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
     columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     pulleys, nothing = source.description.cable.pulleys, np.full(len(table.rows), np.nan)
-    read = partial(_tensions, table, columns, pulleys)
+    read = partial(_read_tensions, table, columns, pulleys)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
     own = read_own_angles(table, columns, contacts)
     route_values = read_route(table, columns, route)
@@ -153,10 +160,10 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     remarks += describe_paired_headings(table, columns, source.columns)
     if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
-    strokes, origin = read_strokes(columns, len(table.rows)), provenance_of(table)
-    velocity, unit = _velocities(columns.get("velocity"), len(table.rows))
+    strokes, origin = read_strokes(columns, len(table.rows)), origin_of_rows(table)
+    velocity, unit = _read_velocities(columns.get("velocity"), len(table.rows))
     table.faults.refuse()
-    run, run_names, run_remarks = _mounted(columns.get("run"), source, route_values, own, origin, group)
+    run, run_names, run_remarks = _assign_runs(columns.get("run"), source, route_values, own, origin, group)
     remarks += run_remarks
     if held := int(np.sum(strokes == 0)):
         remarks.append(
@@ -167,7 +174,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     return ForceTable(*parts), remarks, table.account
 
 
-def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
+def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     """Velocities, NaN where blank or without a column, and their internal unit."""
     if column is None:
         return np.full(n_rows, np.nan), ""
@@ -175,15 +182,15 @@ def _velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
     return values, INTERNAL_UNITS[speed_dimension(column.unit or "mm/s")]
 
 
-def _mounted(
+def _assign_runs(
     column: Column | None, source: Source, route: Vector, own: OwnAngles, origin: RowOrigin, group: tuple[str, ...]
 ) -> tuple[Labels, tuple[str, ...], list[str]]:
     """Run of each row, the name of each run, and what had to be assumed."""
     limits, how, file = source.description.route, source.settings.run, origin.files[0]
     if how == "each row":
-        return np.arange(len(route)), tuple(f"row {row}" for row in origin.row), [each_row_apart(len(route), file)]
+        return np.arange(len(route)), tuple(f"row {row}" for row in origin.row), [remark_on_one_row_runs(len(route), file)]
     if column is None:
-        keys = _places(route, own, limits.unit if limits else "")
+        keys = _describe_conditions(route, own, limits.unit if limits else "")
         keys = [f"{name}, {key}" for name, key in zip(group, keys, strict=True)] if group else keys
         names = tuple(dict.fromkeys(keys))
         return np.array([names.index(key) for key in keys]), names, [
@@ -195,25 +202,25 @@ def _mounted(
     if how != "at one length":
         names = tuple(dict.fromkeys(labels))
         return np.array([names.index(label) for label in labels]), names, []
-    run, distinct = mountings(labels, group, route, own, limits)
-    remark = numbered_anew(labels, group, len(distinct), file, limits)
+    run, distinct = find_mountings(labels, group, route, own, limits)
+    remark = remark_on_reused_labels(labels, group, len(distinct), file, limits)
     return run, tuple(distinct), [remark] if remark else []
 
 
-def _places(route: Vector, own: OwnAngles, unit: str) -> list[str]:
+def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     """Where each row was read, such as "440 mm" or "45 deg"."""
     rows, units = np.column_stack([route, np.rad2deg(own.angle)]), [unit, *["deg"] * len(own.names)]
     known = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
-def _tensions(table: RawTable, columns: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
+def _read_tensions(table: RawTable, columns: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
     """Tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
-    column = end_column(table, columns, end)
-    return forces_of(np.array(column.read_cells(partial(_force, column), np.nan)), table, columns, end, pulleys)
+    column = find_end_column(table, columns, end)
+    return convert_to_forces(np.array(column.read_cells(partial(_read_force, column), np.nan)), table, columns, end, pulleys)
 
 
-def _force(column: Column, cell: Cell) -> float:
+def _read_force(column: Column, cell: Cell) -> float:
     value = column.value(cell)
     if value <= 0:
         raise cell.refuse(

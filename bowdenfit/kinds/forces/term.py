@@ -18,8 +18,8 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.next_run import ForceRunCandidates
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
-from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
 from bowdenfit.kinds.tables import AngleTable
@@ -125,12 +125,12 @@ class HeldForcesTerm:
         return self.data["input_force"] / self.data["output_force"]
 
 
-def _group(cable: Cable, table: ForceTable) -> Labels:
+def _number_groups(cable: Cable, table: ForceTable) -> Labels:
     """Number of each row's group."""
     return group_numbers(cable.friction.groups, table.group, len(table.run))
 
 
-def sliding_rows(
+def make_sliding_rows(
     description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
 ) -> SlidingRows:
     """Some rows of a table with what its readings together say of their forces.
@@ -143,7 +143,7 @@ def sliding_rows(
     """
     stroke, force_in, force_out = table.stroke[used], table.input_force[used], table.output_force[used]
     keys = np.column_stack([table.run[used], stroke, *(rows[name][used] for name in ROW_ARRAYS)])
-    expected, weight = _expected(description, table, used, keys)
+    expected, weight = _expect_forces(description, table, used, keys)
     return SlidingRows(
         expected.input_force,
         expected.output_force,
@@ -158,7 +158,7 @@ def sliding_rows(
     )
 
 
-def _expected(
+def _expect_forces(
     description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray
 ) -> tuple[ExpectedForces, Vector]:
     """What the readings of a run together say of their forces, and how much each tells of its log ratio [N^2].
@@ -211,26 +211,26 @@ class ForceTerms(TermKind[ForceTable]):
 
     name = "forces"
     candidate = ForceRunCandidates()
-    tells_mountings = True
+    shows_mounting_scatter = True
 
     @override
     def terms(
         self, cable: Cable, table: ForceTable, angles: AngleTable | None
     ) -> tuple[RunsTerm | HeldForcesTerm, ...]:
         """Return a term of the sliding rows by run, and one of the held rows one by one."""
-        rows = row_angles(cable.description, table, angles).data | {"group": _group(cable, table)}
+        rows = collect_row_angles(cable.description, table, angles).data | {"group": _number_groups(cable, table)}
         terms: list[RunsTerm | HeldForcesTerm] = []
         sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
         if len(sliding):
-            readings = sliding_rows(cable.description, table, rows, sliding)
+            readings = make_sliding_rows(cable.description, table, rows, sliding)
             labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
-            terms.append(RunsTerm(cable, run_sums(cable, readings), labels, rows=readings))
+            terms.append(RunsTerm(cable, sum_runs(cable, readings), labels, rows=readings))
         if len(held):
             data = {name: rows[name][held] for name in ROW_ARRAYS} | {
                 "input_force": table.input_force[held],
                 "output_force": table.output_force[held],
             }
-            terms.append(HeldForcesTerm(cable, data, tuple(table.origin.place(int(i)) for i in held)))
+            terms.append(HeldForcesTerm(cable, data, tuple(table.origin.describe_row(int(i)) for i in held)))
         return tuple(terms)
 
     @override
@@ -248,7 +248,7 @@ class ForceTerms(TermKind[ForceTable]):
         of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
         bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
         mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
-        friction = cable.friction_exponent(values, bends, jnp.asarray(_group(cable, table)))
+        friction = cable.friction_exponent(values, bends, jnp.asarray(_number_groups(cable, table)))
         exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
         stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
         output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
@@ -262,10 +262,10 @@ class ForceTerms(TermKind[ForceTable]):
                 cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
                 table.output_force,
             ),
-            "slipped": self._slipped(table, truth, jax.random.fold_in(truth.key, 5)),
+            "slipped": self._draw_slips(table, truth, jax.random.fold_in(truth.key, 5)),
         }
 
-    def _slipped(self, table: ForceTable, truth: Truth, key: Array) -> Array:
+    def _draw_slips(self, table: ForceTable, truth: Truth, key: Array) -> Array:
         """Draw which held readings would have slipped: their likelihood is the probability that friction holds them."""
         held = [t for t in self.terms(truth.cable, table, truth.angles) if isinstance(t, HeldForcesTerm)]
         log_probability = [term.log_likelihood(truth.values, jax.tree.map(jnp.asarray, term.data)) for term in held]
@@ -277,7 +277,7 @@ class ForceTerms(TermKind[ForceTable]):
         return replace(table, input_force=readings["input_force"], output_force=readings["output_force"])
 
     @override
-    def places(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
         """Return the load of each run, where each was made at one and not all at the same; number of its group, from 1."""
         if not isinstance(term, RunsTerm) or term.rows is None:
             return {}

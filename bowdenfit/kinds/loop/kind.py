@@ -16,27 +16,27 @@ from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.matching import meanings
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
-from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, copies, without_runs
+from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
     ENDS,
     STROKE_NAMES,
+    FileRows,
     OwnAngles,
-    Page,
     RowOrigin,
     Stroke,
     check_spelling,
-    end_column,
-    fixed,
-    forces_of,
-    in_words,
-    provenance_of,
-    radians,
+    convert_to_forces,
+    convert_to_radians,
+    describe_range,
+    find_end_column,
+    format_fixed,
+    origin_of_rows,
     read_own_angles,
     read_route,
     read_strokes,
     read_tension,
     shared_columns,
-    signs,
+    stroke_signs,
 )
 from bowdenfit.kinds.table_files import STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import LoopTable, Measurements, PreloadTable, StretchTable
@@ -110,7 +110,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         check_spelling(table, columns, others)
         nothing = np.full(len(table.rows), np.nan)
         input_force, output_force = table.faults.read_all(
-            lambda end: _end_forces(table, columns, end, pulleys), ("input", "output"), nothing
+            lambda end: _read_end_forces(table, columns, end, pulleys), ("input", "output"), nothing
         )
         stroke = read_strokes(columns, len(table.rows), held="")
         preload = nothing
@@ -126,7 +126,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 "out."
             )
             raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
-        made = LoopTable(at, input_force, output_force, stroke, preload, own, provenance_of(table))
+        made = LoopTable(at, input_force, output_force, stroke, preload, own, origin_of_rows(table))
         _check_loss(table, made)
         remarks = []
         if "stroke" not in columns:
@@ -154,7 +154,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         own = f"; {measured} rows have their own measured preload" if measured else ""
         return [
             f"{table.origin.files[0]}: {self.count_readings(table)} ({forward} moving forward, "
-            f"{len(table.stroke) - forward} back), input {in_words(table.input_force, 'N')}; its preload {how}{own}"
+            f"{len(table.stroke) - forward} back), input {describe_range(table.input_force, 'N')}; its preload {how}{own}"
         ]
 
     @override
@@ -199,7 +199,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         settings = np.column_stack([table.route, table.own.angle, table.preload])
         _, setting = np.unique(np.nan_to_num(settings, nan=-1.0), axis=0, return_inverse=True)
         forces = np.column_stack([table.input_force, table.output_force])
-        return copies(without_runs(table.origin, settings, forces, table.input_force, 3 * setting + table.stroke))
+        return describe_copies(
+            compare_without_runs(table.origin, settings, forces, table.input_force, 3 * setting + table.stroke)
+        )
 
     @override
     def why_implausible(self, measured: LoopTable, simulated: LoopTable) -> str:
@@ -212,14 +214,14 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         return "" if 1 - HIGHEST <= share <= 1 - LOWEST else "a loop loses less than 1 % or more than 80 % of its force"
 
     @override
-    def file_rows(self, table: LoopTable, description: Description) -> Page:
+    def file_rows(self, table: LoopTable, description: Description) -> FileRows:
         """Return headings and rows, of torques where both pulleys' radii are stated."""
         cable, names = description.cable, table.own.names
         radii = [
             radius.to("length") / 1000 for radius in (cable.input_pulley_radius, cable.output_pulley_radius) if radius
         ]
         what, (first, second), digits = ("force_N", (1.0, 1.0), 3) if len(radii) < 2 else ("torque_N_m", radii, 5)
-        inputs, outputs = fixed(first * table.input_force, digits), fixed(second * table.output_force, digits)
+        inputs, outputs = format_fixed(first * table.input_force, digits), format_fixed(second * table.output_force, digits)
         rows = [
             [
                 *(f"{angle:.6g}" for angle in np.rad2deg(table.own.angle[i])),
@@ -233,9 +235,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
 
     @override
     def empty_table(self, design: LoopDesign, description: Description, file: str) -> LoopTable:
-        loop, strokes = design.loop, signs(design.loop.strokes)
-        loaded = [(a, f, s) for a in radians(loop.wrap_angles) for s in strokes for f in loop.input_forces]
-        free = [(a, np.nan, s) for a in radians(loop.free_motion) for s in strokes]
+        loop, strokes = design.loop, stroke_signs(design.loop.strokes)
+        loaded = [(a, f, s) for a in convert_to_radians(loop.wrap_angles) for s in strokes for f in loop.input_forces]
+        free = [(a, np.nan, s) for a in convert_to_radians(loop.free_motion) for s in strokes]
         rows = np.array([*loaded, *free], dtype=float).reshape(-1, 3)
         names, n = description.angle_columns, len(rows)
         own = OwnAngles.none(names, n)
@@ -247,10 +249,10 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)
 
 
-def _end_forces(table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def _read_end_forces(table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
     """Return the forces at one end [N], from its force column or from its torques and the radius of its pulley."""
-    read = np.asarray(end_column(table, columns, end, is_loop=True).numbers())
-    return forces_of(read, table, columns, end, pulleys)
+    read = np.asarray(find_end_column(table, columns, end, is_loop=True).numbers())
+    return convert_to_forces(read, table, columns, end, pulleys)
 
 
 def _is_plain_angle(heading: str) -> bool:

@@ -16,8 +16,8 @@ from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.cable.noise import noise_law, scatter
-from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, one_reading_each, some_loads
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, choose_loads, simulate_rows
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind, Truth
@@ -114,9 +114,9 @@ class LoopTerm:
         return self.data["output_force"]
 
 
-def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
+def make_loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
     """The term of a loop table."""
-    rows = row_angles(cable.description, table, angles)
+    rows = collect_row_angles(cable.description, table, angles)
     data = rows.data | {
         "input_force": table.input_force,
         "output_force": table.output_force,
@@ -128,7 +128,7 @@ def loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> Loop
     if known and not data["has_preload"].any():  # friction and preload are worked out once for every different case
         data["cases"], at = np.unique(rows.own, axis=0, return_inverse=True)
         data["spread"] = spread_matrix(at.ravel())
-    return LoopTerm(cable, data, tuple(table.origin.place(i) for i in range(len(table.stroke))))
+    return LoopTerm(cable, data, tuple(table.origin.describe_row(i) for i in range(len(table.stroke))))
 
 
 class LoopCandidates(CandidateKind):
@@ -147,7 +147,7 @@ class LoopCandidates(CandidateKind):
         return at.cable.is_loop
 
     @override
-    def measured(self, cable: Cable) -> str:
+    def describe_measurement(self, cable: Cable) -> str:
         return "the loop's output force"
 
     @override
@@ -156,7 +156,7 @@ class LoopCandidates(CandidateKind):
         table = at.measurements.table(LoopTable)
         if table is None:
             return []
-        loads = some_loads(np.abs(table.input_force))
+        loads = choose_loads(np.abs(table.input_force))
         return [replace(case, load=load) for case in at.along_cable(self.name, table.own) for load in loads]
 
     @override
@@ -164,7 +164,7 @@ class LoopCandidates(CandidateKind):
         (route, own, origin), load = at.rows(candidates), np.array([c.load for c in candidates])
         forward, nothing = np.ones(len(candidates), dtype=int), np.full(len(candidates), np.nan)
         table = LoopTable(route, load, 0.8 * load, forward, nothing, own, origin)
-        return one_reading_each(loop_term(at.cable, table, at.angles))
+        return simulate_rows(make_loop_term(at.cable, table, at.angles))
 
 
 class LoopTerms(TermKind[LoopTable]):
@@ -175,7 +175,7 @@ class LoopTerms(TermKind[LoopTable]):
 
     @override
     def terms(self, cable: Cable, table: LoopTable, angles: AngleTable | None) -> tuple[LoopTerm]:
-        return (loop_term(cable, table, angles),)
+        return (make_loop_term(cable, table, angles),)
 
     @override
     def parameters(self, table: LoopTable, at: Circumstances) -> list[Parameter]:
@@ -208,7 +208,7 @@ class LoopTerms(TermKind[LoopTable]):
         }
 
     @override
-    def places(self, table: LoopTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: LoopTable, term: Term) -> Mapping[str, np.ndarray]:
         return {LOAD: table.input_force, WRAP_ANGLE: np.rad2deg(np.nansum(table.own.angle, axis=1))}
 
     @override

@@ -8,10 +8,19 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
-from bowdenfit.kinds.plausibility import within_factor
-from bowdenfit.kinds.rows import Page, RowOrigin, fixed, in_words, provenance_of, radians, read_angle, read_tension
+from bowdenfit.kinds.plausibility import is_within_factor
+from bowdenfit.kinds.rows import (
+    FileRows,
+    RowOrigin,
+    convert_to_radians,
+    describe_range,
+    format_fixed,
+    origin_of_rows,
+    read_angle,
+    read_tension,
+)
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
-from bowdenfit.kinds.tables import Measurements, PreloadTable, PreloadTableSettings, StretchTable, one_angle_warning
+from bowdenfit.kinds.tables import Measurements, PreloadTable, PreloadTableSettings, StretchTable, warn_of_single_angle
 from bowdenfit.types import Vector
 from bowdenfit.words import counted
 
@@ -64,7 +73,7 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
         rows = PreloadTable(
             np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan)),
             np.array(preloads.read_cells(lambda cell: read_tension(cell, preloads, "a preload"), np.nan)),
-            provenance_of(table),
+            origin_of_rows(table),
         )
         return TableFromFiles(rows, {path.name: path}, accounts=(table.account,))
 
@@ -73,9 +82,9 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
         """Return how many readings there are, how large and at which wrap angles."""
         slack = int(np.sum(table.preload == 0))
         none = f" ({slack} of them 0, which says at most 0)" if slack else ""
-        angles = in_words(np.rad2deg(table.wrap_angle), "deg")
+        angles = describe_range(np.rad2deg(table.wrap_angle), "deg")
         file, n = table.origin.files[0], self.count_readings(table)
-        return [f"{file}: {n}{none}, {in_words(table.preload, 'N')}, at {angles}"]
+        return [f"{file}: {n}{none}, {describe_range(table.preload, 'N')}, at {angles}"]
 
     @override
     def count_readings(self, table: PreloadTable) -> str:
@@ -92,7 +101,7 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
     @override
     def warnings(self, table: PreloadTable, description: Description, measurements: Measurements) -> list[str]:
         lacks_stretch = measurements.table(StretchTable) is None
-        file, warnings = table.origin.files[0], one_angle_warning(measurements) if lacks_stretch else []
+        file, warnings = table.origin.files[0], warn_of_single_angle(measurements) if lacks_stretch else []
         if not description.preload_follows_stretch:
             return warnings
         if not table.preload.any():
@@ -116,15 +125,15 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
         """Return that the rope is slack nearly everywhere, or the preload of another size than the measured."""
         if np.sum(simulated.preload > 0) < min(int(np.sum(measured.preload > 0)), _FEWEST_TAUT):
             return "the rope is slack at nearly every angle"
-        close = within_factor(measured.preload.max(), simulated.preload.max())
+        close = is_within_factor(measured.preload.max(), simulated.preload.max())
         return "" if close else "the preload is far from the measured one"
 
     @override
-    def file_rows(self, table: PreloadTable, description: Description) -> Page:
-        columns = zip(np.rad2deg(table.wrap_angle), fixed(table.preload, 3), strict=True)
+    def file_rows(self, table: PreloadTable, description: Description) -> FileRows:
+        columns = zip(np.rad2deg(table.wrap_angle), format_fixed(table.preload, 3), strict=True)
         return ["wrap_angle_deg", "preload_N"], [[f"{angle:.6g}", preload] for angle, preload in columns]
 
     @override
     def empty_table(self, design: PreloadDesign, description: Description, file: str) -> PreloadTable:
-        angles = radians(design.preload.wrap_angles)
+        angles = convert_to_radians(design.preload.wrap_angles)
         return PreloadTable(angles, np.full(len(angles), 20.0), RowOrigin.below_heading(file, len(angles)))

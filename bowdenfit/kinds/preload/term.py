@@ -19,8 +19,8 @@ from bowdenfit.kinds.candidate import (
     CandidateKind,
     Simulation,
     Situation,
-    one_reading_each,
-    some_bends,
+    choose_wrap_angles,
+    simulate_rows,
 )
 from bowdenfit.kinds.shared_parameters import preload, preload_scale
 from bowdenfit.kinds.tables import AngleTable, PreloadTable
@@ -31,9 +31,9 @@ from bowdenfit.kinds.term import (
     Term,
     TermKind,
     Truth,
-    first_less,
-    joined,
-    last_less,
+    deviations_of_bounds,
+    deviations_of_readings,
+    join_contributions,
 )
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
@@ -78,21 +78,23 @@ class PreloadTerm(IndependentReadings):
     ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
         """Standardized deviations: of the readings, and of those that are only known to be at most 0."""
         expected = self.expected(values, data)
-        return first_less(data["reading"], expected) / noise, last_less(data["at_most"], expected) / noise
+        return deviations_of_readings(data["reading"], expected) / noise, deviations_of_bounds(
+            data["at_most"], expected
+        ) / noise
 
     @override
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         deviation, u = self._deviations(values, data, values[self.noise])
         law = noise_law(self.cable.description)
         read = law.log_density(deviation) - jnp.log(values[self.noise])
-        return joined((data["reading"], read), (data["at_most"], law.log_cdf(u)))
+        return join_contributions((data["reading"], read), (data["at_most"], law.log_cdf(u)))
 
     @override
     def residuals(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Standardized residuals; sqrt(-2 log likelihood) for rows known to be at most 0."""
         deviation, u = self._deviations(values, data, jax.lax.stop_gradient(values[self.noise]))
         law = noise_law(self.cable.description)
-        return joined((data["reading"], law.residual(deviation)), (data["at_most"], law.bound_residual(u)))
+        return join_contributions((data["reading"], law.residual(deviation)), (data["at_most"], law.bound_residual(u)))
 
     @override
     def simulate(
@@ -105,7 +107,7 @@ class PreloadTerm(IndependentReadings):
         return np.concatenate([self.data["reading"], self.data["at_most"]])
 
 
-def preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
+def make_preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
     """The term of a table of preload; rows that read 0 come last."""
     slack = table.preload == 0
     angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
@@ -127,13 +129,13 @@ class PreloadCandidates(CandidateKind):
     def candidates(self, at: Situation) -> list[Candidate]:
         table = at.measurements.table(PreloadTable)
         return (
-            [Candidate(self.name, angles=(bend,)) for bend in some_bends(table.wrap_angle)] if table is not None else []
+            [Candidate(self.name, angles=(bend,)) for bend in choose_wrap_angles(table.wrap_angle)] if table is not None else []
         )
 
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
         bend, (_, _, origin) = np.array([sum(c.angles) for c in candidates]), at.rows(candidates)
-        return one_reading_each(preload_term(at.cable, PreloadTable(bend, np.full(len(candidates), 20.0), origin)))
+        return simulate_rows(make_preload_term(at.cable, PreloadTable(bend, np.full(len(candidates), 20.0), origin)))
 
 
 class PreloadTerms(TermKind[PreloadTable]):
@@ -144,7 +146,7 @@ class PreloadTerms(TermKind[PreloadTable]):
 
     @override
     def terms(self, cable: Cable, table: PreloadTable, angles: AngleTable | None) -> tuple[PreloadTerm]:
-        return (preload_term(cable, table),)
+        return (make_preload_term(cable, table),)
 
     @override
     def parameters(self, table: PreloadTable, at: Circumstances) -> list[Parameter]:
@@ -161,8 +163,8 @@ class PreloadTerms(TermKind[PreloadTable]):
         """Draw readings of a table of which nobody knows yet which rows will be slack."""
         taut = replace(table, preload=np.ones(len(table.preload)))
         own_key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[1]
-        return {"preload": truth.simulate(preload_term(truth.cable, taut), own_key)}
+        return {"preload": truth.simulate(make_preload_term(truth.cable, taut), own_key)}
 
     @override
-    def places(self, table: PreloadTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: PreloadTable, term: Term) -> Mapping[str, np.ndarray]:
         return {WRAP_ANGLE: np.rad2deg(term.data["wrap_angle"])}

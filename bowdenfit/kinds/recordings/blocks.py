@@ -34,24 +34,24 @@ _NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading i
 
 
 MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
-_FREE = ("weight", "worth", "censored", "share", "drift", "restart", "input_noise")
+_FREE = ("weight", "n_effective", "censored", "share", "drift", "restart", "input_noise")
 WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
 _HELD = ("input_force", "likely_force", "output_force", "velocity")
 
 
-def positive(recording: Recording) -> np.ndarray:
+def is_under_tension(recording: Recording) -> np.ndarray:
     """Blocks that are readings of a rope under tension."""
     blocks = recording.blocks
     return ~blocks.saturated & (blocks.input_force > 0) & (blocks.output_force > 0)
 
 
-def worth_of(recording: Recording, used: np.ndarray) -> np.ndarray:
+def effective_counts(recording: Recording, used: np.ndarray) -> np.ndarray:
     """What each block is worth: in proportion to its samples, and less where deviations stay alike for long."""
     samples = recording.blocks.samples[used].astype(float)
     return samples / recording.blocks.samples.mean() / recording.strokes.correlation
 
 
-def drift_of(recording: Recording) -> np.ndarray:
+def output_drift(recording: Recording) -> np.ndarray:
     """Change of log F_out with time [1/s], by which a delay of its channel shifts it.
 
     From one block to the next where that is clear of noise, else over as many blocks on both sides as that takes, as far as
@@ -74,14 +74,14 @@ def drift_of(recording: Recording) -> np.ndarray:
     return drift
 
 
-def likely_forces(blocks: Blocks) -> tuple[Vector, Vector]:
+def smooth_forces(blocks: Blocks) -> tuple[Vector, Vector]:
     """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `smooth_input`."""
     forces = (blocks.input_force, blocks.output_force)
     likely_in, likely_out = (np.maximum(smooth_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in forces)
     return likely_in, likely_out
 
 
-def inside_phase(state: np.ndarray) -> np.ndarray:
+def is_inside_phase(state: np.ndarray) -> np.ndarray:
     """Blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
     same = np.diff(state) == 0
     return np.append(True, same) & np.append(same, True)
@@ -109,30 +109,30 @@ def standing_share(state: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.where(state == 0, (0.5 * known / np.bincount(phase))[phase], 1.0)
 
 
-def _at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
+def _is_at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
     """Saturated blocks in which this of the two forces stands at the end of the range, as its saturated samples do."""
     ends = [end for end in recording.account.limits if np.isfinite(end)]
     near = [np.abs(force - end) <= _NEAR_LIMIT * max(np.abs(ends)) for end in ends]
     return recording.blocks.saturated & (np.any(near, axis=0) if near else np.zeros(len(force), dtype=bool))
 
 
-def output_saturated(recording: Recording) -> np.ndarray:
+def is_output_saturated(recording: Recording) -> np.ndarray:
     """Blocks whose output force is at least as large as what was read."""
-    return _at_limit(recording, recording.blocks.output_force)
+    return _is_at_limit(recording, recording.blocks.output_force)
 
 
-def input_saturated(recording: Recording) -> np.ndarray:
+def is_input_saturated(recording: Recording) -> np.ndarray:
     """Blocks whose input force is not known."""
-    return _at_limit(recording, recording.blocks.input_force)
+    return _is_at_limit(recording, recording.blocks.input_force)
 
 
-def restarts(lost: np.ndarray) -> np.ndarray:
+def find_restarts(lost: np.ndarray) -> np.ndarray:
     """Blocks after a stretch whose input is not known: where the operator stands there must be read anew."""
     return ~lost & np.append(False, lost[:-1])
 
 
 @dataclass(frozen=True)
-class BlocksUsed:
+class SelectedBlocks:
     """Blocks of one recording that enter a likelihood.
 
     Args:
@@ -140,8 +140,8 @@ class BlocksUsed:
         stroke: +1 sliding toward the motor, -1 sliding back.
         input_force, output_force: Forces [N].
         log_ratio: s log(F_in/F_out), without what noise adds to it [1].
-        worth: How many independent readings each counts for [1].
-        tells: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2].
+        n_effective: How many independent readings each counts for [1].
+        information: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2].
     """
 
     used: Labels
@@ -149,11 +149,11 @@ class BlocksUsed:
     input_force: Vector
     output_force: Vector
     log_ratio: Vector
-    worth: Vector
-    tells: Vector
+    n_effective: Vector
+    information: Vector
 
 
-def sliding_blocks(recording: Recording, description: Description) -> BlocksUsed:
+def select_sliding_blocks(recording: Recording, description: Description) -> SelectedBlocks:
     """Blocks in which the rope slides, with their log ratio.
 
     Args:
@@ -161,19 +161,19 @@ def sliding_blocks(recording: Recording, description: Description) -> BlocksUsed
         description: The cable, which says how the noises of its cells compare.
     """
     ratio, blocks = description.sensors.noise_ratio, recording.blocks
-    used = np.flatnonzero(recording.strokes.used_sliding & positive(recording))
+    used = np.flatnonzero(recording.strokes.used_sliding & is_under_tension(recording))
     stroke, force_in, force_out = recording.strokes.stroke[used], blocks.input_force[used], blocks.output_force[used]
-    noise = noise_of_output(recording, ratio)
+    noise = estimate_output_noise(recording, ratio)
     group = np.unique(stroke, return_inverse=True)[1]
     expected = expected_forces(force_in, force_out, group, ratio, noise, description.fits_offsets)
     variance = np.zeros(len(used))
     for share, force in ((ratio, expected.input_force), (1.0, expected.output_force)):
         variance += (share / force) ** 2 * (1 + 2.5 * (share * noise / force) ** 2)
     log_ratio = stroke * (np.log(force_in / force_out) - expected.log_ratio_error)
-    return BlocksUsed(used, stroke, force_in, force_out, log_ratio, worth_of(recording, used), 1 / variance)
+    return SelectedBlocks(used, stroke, force_in, force_out, log_ratio, effective_counts(recording, used), 1 / variance)
 
 
-def noise_of_output(recording: Recording, noise_ratio: float) -> float:
+def estimate_output_noise(recording: Recording, noise_ratio: float) -> float:
     """Standard deviation of a block's output force, from block to block, in both cells together [N].
 
     Args:
@@ -185,7 +185,7 @@ def noise_of_output(recording: Recording, noise_ratio: float) -> float:
 
 
 @dataclass(frozen=True)
-class Thinned:
+class BlockGroups:
     """Blocks of one recording, joined inside their phases where there are many.
 
     Args:
@@ -220,23 +220,23 @@ class Thinned:
         )
         likely = self.mean(smooth_input(blocks.input_force))
         sliding = self.recording.strokes.contact[self.starts] != 0
-        off = input_saturated(self.recording)
+        off = is_input_saturated(self.recording)
         lost = self.any_of(off)
-        return self._censored(output_saturated(self.recording) & censored, force_out, lost) | {
+        return self._censored(is_output_saturated(self.recording) & censored, force_out, lost) | {
             "input_force": force_in,
             "likely_force": likely,
             "input_noise": np.where(sliding, force_in - likely, 0.0),
             "output_force": force_out,
             "velocity": self.mean(blocks.velocity),
-            "worth": self._worth(usable & ~off, lost),
-            "restart": restarts(lost),
+            "n_effective": self._count_effective(usable & ~off, lost),
+            "restart": find_restarts(lost),
             "drift": np.gradient(drive.reading(force_out), self.mean(blocks.time)),
         }
 
-    def _worth(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    def _count_effective(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
         """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
         contact = self.recording.strokes.contact
-        effective = worth_of(self.recording, np.arange(len(contact))) * (counted & inside_phase(contact))
+        effective = effective_counts(self.recording, np.arange(len(contact))) * (counted & is_inside_phase(contact))
         return np.add.reduceat(effective * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
@@ -250,36 +250,36 @@ class Thinned:
         low, high = self.recording.account.limits
         end = np.where(force_out > (low + high) / 2 if np.isfinite(low + high) else np.isfinite(high), 1.0, -1.0)
         beyond = self.any_of(saturated) & ~lost
-        effective = worth_of(self.recording, np.arange(len(saturated)))
+        effective = effective_counts(self.recording, np.arange(len(saturated)))
         share = np.add.reduceat(effective * saturated, self.starts)
         return {"censored": np.where(beyond, end, 0.0), "share": np.where(beyond, share, 0.0)}
 
 
-def group_blocks(recording: Recording) -> Thinned:
+def group_blocks(recording: Recording) -> BlockGroups:
     """The blocks of a recording, in groups where there are more than `MOST_BLOCKS`."""
-    return Thinned(recording, first_of_groups(recording.strokes.contact, MOST_BLOCKS))
+    return BlockGroups(recording, group_starts(recording.strokes.contact, MOST_BLOCKS))
 
 
-def side_by_side(
+def stack_recordings(
     recordings: Recordings, parts: Sequence[Mapping[str, Any]], angles: Mapping[str, np.ndarray]
 ) -> dict[str, Any]:
     """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
 
     Args:
         recordings: The recordings.
-        parts: Arrays of each: those of `Thinned.arrays`, and the weight.
+        parts: Arrays of each: those of `BlockGroups.arrays`, and the weight.
         angles: `ROW_ARRAYS` of each.
     """
     runs = recordings.runs
     run = np.array([runs.index(r.run) for r in recordings.items])
-    free = {name: beside([p[name] for p in parts], "constant") for name in _FREE}
-    worth = free.pop("worth")
+    free = {name: pad_columns([p[name] for p in parts], "constant") for name in _FREE}
+    n_effective = free.pop("n_effective")
     counted = free["weight"] > 0
-    readings = np.minimum(worth, 1.0)  # blocks that are joined are one reading, however well it is known
+    readings = np.minimum(n_effective, 1.0)  # blocks that are joined are one reading, however well it is known
     ratio = np.where(counted, free["weight"], 1.0) / np.where(counted, readings, 1.0)
     log_weights = np.where(counted, readings * np.log(ratio), 0.0)
     arrays = (
-        {name: angles[name] for name in ROW_ARRAYS} | {name: beside([p[name] for p in parts]) for name in _HELD} | free
+        {name: angles[name] for name in ROW_ARRAYS} | {name: pad_columns([p[name] for p in parts]) for name in _HELD} | free
     )
     return arrays | {
         "run": run,
@@ -288,13 +288,13 @@ def side_by_side(
     }
 
 
-def beside(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "edge") -> np.ndarray:
+def pad_columns(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "edge") -> np.ndarray:
     """Columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
     longest = max(len(column) for column in columns)
     return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
 
 
-def first_of_groups(state: np.ndarray, most: int) -> np.ndarray:
+def group_starts(state: np.ndarray, most: int) -> np.ndarray:
     """First block of each group of blocks that are joined: of one phase only, its first and last block always alone.
 
     The operator stands where the end of a stroke left it, so the ends must not be averaged away.

@@ -9,9 +9,9 @@ from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.matching import Quantity
-from bowdenfit.kinds.kind import FrictionKind, Readings, efficiencies
-from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, beyond
-from bowdenfit.kinds.recordings.reader import RecordingsTable, read_recordings, recorded_angles
+from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
+from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
+from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings, read_recordings
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import AngleTable, Measurements
@@ -41,7 +41,7 @@ _FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
 _UNDER_LOAD = 0.2  # of the largest force of a loop, above which it counts as loaded
 
 
-def preparation_pages(recordings: Recordings) -> list[dict[str, Any]]:
+def list_preparations(recordings: Recordings) -> list[dict[str, Any]]:
     """Return a dictionary for each recording: its samples, its preparation and its phases, in s, N and Hz."""
     return [_preparation(recording) for recording in recordings.items]
 
@@ -71,22 +71,22 @@ def _preparation(recording: Recording) -> dict[str, Any]:
     }
 
 
-def recordings_text(recordings: Recordings) -> list[str]:
+def describe_preparations(recordings: Recordings) -> list[str]:
     """What was done to the recordings, line by line."""
-    pages = preparation_pages(recordings)
-    losses = [(_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.items]
-    rows = [_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
+    pages = list_preparations(recordings)
+    losses = [(_format_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.items]
+    rows = [_format_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
     lines = narrow_table(_LOOP_HEADS if recordings.loop else _HEADS, rows, left=("left out",)).splitlines()
     notes = [
         _LOOP_NOTE if recordings.loop else _NOTE,
-        *_delay(pages),
-        *_tare(pages),
-        *_by_hand(pages),
+        *_describe_delay(pages),
+        *_describe_tare(pages),
+        *_describe_manual_phases(pages),
     ]
     return [*lines, *(line for note in notes for line in filled(note).splitlines())]
 
 
-def _row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
+def _format_row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
     counts, blocks = page["counts"], page["blocks"]
     left_out = [f"{n} {kind}" for kind, n in counts.items() if kind != "used" and n]
     block = f"{1000 * page['block']:.4g} ms" if page["block"] > 0 else "none"
@@ -98,16 +98,16 @@ def _row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
         block,
         *(str(blocks[name]) for name in ("pulling", "switching", "returning", "sliding")),
         *loss,
-        _or_dash(page["exponent"], ".3f"),
+        _format_or_dash(page["exponent"], ".3f"),
     )
 
 
-def _or_dash(value: float, digits: str, unit: str = "") -> str:
+def _format_or_dash(value: float, digits: str, unit: str = "") -> str:
     """A number, or a dash where it is not known."""
     return f"{value:{digits}}{unit}" if np.isfinite(value) else "-"
 
 
-def _delay(pages: list[dict[str, Any]]) -> list[str]:
+def _describe_delay(pages: list[dict[str, Any]]) -> list[str]:
     """The delay, once where it is one for all."""
     texts = {}
     for page in pages:
@@ -119,7 +119,7 @@ def _delay(pages: list[dict[str, Any]]) -> list[str]:
     return [f"The output channel was shifted back by a delay of {text}." for text in texts]
 
 
-def _tare(pages: list[dict[str, Any]]) -> list[str]:
+def _describe_tare(pages: list[dict[str, Any]]) -> list[str]:
     tared = [p for p in pages if any(p["tare"])]
     if not tared:
         return []
@@ -127,7 +127,7 @@ def _tare(pages: list[dict[str, Any]]) -> list[str]:
     return [f"Tare taken off the input and output force: {listed(parts)}."]
 
 
-def _by_hand(pages: list[dict[str, Any]]) -> list[str]:
+def _describe_manual_phases(pages: list[dict[str, Any]]) -> list[str]:
     names = [p["name"] for p in pages if p["phases_by_hand"]]
     return [f"Phases set by hand in cable.toml: {listed(names)}."] if names else []
 
@@ -139,7 +139,7 @@ class RecordingKind(FrictionKind[Recordings]):
     table = Recordings
     settings = RecordingsTable
     readings = (
-        efficiencies("recorded_efficiency", "recordings", "recordings", "recording {}", are_runs=True),
+        efficiency_readings("recorded_efficiency", "recordings", "recordings", "recording {}", are_runs=True),
         Readings("recorded_loss", "recordings", "recordings", "recording {}", "Force lost (N)"),
     )
     heading = "Recordings"
@@ -164,7 +164,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def describe(self, table: Recordings, description: Description) -> list[str]:
-        return recordings_text(table)
+        return describe_preparations(table)
 
     @override
     def describe_single_file(self, table: Recordings) -> str:
@@ -182,7 +182,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def conditions(self, table: Recordings) -> RowConditions:
-        return recorded_angles(table)
+        return angles_of_recordings(table)
 
     @override
     def forces(self, table: Recordings) -> Vector:
@@ -288,7 +288,7 @@ class RecordingKind(FrictionKind[Recordings]):
             if other.strokes.noise > max(FACTOR * one.strokes.noise, SCATTER if not measured.loop else 0.0):
                 return "a recording is nothing but noise"
         exponents = np.array([r.strokes.exponent for r in simulated.items])
-        return beyond(exponents[np.isfinite(exponents)], "the efficiency of a recording")
+        return explain_impossible_loss(exponents[np.isfinite(exponents)], "the efficiency of a recording")
 
 
 def _why_impossible(page: Preparation) -> str:

@@ -38,7 +38,7 @@ _SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a
 _SAME_LENGTH = 0.005  # of the range of the route, by which a length may
 
 
-def entry_from_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
+def parse_file_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
     """Return what the name of a file says, by the table's pattern."""
     if pattern is None:
         return RecordingFile(file=file)
@@ -74,12 +74,12 @@ def _check_pattern(description: Description, pattern: str) -> None:
                 raise DescriptionError(f"{key}, {{{name}:{unit}}}: {error}.") from None
 
 
-def place_names(description: Description) -> tuple[str, ...]:
+def location_names(description: Description) -> tuple[str, ...]:
     """Quantities that say where a recording was made."""
     return (*description.angle_columns, *([description.route.variable] if description.route else []))
 
 
-def placed_by_channels(
+def locate_by_channels(
     description: Description, file: ChannelFile, entry: RecordingFile, sources: Mapping[str, ColumnSource]
 ) -> RecordingFile:
     """A recording's entry with the wrap angles and the length that its channels say, where it does not say them itself.
@@ -101,27 +101,27 @@ def placed_by_channels(
         if column is None or (column not in sources and (contact.wrap_angle.curve or column in angles)):
             continue
         if column in angles:
-            raise _twice(entry, column)
-        angle = _angle(file, column, sources.get(column))
+            raise _make_duplicate_error(entry, column)
+        angle = _read_steady_angle(file, column, sources.get(column))
         if angle is not None:
             angles[column] = QuantityValue(value=angle, unit="rad")
     route = description.route
     if route is not None and (route.variable in sources or at is None):
-        length = _length(file, route, sources.get(route.variable))
+        length = _read_steady_length(file, route, sources.get(route.variable))
         if length is not None and at is not None:
-            raise _twice(entry, route.variable)
+            raise _make_duplicate_error(entry, route.variable)
         at = length if length is not None else at
     return entry.model_copy(update={"wrap_angles": angles, "at": at})
 
 
-def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
+def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
     """A wrap angle [rad]."""
     steady = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
     if steady is None:
         return None
     value, low, high = steady
     if high - low > _SAME_BEND:
-        raise _changes(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
+        raise _make_change_error(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
     if value < 0:
         raise DatasetError(
             f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so turn that of the "
@@ -130,7 +130,7 @@ def _angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float
     return value
 
 
-def _length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
+def _read_steady_length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
     """A value of the route variable, in its unit."""
     quantity = Quantity(route.variable, "route", route.unit)
     steady = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
@@ -138,18 +138,18 @@ def _length(file: ChannelFile, route: Route, source: ColumnSource | None) -> flo
         return None
     value, low, high = steady
     if high - low > _SAME_LENGTH * abs(route.range[1] - route.range[0]):
-        raise _changes(file, route.variable, low, high, route.unit)
+        raise _make_change_error(file, route.variable, low, high, route.unit)
     return float(f"{value:.12g}")
 
 
-def _changes(file: ChannelFile, name: str, low: float, high: float, unit: str) -> DatasetError:
+def _make_change_error(file: ChannelFile, name: str, low: float, high: float, unit: str) -> DatasetError:
     return DatasetError(
         f"{file.path.name}: {name} changes from {low:.4g} to {high:.4g} {unit} during the recording, which is of one bend; "
         "choose its rows by where = { ... } in a [[recording]] for each, or state the value there and rename the channel."
     )
 
 
-def _twice(entry: RecordingFile, name: str) -> DatasetError:
+def _make_duplicate_error(entry: RecordingFile, name: str) -> DatasetError:
     return DatasetError(
         f"{entry.file}: {name} is stated in its [[recording]], and a channel is named for it too; keep one of the two."
     )
@@ -173,7 +173,7 @@ class RecordingsTable(TableSettings):
         return self.prepare.tare == "fitted"
 
 
-def recorded_angles(recordings: Recordings) -> RowConditions:
+def angles_of_recordings(recordings: Recordings) -> RowConditions:
     """Route values and own angles, one row a recording."""
     shape = (len(recordings.items), len(recordings.columns))
     angle, sd = (np.array([getattr(r, n) for r in recordings.items]).reshape(shape) for n in ("own_angle", "own_sd"))
@@ -190,10 +190,10 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
         DatasetError, DescriptionError: What is wrong, in a sentence.
     """
     description, channels = source.description, source.channels
-    entries = _entries(source)
+    entries = _list_entries(source)
     _check_names(entries)
     faults = Faults()
-    read = faults.read_all(lambda entry: _to_read(description, *entry, channels), entries, None)
+    read = faults.read_all(lambda entry: _read_file(description, *entry, channels), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -202,11 +202,14 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
             f"{' and '.join(units.values())} give velocities of different kinds, of the rope and of the motor; give both in "
             "mm/s or both in r/min."
         )
-    prepared, delay_sd = _prepared(files)
-    items = tuple(_recording(description, f, *parts) for f, parts in zip(files, _said_once(prepared), strict=True))
+    prepared, delay_sd = _prepare_files(files)
+    items = tuple(
+        _make_recording(description, f, *parts)
+        for f, parts in zip(files, _keep_first_loop_remark(prepared), strict=True)
+    )
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
     recordings = Recordings(description.angle_columns, items, unit, delay_sd, loop)
-    _check_placed(recordings, description)
+    _check_locations(recordings, description)
     remarks = [remark for r in items for remark in (*r.account.remarks, *r.strokes.remarks)]
     accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
     return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
@@ -224,7 +227,7 @@ class _File:
     account: RowAccount | None
 
 
-def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
+def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
     """Every recording prepared with one delay, and the standard error of that delay [s].
 
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
@@ -234,11 +237,11 @@ def _prepared(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], flo
     delays = [i.delay for i in inspections if i.settings.delay == "estimated" and i.delay.sd > 0]
     if not delays:
         return [average_recording(i) for i in inspections], max((f.delay_sd for f in files), default=0.0)
-    delay, sd = _pooled(np.array([d.value for d in delays]), np.array([d.sd for d in delays]))
+    delay, sd = _pool_delays(np.array([d.value for d in delays]), np.array([d.sd for d in delays]))
     return [average_recording(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in inspections], sd
 
 
-def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
+def _keep_first_loop_remark(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
     """What is said of every loop alike, that its delay is not estimated, kept in the first account only."""
     is_stated = False
     kept = []
@@ -249,7 +252,7 @@ def _said_once(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks,
     return kept
 
 
-def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
+def _pool_delays(delays: Vector, sds: Vector) -> tuple[float, float]:
     """Weighted mean of estimated delays and its standard error [s].
 
     What chance did to each estimate averages out, and is at least as large as the estimates differ. What all of them have
@@ -262,19 +265,19 @@ def _pooled(delays: Vector, sds: Vector) -> tuple[float, float]:
     return mean, float(np.hypot(np.sqrt(max(chance, apart)), COMMON_ERROR))
 
 
-def _entries(source: Source) -> list[tuple[Path, RecordingFile]]:
+def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     """Every file with what is said of it; a file named in a [[recording]] is not read twice."""
     description = source.description
     entries = [(source.folder / entry.file, entry) for entry in description.recording]
     named = {path.resolve() for path, _ in entries}
     for path in source.files:
         if path.resolve() not in named:
-            entries.append((path, entry_from_name(description, source.settings.pattern, path, source.name_of(path))))
+            entries.append((path, parse_file_name(description, source.settings.pattern, path, source.name_of(path))))
     runs = Counter(entry.run for _, entry in entries if not entry.name)
-    return [(path, _named(path, entry) if runs[entry.run] > 1 else entry) for path, entry in entries]
+    return [(path, _name_within_run(path, entry) if runs[entry.run] > 1 else entry) for path, entry in entries]
 
 
-def _named(path: Path, entry: RecordingFile) -> RecordingFile:
+def _name_within_run(path: Path, entry: RecordingFile) -> RecordingFile:
     """One of several recordings of a run that have no names of their own."""
     if entry.name or not entry.run:
         return entry
@@ -282,7 +285,7 @@ def _named(path: Path, entry: RecordingFile) -> RecordingFile:
 
 
 def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
-    names = [_name(path, entry) for path, entry in entries]
+    names = [_recording_name(path, entry) for path, entry in entries]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DescriptionError(
@@ -290,41 +293,45 @@ def _check_names(entries: list[tuple[Path, RecordingFile]]) -> None:
         )
 
 
-def _name(path: Path, entry: RecordingFile) -> str:
+def _recording_name(path: Path, entry: RecordingFile) -> str:
     return entry.name or entry.run or path.stem
 
 
-def _to_read(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
+def _read_file(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
     table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
     page = entry.prepare or table.prepare
-    sources = _known(table.channels, description) | _known(entry.channels, description) | dict(channels)
+    sources = (
+        _check_channel_names(table.channels, description)
+        | _check_channel_names(entry.channels, description)
+        | dict(channels)
+    )
     file = read_channels(path)
     rows = rows_where(file, entry.where)
     raw, unit = to_recording(
-        rows, _name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
+        rows, _recording_name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
     )
-    entry = placed_by_channels(description, rows, entry, sources)
+    entry = locate_by_channels(description, rows, entry, sources)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
     return _File(raw, entry, page, stated or 0.0, unit, file.account)
 
 
-def _recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
+def _make_recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:
     raw, entry = file.raw, file.entry
     strokes = find_strokes(blocks, raw.file, raw.name, entry.strokes, cable_of(description))
     if entry.velocity is not None and not len(raw.velocity):
         speed = entry.velocity.to(speed_dimension(entry.velocity.unit))
         blocks = replace(blocks, velocity=np.full(len(blocks.time), speed))
-    angle, sd = _own_angles(description, entry)
+    angle, sd = _stated_angles(description, entry)
     route = float("nan") if entry.at is None else entry.at
     return Recording(raw.name, raw.file, entry.run or raw.name, route, angle, sd, blocks, strokes, account)
 
 
-def _known(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
+def _check_channel_names(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
     """Channels of the description, if they are of quantities that a recording has."""
-    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), *place_names(description)]
+    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), *location_names(description)]
     for name in channels:
         if name not in known:
             raise DescriptionError(
@@ -333,7 +340,7 @@ def _known(channels: Mapping[str, ColumnSource], description: Description) -> di
     return dict(channels)
 
 
-def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:
+def _stated_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:
     """Wrap angles measured with a recording, and their standard deviations [rad]."""
     columns = description.angle_columns
     for name in entry.wrap_angles:
@@ -348,7 +355,7 @@ def _own_angles(description: Description, entry: RecordingFile) -> tuple[np.ndar
     return np.array(angles, dtype=float), np.array(sds, dtype=float)
 
 
-def _check_placed(recordings: Recordings, description: Description) -> None:
+def _check_locations(recordings: Recordings, description: Description) -> None:
     """Refuse a recording that cannot be given a wrap angle in every contact."""
     route = description.route
     for recording in recordings.items:

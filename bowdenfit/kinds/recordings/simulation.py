@@ -17,15 +17,15 @@ from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.kinds.recordings.blocks import beside
-from bowdenfit.kinds.recordings.reader import recorded_angles
+from bowdenfit.kinds.recordings.blocks import pad_columns
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.term import Truth
 from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 
 
-def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
+def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
     """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
     All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: it stays alike from block
@@ -37,18 +37,20 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     """
     cable, values, scale = truth.cable, truth.values, truth.scale
     of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(truth.key, 4), 4)
-    angles, variance = truth.wrap_angles(recorded_angles(recordings))
+    angles, variance = truth.wrap_angles(angles_of_recordings(recordings))
     error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
     run = np.array([recordings.runs.index(r.run) for r in recordings.items])
     mounting = values[RUN_SCATTER] * truth.scatter(of_run, (len(recordings.runs),))[run]
     exponent = cable.friction_exponent(values, angles + scale * error)
-    force = jnp.asarray(beside([smooth_input(r.blocks.input_force) for r in recordings.items]))
-    velocity = jnp.asarray(beside([r.blocks.velocity for r in recordings.items]))
+    force = jnp.asarray(pad_columns([smooth_input(r.blocks.input_force) for r in recordings.items]))
+    velocity = jnp.asarray(pad_columns([r.blocks.velocity for r in recordings.items]))
     cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent)
     at_least = jnp.maximum(force, drive.least_force)
-    output, _ = drive.follow(at_least, scale * mounting, _starts(drive, recordings, at_least, scale * mounting))
-    error_numbers = beside([errors_shared(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]).astype(int)
-    fewer = jnp.asarray(beside([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.items]))
+    output, _ = drive.follow(at_least, scale * mounting, _start_positions(drive, recordings, at_least, scale * mounting))
+    error_numbers = pad_columns(
+        [number_shared_errors(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]
+    ).astype(int)
+    fewer = jnp.asarray(pad_columns([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.items]))
     shape, noise = (error_numbers.max() + 1, len(recordings.items)), scale * values[BLOCK_NOISE] * fewer
     noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
     errors = [sd * jax.random.normal(k, shape)[error_numbers, np.arange(shape[1])] for sd, k in noises]
@@ -60,14 +62,14 @@ def drawn_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Arra
     }
 
 
-def _starts(drive: RopeDrive | LoopDrive, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
+def _start_positions(drive: RopeDrive | LoopDrive, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
     """Where the operator starts: a rope where it was in its band when measured, a loop at the force that was measured."""
     if isinstance(drive, LoopDrive):
         return jnp.array([r.blocks.output_force[0] for r in recordings.items])
-    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start(r) for r in recordings.items])
+    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start_in_band(r) for r in recordings.items])
 
 
-def _start(recording: Recording) -> float:
+def _start_in_band(recording: Recording) -> float:
     """Where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
     blocks, strokes = recording.blocks, recording.strokes
     least = LEAST_SHARE * np.max(np.abs(blocks.input_force))
@@ -75,7 +77,7 @@ def _start(recording: Recording) -> float:
     return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
 
 
-def errors_shared(blocks: int, correlation: float) -> np.ndarray:
+def number_shared_errors(blocks: int, correlation: float) -> np.ndarray:
     """Which error each block has, for means of many blocks to scatter as those of a `correlation`-th as many would.
 
     With errors shared by blocks in groups, the mean of N scatters by as much as that of N / c independent ones if c is the size
@@ -96,8 +98,8 @@ def errors_shared(blocks: int, correlation: float) -> np.ndarray:
     return np.searchsorted(starts, np.arange(blocks), "right") - 1
 
 
-def recorded_again(description: Description, recordings: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
-    """The recordings with forces drawn by `drawn_recordings`, their strokes found anew.
+def replace_forces(description: Description, recordings: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
+    """The recordings with forces drawn by `draw_recordings`, their strokes found anew.
 
     What the likelihood takes a block to be worth is kept: how long deviations stay alike is not found anew.
 
@@ -115,12 +117,12 @@ def recorded_again(description: Description, recordings: Recordings, readings: M
         shown, error = readings["output_force"][:n, i], readings["output_error"][:n, i]
         late = shown - float(readings["delay_error"]) * np.gradient(shown, time)
         blocks = replace(recording.blocks, input_force=readings["input_force"][:n, i], output_force=late + error)
-        strokes = _strokes(description, recording, blocks)
+        strokes = _find_strokes_again(description, recording, blocks)
         items.append(replace(recording, blocks=blocks, strokes=strokes))
     return replace(recordings, items=tuple(items))
 
 
-def _strokes(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
+def _find_strokes_again(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
     spans = [
         phase
         for entry in description.recording

@@ -16,27 +16,27 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
-    BlocksUsed,
-    drift_of,
-    input_saturated,
-    inside_phase,
-    likely_forces,
-    positive,
-    restarts,
-    sliding_blocks,
+    SelectedBlocks,
+    effective_counts,
+    find_restarts,
+    is_input_saturated,
+    is_inside_phase,
+    is_under_tension,
+    output_drift,
+    select_sliding_blocks,
+    smooth_forces,
     standing_share,
-    worth_of,
 )
-from bowdenfit.kinds.recordings.reader import RecordingsTable, recorded_angles
-from bowdenfit.kinds.recordings.simulation import drawn_recordings, recorded_again, refuse_saturated
+from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings
+from bowdenfit.kinds.recordings.simulation import draw_recordings, refuse_saturated, replace_forces
 from bowdenfit.kinds.recordings.whole_recordings import (
     LoopRecordingsTerm,
     WholeRecordingsTerm,
-    loop_recordings_term,
-    pad_recordings,
+    make_loop_recordings_term,
+    stack_rope_recordings,
 )
-from bowdenfit.kinds.row_angles import row_angles
-from bowdenfit.kinds.runs import RunsTerm, run_sums
+from bowdenfit.kinds.row_angles import collect_row_angles
+from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.tables import AngleTable
@@ -47,7 +47,7 @@ from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, 
 from bowdenfit.recordings.recording import Recording, Recordings
 
 
-def recordings_term(
+def make_recordings_term(
     cable: Cable, recordings: Recordings, angles: AngleTable | None
 ) -> RunsTerm | WholeRecordingsTerm | LoopRecordingsTerm:
     """The term of a data set's recordings, as its description wants them used; those of a loop are always whole.
@@ -56,53 +56,53 @@ def recordings_term(
         DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
     """
     settings = cable.description.table(RecordingsTable)
-    rows = row_angles(cable.description, recorded_angles(recordings), angles).data
-    labels = tuple(_label(cable, recordings, run) for run in recordings.runs)
+    rows = collect_row_angles(cable.description, angles_of_recordings(recordings), angles).data
+    labels = tuple(_run_label(cable, recordings, run) for run in recordings.runs)
     if recordings.loop:
-        censored = settings is not None and _censored(settings, recordings)
-        return loop_recordings_term(cable, recordings, rows, labels, censored)
+        censored = settings is not None and _is_censored(settings, recordings)
+        return make_loop_recordings_term(cable, recordings, rows, labels, censored)
     if settings is None or settings.likelihood == "runs":
-        parts = [sliding_blocks(r, cable.description) for r in recordings.items]
-        _needs_blocks(recordings, parts)
-        blocks = _rows(recordings, parts, rows)
-        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
+        parts = [select_sliding_blocks(r, cable.description) for r in recordings.items]
+        _require_blocks(recordings, parts)
+        blocks = _make_sliding_rows(recordings, parts, rows)
+        return RunsTerm(cable, sum_runs(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
     for recording in recordings.items:
-        _needs_reversal(recording)
-    censored, noise_ratio = _censored(settings, recordings), cable.description.sensors.noise_ratio
+        _require_reversal(recording)
+    censored, noise_ratio = _is_censored(settings, recordings), cable.description.sensors.noise_ratio
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
-        parts = [_all_blocks(r, noise_ratio) for r in recordings.items]
-        _needs_blocks(recordings, parts)
-        blocks = _rows(recordings, parts, rows)
-        return RunsTerm(cable, run_sums(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
-    return WholeRecordingsTerm(cable, pad_recordings(recordings, rows, censored, noise_ratio), labels)
+        parts = [_select_all_blocks(r, noise_ratio) for r in recordings.items]
+        _require_blocks(recordings, parts)
+        blocks = _make_sliding_rows(recordings, parts, rows)
+        return RunsTerm(cable, sum_runs(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
+    return WholeRecordingsTerm(cable, stack_rope_recordings(recordings, rows, censored, noise_ratio), labels)
 
 
-def _censored(settings: RecordingsTable, recordings: Recordings) -> bool:
+def _is_censored(settings: RecordingsTable, recordings: Recordings) -> bool:
     """Whether readings at the end of the range count as ones beyond it, and there are any."""
     return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.items)
 
 
-def _label(cable: Cable, recordings: Recordings, run: str) -> str:
+def _run_label(cable: Cable, recordings: Recordings, run: str) -> str:
     """Name of a run, with its route value where it has just one and does not say it itself."""
     route, at = cable.description.route, {r.route for r in recordings.items if r.run == run}
     where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
     return f"{run} ({where})" if where and where not in run else run
 
 
-def _needs_blocks(recordings: Recordings, parts: list[BlocksUsed]) -> None:
+def _require_blocks(recordings: Recordings, parts: list[SelectedBlocks]) -> None:
     """Every run must have something that the likelihood can use."""
     for run in recordings.runs:
         members = [r for r in recordings.items if r.run == run]
         if not any(len(p.used) for r, p in zip(recordings.items, parts, strict=True) if r.run == run):
-            under_tension = np.concatenate([positive(r) for r in members]).mean() > _MOSTLY
+            under_tension = np.concatenate([is_under_tension(r) for r in members]).mean() > _MOSTLY
             why = _NO_SLIDING if under_tension else _NO_TENSION
             raise DatasetError(
                 f"{members[0].file}: nothing of the run {run!r} can be used, because {why}; or leave the recording out."
             )
 
 
-def _needs_reversal(recording: Recording) -> None:
+def _require_reversal(recording: Recording) -> None:
     if len(set(recording.strokes.stroke) - {0}) < 2:
         raise DatasetError(
             f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to show "
@@ -124,35 +124,35 @@ _NO_SLIDING = (
 )
 
 
-def _all_blocks(recording: Recording, noise_ratio: float) -> BlocksUsed:
+def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBlocks:
     r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
     Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
     \hat\Lambda)`; so every block reads the friction exponent of the stroke before it.
     """
-    kept_at, blocks, strokes = positive(recording), recording.blocks, recording.strokes
+    kept_at, blocks, strokes = is_under_tension(recording), recording.blocks, recording.strokes
     x, y = np.log(blocks.input_force[kept_at]), np.log(blocks.output_force[kept_at])
-    likely_in, likely_out = likely_forces(blocks)
+    likely_in, likely_out = smooth_forces(blocks)
     moved = np.log(likely_in[kept_at])
-    followed, (state, last) = _followed_in_parts(recording, kept_at, moved, y)
+    followed, (state, last) = _follow_in_parts(recording, kept_at, moved, y)
     followed += np.where(state != 0, x - moved, 0.0)
-    inside = inside_phase(state)
+    inside = is_inside_phase(state)
     kept = (last != 0) & inside
     used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
     ratio = strokes.exponent - stroke * (y - followed)[kept]
     slides = state[kept] != 0
     likely_in, likely_out = likely_in[used], likely_out[used]
     of_output_alone = np.where(slides, 1.0, 1 + (noise_ratio * likely_out / likely_in) ** 2)
-    worth = worth_of(recording, used) * of_output_alone * standing_share(state, blocks.input_force[kept_at])[kept]
-    tells = 1 / ((noise_ratio / likely_in) ** 2 + 1 / likely_out**2)
-    return BlocksUsed(used, stroke, blocks.input_force[used], blocks.output_force[used], ratio, worth, tells)
+    n_effective = effective_counts(recording, used) * of_output_alone * standing_share(state, blocks.input_force[kept_at])[kept]
+    information = 1 / ((noise_ratio / likely_in) ** 2 + 1 / likely_out**2)
+    return SelectedBlocks(used, stroke, blocks.input_force[used], blocks.output_force[used], ratio, n_effective, information)
 
 
-def _followed_in_parts(
+def _follow_in_parts(
     recording: Recording, kept: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The operator over the kept blocks, and the last contact up to each, started anew where the input was not known."""
-    starts = np.flatnonzero(np.append(True, restarts(input_saturated(recording))[kept][1:])[: len(x)])
+    starts = np.flatnonzero(np.append(True, find_restarts(is_input_saturated(recording))[kept][1:])[: len(x)])
     strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
     last = np.zeros(len(x), dtype=int)
     for start, stop in zip(starts, np.append(starts[1:], len(x))[: len(starts)], strict=True):
@@ -162,26 +162,26 @@ def _followed_in_parts(
     return followed, np.stack([state, last])
 
 
-def _rows(recordings: Recordings, parts: list[BlocksUsed], angles: Mapping[str, np.ndarray]) -> SlidingRows:
+def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angles: Mapping[str, np.ndarray]) -> SlidingRows:
     """Blocks of all recordings as rows of runs."""
     of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
     runs = recordings.runs
 
-    def joined(name: str) -> np.ndarray:
+    def concatenate(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])
 
     pairs = list(zip(recordings.items, parts, strict=True))
     return SlidingRows(
-        joined("input_force"),
-        joined("output_force"),
-        joined("log_ratio"),
-        joined("stroke").astype(int),
+        concatenate("input_force"),
+        concatenate("output_force"),
+        concatenate("log_ratio"),
+        concatenate("stroke").astype(int),
         np.array([runs.index(r.run) for r in recordings.items])[of_recording],
         np.concatenate([r.blocks.velocity[p.used] for r, p in pairs]),
-        np.concatenate([p.stroke * drift_of(r)[p.used] for r, p in pairs]),
-        joined("worth"),
+        np.concatenate([p.stroke * output_drift(r)[p.used] for r, p in pairs]),
+        concatenate("n_effective"),
         {name: angles[name][of_recording] for name in ROW_ARRAYS},
-        joined("tells"),
+        concatenate("information"),
     )
 
 
@@ -189,11 +189,11 @@ class RecordingTerms(TermKind[Recordings]):
     """Recordings in the likelihood."""
 
     name = "recordings"
-    tells_mountings = True
+    shows_mounting_scatter = True
 
     @override
     def terms(self, cable: Cable, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
-        return (recordings_term(cable, table, angles),)
+        return (make_recordings_term(cable, table, angles),)
 
     @override
     def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
@@ -209,11 +209,11 @@ class RecordingTerms(TermKind[Recordings]):
 
     @override
     def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:
-        return drawn_recordings(table, truth)
+        return draw_recordings(table, truth)
 
     @override
     def with_readings(self, description: Description, table: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
-        return recorded_again(description, table, readings)
+        return replace_forces(description, table, readings)
 
     @override
     def check_drawable(self, description: Description, table: Recordings) -> None:

@@ -22,15 +22,15 @@ from bowdenfit.cable.noise import noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     WITHOUT_WEIGHT,
-    beside,
     group_blocks,
-    likely_forces,
-    positive,
-    side_by_side,
+    is_under_tension,
+    pad_columns,
+    smooth_forces,
+    stack_recordings,
 )
 from bowdenfit.kinds.row_angles import resolve_angles
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS
-from bowdenfit.kinds.term import rounded_up
+from bowdenfit.kinds.term import round_up_count
 from bowdenfit.physics.distributions import log_normal_cdf
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.physics.loop import loop_output_force
@@ -52,7 +52,7 @@ _LOOP_REACH = 0.5  # of the friction exponent, that its first guess is corrected
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Mounted:
+class MountingEffects:
     """What blocks say with the mounting effects integrated out.
 
     Args:
@@ -103,7 +103,7 @@ class BlocksTerm(ABC):
     def padded(self) -> dict[str, Any]:
         """See `LogDensity.padded`: recordings that stand still for longer at their end, with no weight."""
         blocks = len(self.data["weight"])
-        missing = ((0, rounded_up(blocks) - blocks), (0, 0))
+        missing = ((0, round_up_count(blocks) - blocks), (0, 0))
         long = {
             name: np.pad(values, missing, "constant" if name in WITHOUT_WEIGHT else "edge")
             for name, values in self.data.items()
@@ -120,7 +120,7 @@ class BlocksTerm(ABC):
         angles, variance = resolve_angles(self.cable, values, data)
         return make_drive(self.cable, values, angles, data["velocity"]), angles, variance
 
-    def _followed(
+    def _follow(
         self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
     ) -> tuple[PerTime, PerTime]:
         """Deviation of the readings from the operator's output, and the output's derivative by the exponent."""
@@ -131,21 +131,21 @@ class BlocksTerm(ABC):
         expected, loading = drive.shown(cells, *followed)
         return data["reading"] + cells.late(data["drift"]) - expected, loading
 
-    def _deviations(self, values: Values, data: Data, weights: Values) -> Mounted:
+    def _deviations(self, values: Values, data: Data, weights: Values) -> MountingEffects:
         """What the blocks say with the mounting integrated out."""
         (drive, angles, variance), cells = self._drive(values, data), LoadCells.of(values)
         guess, reach = self._first_guess(drive, data)
-        deviation, loading = self._followed(drive, cells, data, guess)
+        deviation, loading = self._follow(drive, cells, data, guess)
         by_recording = jnp.sum(data["weight"] * loading**2, axis=0)
         step = jnp.sum(data["weight"] * loading * deviation, axis=0) / jnp.maximum(by_recording, 1e-30)
         guess = guess + jnp.clip(step, -reach, reach)
-        deviation, loading = self._followed(drive, cells, data, guess)
+        deviation, loading = self._follow(drive, cells, data, guess)
         of_angles = self.cable.exponent_variance(weights, angles, variance)
-        return self._mounted(data, weights, deviation + loading * guess, loading, of_angles)
+        return self._integrate_mountings(data, weights, deviation + loading * guess, loading, of_angles)
 
-    def _mounted(
+    def _integrate_mountings(
         self, data: Data, weights: Values, deviation: PerTime, loading: PerTime, of_angles: PerRecording
-    ) -> Mounted:
+    ) -> MountingEffects:
         """The mounting effect of each run in closed form.
 
         Args:
@@ -160,9 +160,9 @@ class BlocksTerm(ABC):
         effect = self._per_run(data, data["weight"] * loading * deviation) / total
         from_angles = self._per_run(data, data["weight"] * loading**2 * of_angles) / total
         sd = jnp.sqrt(weights[RUN_SCATTER] ** 2 + from_angles + weights[self.reading_noise] ** 2 / total)
-        return Mounted(deviation - loading * effect[data["run"]], effect, sd, total)
+        return MountingEffects(deviation - loading * effect[data["run"]], effect, sd, total)
 
-    def _beyond(self, data: Data, effects: Mounted, noise: Array) -> PerTime:
+    def _excess_over_limit(self, data: Data, effects: MountingEffects, noise: Array) -> PerTime:
         """How far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
         return data["censored"] * -effects.within * data["newtons"] / noise
 
@@ -172,7 +172,7 @@ class BlocksTerm(ABC):
         squares = self._per_run(data, data["weight"] * effects.within**2)
         constant = (data["log_weights"] - jnp.log(effects.total) - (n - 1) * jnp.log(2 * jnp.pi)) / 2
         inside = constant - (n - 1) * jnp.log(noise) - squares / (2 * noise**2)
-        log_probability = log_normal_cdf(self._beyond(data, effects, noise)) * data["share"]
+        log_probability = log_normal_cdf(self._excess_over_limit(data, effects, noise)) * data["share"]
         censored = self._per_run(data, jnp.where(data["censored"] != 0, log_probability, 0.0))
         return inside + noise_law(self.cable.description).log_density(effects.effect, 0.0, effects.sd) + censored
 
@@ -180,7 +180,7 @@ class BlocksTerm(ABC):
         """Standardized residuals of the same likelihood: between runs, and of the blocks of a run."""
         effects = self._deviations(values, data, jax.lax.stop_gradient(dict(values)))
         noise = jax.lax.stop_gradient(values[self.reading_noise])
-        beyond = self._beyond(data, effects, noise)
+        beyond = self._excess_over_limit(data, effects, noise)
         inside = jnp.sqrt(data["weight"]) * effects.within / noise
         # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
         root = jnp.sqrt(-2 * data["share"] * log_normal_cdf(jnp.minimum(beyond, 29.0)) + 1e-300)
@@ -206,24 +206,24 @@ class WholeRecordingsTerm(BlocksTerm):
     def _first_guess(self, drive: RopeDrive, data: Data) -> tuple[PerRecording, PerRecording]:
         guess = jnp.zeros_like(drive.exponent)
         if not self.cable.friction.depends_on_load:  # else the loop's width means another exponent at every scale
-            guess = data["exponent"] - self._typical(drive, data)
+            guess = data["exponent"] - self._typical_exponent(drive, data)
         return guess, _ROPE_REACH * jnp.asarray(data["exponent"])
 
-    def _typical(self, drive: RopeDrive, data: Data) -> PerRecording:
+    def _typical_exponent(self, drive: RopeDrive, data: Data) -> PerRecording:
         """Friction exponent of each recording at its mean speed [1]."""
         return drive.exponent * drive.friction.rate(drive.values, data["speed"])
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Expected efficiency of each run, the effect of its mounting left out [1]."""
-        return transmission_efficiency(self._of_run(self._typical(self._drive(values, data)[0], data)))
+        return transmission_efficiency(self._average_by_run(self._typical_exponent(self._drive(values, data)[0], data)))
 
     def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " runs"]:
         """Efficiency of each run as the bench would give it [1]."""
         sd = self._deviations(values, data, values).sd
-        of_run = self._of_run(self._typical(self._drive(values, data)[0], data))
+        of_run = self._average_by_run(self._typical_exponent(self._drive(values, data)[0], data))
         return transmission_efficiency(of_run + sd * scatter(key, sd.shape, self.cable.description))
 
-    def _of_run(self, of_recording: Array) -> Array:
+    def _average_by_run(self, of_recording: Array) -> Array:
         """Mean over the recordings of each run."""
         run, runs = jnp.asarray(self.data["run"]), len(self.labels)
         counts = jnp.zeros(runs).at[run].add(1.0)
@@ -235,14 +235,14 @@ class WholeRecordingsTerm(BlocksTerm):
         return np.exp(-np.bincount(run, exponent) / np.bincount(run))
 
 
-def pad_recordings(
+def stack_rope_recordings(
     recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
 ) -> dict[str, Any]:
     """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
 
     The noise ratio is that of the input over that of the output.
     """
-    data = side_by_side(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.items], angles)
+    data = stack_recordings(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.items], angles)
     speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.items]
     return data | {
         "reading": np.log(data["output_force"]),
@@ -255,10 +255,10 @@ def pad_recordings(
 def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
     """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
-    arrays = groups.arrays(RopeDrive, positive(recording), censored)
-    likely_in, likely_out = (groups.mean(force) for force in likely_forces(recording.blocks))
+    arrays = groups.arrays(RopeDrive, is_under_tension(recording), censored)
+    likely_in, likely_out = (groups.mean(force) for force in smooth_forces(recording.blocks))
     of_input = noise_ratio * (recording.strokes.contact[groups.starts] != 0)
-    return arrays | {"weight": arrays["worth"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}
+    return arrays | {"weight": arrays["n_effective"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ class LoopRecordingsTerm(BlocksTerm):
         guess = jnp.where(data["tells_loss"] | data["tells_exponent"], own - drive.exponent, 0.0)
         return guess, _LOOP_REACH * (drive.exponent + guess)
 
-    def _lost(
+    def _mean_lost_force(
         self, values: Values, data: Data, drive: LoopDrive, more: PerRecording | float = 0.0
     ) -> Float[Array, " runs"]:
         """Mean force lost in the blocks that move [N], with more friction exponent than the cable's."""
@@ -297,14 +297,14 @@ class LoopRecordingsTerm(BlocksTerm):
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
         """Expected mean force lost while each run moves, the effect of its mounting left out [N]."""
-        return self._lost(values, data, self._drive(values, data)[0])
+        return self._mean_lost_force(values, data, self._drive(values, data)[0])
 
     def simulate(self, values: Values, data: Data, key: Array) -> Float[Array, " runs"]:
         """Mean force lost while each run moves as the bench would give it [N]."""
         drive = self._drive(values, data)[0]
 
         def lost(more: Array) -> Array:
-            return self._lost(values, data, drive, more)
+            return self._mean_lost_force(values, data, drive, more)
 
         mean, by_exponent = jax.jvp(lost, (jnp.zeros_like(drive.exponent),), (jnp.ones_like(drive.exponent),))
         sd = self._deviations(values, data, values).sd
@@ -316,7 +316,7 @@ class LoopRecordingsTerm(BlocksTerm):
         return np.bincount(self.data["run"], lost.sum(axis=0))
 
 
-def loop_recordings_term(
+def make_loop_recordings_term(
     cable: Cable, recordings: Recordings, angles: Mapping[str, np.ndarray], labels: tuple[str, ...], censored: bool
 ) -> LoopRecordingsTerm:
     """The term of a loop's recordings.
@@ -330,8 +330,8 @@ def loop_recordings_term(
     """
     noise_ratio = cable.description.sensors.noise_ratio
     parts = [_loop_blocks(r, censored, noise_ratio) for r in recordings.items]
-    data = side_by_side(recordings, parts, angles)
-    moving = beside([p["moving"] for p in parts], "constant")
+    data = stack_recordings(recordings, parts, angles)
+    moving = pad_columns([p["moving"] for p in parts], "constant")
     of_run = np.bincount(data["run"], np.abs(moving).sum(axis=0))
     loss, exponent = (np.array([getattr(r.strokes, name) for r in recordings.items]) for name in ("drag", "exponent"))
     return LoopRecordingsTerm(
@@ -360,7 +360,7 @@ def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> di
     stroke = strokes.stroke[groups.starts]
     used = strokes.used_sliding & ~blocks.saturated
     return arrays | {
-        "weight": arrays["worth"] / (1 + (noise_ratio * _input_share(recording, arrays["input_force"], stroke)) ** 2),
+        "weight": arrays["n_effective"] / (1 + (noise_ratio * _input_share(recording, arrays["input_force"], stroke)) ** 2),
         "moving": stroke * np.add.reduceat(blocks.samples * used, groups.starts).astype(float),
     }
 

@@ -17,7 +17,7 @@ from bowdenfit.files.columns import Column, Quantity, find_columns, require_colu
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Kind, Readings
-from bowdenfit.kinds.rows import Page, RowOrigin, provenance_of
+from bowdenfit.kinds.rows import FileRows, RowOrigin, origin_of_rows
 from bowdenfit.kinds.table_files import RUN, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Labels, Vector
@@ -58,7 +58,7 @@ class RingDownTable(Part):
     inertia_sd: float
     origin: RowOrigin
 
-    def half_swings(self, run: int) -> tuple[int, float]:
+    def measure_half_swings(self, run: int) -> tuple[int, float]:
         """How many half swings of a run are seen, and how long one takes [s]."""
         rows = self.run == run
         time, reading = self.time[rows], self.reading[rows]
@@ -98,22 +98,22 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
     time = np.asarray(clock.numbers())
     is_torque = "torque" in columns
     reading = np.asarray(columns["torque" if is_torque else "angle"].numbers()) / (1000.0 if is_torque else 1.0)
-    run, names = _runs(columns, len(table.rows))
+    run, names = _read_runs(columns, len(table.rows))
     added = np.asarray(columns["added_inertia"].numbers()) if "added_inertia" in columns else np.zeros(len(time))
     table.faults.refuse()
-    releases = [_one_run(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
+    releases = [_find_release(clock, table.file, name, run == i, time, added) for i, name in enumerate(names)]
     since = time - np.array([start for start, _ in releases])[run]
     stated, inertia, sd = source.settings.inertia, np.nan, np.nan
     if stated is not None:
         inertia, sd = stated.to("inertia"), stated.sd_to("inertia") or np.nan
     more = np.array([more for _, more in releases])
-    made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, provenance_of(table))
+    made = RingDownTable(since, reading, is_torque, run, more, inertia, sd, origin_of_rows(table))
     for i, name in enumerate(names):
         _check_swings(table, name, made, i)
     return TableFromFiles(made, {path.name: path}, accounts=(table.account,))
 
 
-def _runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
+def _read_runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
     if "run" not in columns:
         return np.zeros(n, dtype=int), ("",)
     texts = [cell.text.strip() for cell in columns["run"].cells]
@@ -121,7 +121,7 @@ def _runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...
     return np.array([names.index(text) for text in texts]), names
 
 
-def _one_run(clock: Column, file: str, name: str, in_run: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
+def _find_release(clock: Column, file: str, name: str, in_run: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
     """Time of the release and added inertia of a run."""
     called, rows = (f"{file}, run {name!r}" if name else file), np.flatnonzero(in_run)
     back = np.flatnonzero(np.diff(time[rows]) <= 0)
@@ -150,7 +150,7 @@ def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> 
             f"{called}: a ring-down needs at least {_FEWEST_ROWS} rows in which the joint swings, and here {seen}; record "
             "from the release on, at 1 kHz or so."
         )
-    seen_half_swings, half = made.half_swings(run)
+    seen_half_swings, half = made.measure_half_swings(run)
     if seen_half_swings < _FEWEST_HALF_SWINGS:
         raise DatasetError(
             f"{called}: the joint turns round {seen_half_swings} times before it stands still, and fewer than "
@@ -200,7 +200,7 @@ class RingDownKind(Kind[RingDownTable]):
         what, file = "torque" if table.is_torque else "angle", table.origin.files[0]
         lines = []
         for run in range(len(table.added)):
-            n, half = table.half_swings(run)
+            n, half = table.measure_half_swings(run)
             more = f", {table.added[run]:.4g} kg m^2 added" if table.added[run] else ""
             rows = counted(int(np.sum(table.run == run)), "reading")
             lines.append(f"{file}: {rows} of the {what} after a release, {n} half swings of {1000 * half:.3g} ms{more}")
@@ -234,7 +234,7 @@ class RingDownKind(Kind[RingDownTable]):
         return "" if np.ptp(simulated.reading) > np.ptp(measured.reading) / 5 else "the joint hardly swings"
 
     @override
-    def file_rows(self, table: RingDownTable, description: Description) -> Page:
+    def file_rows(self, table: RingDownTable, description: Description) -> FileRows:
         what = "torque_N_m" if table.is_torque else "angle_deg"
         shown = table.reading if table.is_torque else np.rad2deg(table.reading)
         added = table.added[table.run]

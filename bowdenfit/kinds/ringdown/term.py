@@ -38,7 +38,7 @@ _LEAST_DECAY, _MOST_DECAY = 0.05, 0.999  # decay of a half swing
 _MORE_SWINGS = 3  # times those that are seen
 
 
-def of_run(name: str, run: int) -> str:
+def run_parameter_name(name: str, run: int) -> str:
     """Name of a run's own parameter."""
     return f"ring_{name}_{run + 1}"
 
@@ -61,18 +61,18 @@ class RingDownTerm(IndependentReadings):
     @override
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         run, n = data["run"], len(data["added"])
-        amplitude, rest, release = (
-            jnp.stack([values[of_run(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
+        amplitude, at_rest, release = (
+            jnp.stack([values[run_parameter_name(name, i)] for i in range(n)]) for name in ("amplitude", "rest", "release")
         )
         stiffness, damping = values[STIFFNESS], values[DAMPING]
         angle, speed = ring_down(
             data["time"] - release[run], run, amplitude, values[INERTIA] + data["added"], stiffness, damping,
             values[FRICTION], len(data["swings"]),
         )  # fmt: skip
-        return rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
+        return at_rest[run] + jnp.where(data["torque"][run] > 0, stiffness * angle + damping * speed, angle)
 
 
-def ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
+def make_ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
     """The term of a table of ring-downs."""
     swings = _sampling(table)[1]
     data = {
@@ -85,11 +85,11 @@ def ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
 
 def _sampling(table: RingDownTable) -> tuple[float, int]:
     """Interval between rows [s], and how many half swings are followed."""
-    seen = max(table.half_swings(run)[0] for run in range(len(table.added)))
+    seen = max(table.measure_half_swings(run)[0] for run in range(len(table.added)))
     return float(np.median(np.diff(table.time[table.run == 0]))), _MORE_SWINGS * seen + 5
 
 
-def _first_looks(table: RingDownTable, run: int, product: float, stiffness: float) -> tuple[float, float]:
+def _first_estimates(table: RingDownTable, run: int, product: float, stiffness: float) -> tuple[float, float]:
     """Damping [N m s/rad] and friction [N m] by the turns of a run.
 
     Args:
@@ -98,13 +98,13 @@ def _first_looks(table: RingDownTable, run: int, product: float, stiffness: floa
         product: K J [N m kg m^2/rad].
         stiffness: Torque per unit of the reading.
     """
-    rho, held = decay_of_turns(table, run)
+    rho, held = estimate_decay(table, run)
     log_decay = -np.log(rho)
     damping = float(2 * np.sqrt(product) * log_decay / np.hypot(np.pi, log_decay))
     return max(damping, _LEAST), max(held * stiffness, _LEAST)
 
 
-def _inertia(table: RingDownTable, size: float) -> Parameter:
+def _inertia_parameter(table: RingDownTable, size: float) -> Parameter:
     """Inertia of what swings: as stated, or found by adding a known one."""
     free = Parameter(
         INERTIA, "$J$", "inertia of the released joint", "elastic", LogNormal(size, 2 * _LOG_SD), "kg*m^2",
@@ -117,7 +117,31 @@ def _inertia(table: RingDownTable, size: float) -> Parameter:
     return replace(free, prior=TruncatedNormal(table.inertia, table.inertia_sd), scaled_by="")
 
 
-def decay_of_turns(table: RingDownTable, run: int) -> tuple[float, float]:
+def _release_parameters(run: int, amplitude: Normal, at_rest: Normal, unit: str, step: float) -> list[Parameter]:
+    """How one run was released and read.
+
+    Args:
+        run: Number of the run.
+        amplitude: Prior of the first deflection [rad].
+        at_rest: Prior of the reading at rest.
+        unit: Unit of the readings.
+        step: Interval between readings [s].
+    """
+    name, of_run = run_parameter_name, f"of ring-down {run + 1}"
+    return [
+        Parameter(
+            name("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {of_run}", "sensor", amplitude, "rad",
+        ),
+        Parameter(
+            name("rest", run), f"$q_{{{run + 1}}}$", f"reading without a load {of_run}", "sensor", at_rest, unit,
+        ),
+        Parameter(
+            name("release", run), f"$t_{{{run + 1}}}$", f"time of release {of_run}", "sensor", Normal(0.0, step), "s",
+        ),
+    ]  # fmt: skip
+
+
+def estimate_decay(table: RingDownTable, run: int) -> tuple[float, float]:
     r"""Return the decay rho of a half swing by damping, and how far f friction can hold the bar, in units of the reading.
 
     From the way D from one turn to the next, which needs no place of rest:
@@ -153,14 +177,14 @@ class RingDownTerms(TermKind[RingDownTable]):
 
     @override
     def terms(self, cable: Cable, table: RingDownTable, angles: AngleTable | None) -> tuple[RingDownTerm]:
-        return (ring_down_term(cable, table),)
+        return (make_ring_down_term(cable, table),)
 
     @override
     def parameters(self, table: RingDownTable, at: Circumstances) -> list[Parameter]:
         """Return inertia, stiffness, damping and friction, and how each run was released and read."""
         inertia = table.inertia if np.isfinite(table.inertia) else float(np.max(table.added))
         first = int(np.argmin(table.added))
-        seen, half = table.half_swings(first)
+        seen, half = table.measure_half_swings(first)
         omega = np.pi / half
         stiffness = (inertia + table.added[first]) * omega**2
         runs = [table.reading[table.run == run] for run in range(len(table.added))]
@@ -170,10 +194,10 @@ class RingDownTerms(TermKind[RingDownTable]):
         step, unit = _sampling(table)[0], "N*m" if table.is_torque else "rad"
         decay = 2 * np.sqrt(stiffness * (inertia + table.added[first])) * np.log(10) / (np.pi * seen)  # to a tenth
         damping, friction = HalfNormal(_TIMES * decay), HalfNormal(_TIMES * 0.45 * stiffness * angle / seen)
-        looks = _first_looks(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
+        looks = _first_estimates(table, first, stiffness * (inertia + table.added[first]), stiffness * angle / size)
         by = f"the period, {2000 * np.pi / omega:.3g} ms, and an inertia of {inertia:.3g} kg m^2"
         parameters = [
-            _inertia(table, inertia),
+            _inertia_parameter(table, inertia),
             Parameter(
                 STIFFNESS, "$K$", "stiffness against which the released joint swings", "elastic",
                 LogNormal(stiffness, 2 * _LOG_SD), "N*m/rad", scaled_by=by, starts=(), first_look=stiffness,
@@ -194,27 +218,16 @@ class RingDownTerms(TermKind[RingDownTable]):
             ),
         ]  # fmt: skip
         for run, deflection in enumerate(away):
-            start, called = deflection / stiffness if table.is_torque else deflection, f"of ring-down {run + 1}"
-            parameters += [
-                Parameter(
-                    of_run("amplitude", run), f"$x_{{{run + 1}}}$", f"deflection {called}", "sensor",
-                    Normal(start, angle), "rad",
-                ),
-                Parameter(
-                    of_run("rest", run), f"$q_{{{run + 1}}}$", f"reading without a load {called}", "sensor",
-                    Normal(float(np.median(runs[run][-max(len(runs[run]) // 10, 3) :])), _REST_SHARE * size), unit,
-                ),
-                Parameter(
-                    of_run("release", run), f"$t_{{{run + 1}}}$", f"time of release {called}", "sensor", Normal(0.0, step), "s"
-                ),
-            ]  # fmt: skip
+            at_rest = float(np.median(runs[run][-max(len(runs[run]) // 10, 3) :]))
+            start = deflection / stiffness if table.is_torque else deflection
+            parameters += _release_parameters(run, Normal(start, angle), Normal(at_rest, _REST_SHARE * size), unit, step)
         return parameters
 
     @override
     def draw(self, table: RingDownTable, truth: Truth) -> dict[str, Array]:
-        term = ring_down_term(truth.cable, table)
+        term = make_ring_down_term(truth.cable, table)
         return {"reading": truth.simulate(term, jax.random.fold_in(truth.key, 11))}
 
     @override
-    def places(self, table: RingDownTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: RingDownTable, term: Term) -> Mapping[str, np.ndarray]:
         return {"Time (s)": np.asarray(term.data["time"])}

@@ -13,20 +13,20 @@ from bowdenfit.files.columns import Column, Quantity, find_columns, require_colu
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
-from bowdenfit.kinds.plausibility import Compared, copies, parts, within_factor
+from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor, split_by_group
 from bowdenfit.kinds.rows import (
-    Page,
+    FileRows,
     RowOrigin,
     check_spelling,
-    fixed,
-    in_words,
-    provenance_of,
-    radians,
+    convert_to_radians,
+    describe_range,
+    format_fixed,
+    origin_of_rows,
     read_angle,
     read_tension,
 )
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
-from bowdenfit.kinds.tables import Measurements, StretchTable, one_angle_warning
+from bowdenfit.kinds.tables import Measurements, StretchTable, warn_of_single_angle
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import counted, listed, significant
 
@@ -69,11 +69,11 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
     load = np.array(loads.read_cells(lambda cell: read_tension(cell, loads, "a load"), np.nan))
     wrap_angle = np.array(angles.read_cells(lambda cell: read_angle(cell, angles), np.nan))
     stretch = stretches.numbers()
-    unloading = _branches(columns.get("branch"), len(load))
+    unloading = _read_branches(columns.get("branch"), len(load))
     table.faults.refuse()
-    cycle, names = _cycles(columns.get("cycle"), wrap_angle)
+    cycle, names = _assign_cycles(columns.get("cycle"), wrap_angle)
     peak = np.array([load[cycle == c].max() for c in cycle])
-    made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, provenance_of(table))
+    made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, origin_of_rows(table))
     _check_rising(stretches, made)
     remarks = tuple(_branch_remarks(table, made, "branch" in columns))
     return TableFromFiles(made, {path.name: path}, remarks, (table.account,))
@@ -99,13 +99,13 @@ def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[s
     ]
 
 
-def _branches(column: Column | None, n_rows: int) -> Flags:
+def _read_branches(column: Column | None, n_rows: int) -> Flags:
     if column is None:
         return np.zeros(n_rows, dtype=bool)
-    return np.array(column.read_cells(_branch, False), dtype=bool)
+    return np.array(column.read_cells(_read_branch, False), dtype=bool)
 
 
-def _branch(cell: Cell) -> bool:
+def _read_branch(cell: Cell) -> bool:
     text = cell.text.strip().lower()
     if text not in _BRANCHES:
         seen = "the cell is blank" if cell.blank else f"{cell.shown} is no branch"
@@ -113,7 +113,7 @@ def _branch(cell: Cell) -> bool:
     return _BRANCHES[text]
 
 
-def _cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:
+def _assign_cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:
     """Cycle of each row: as named, at one wrap angle."""
     names = [cell.text.strip() or "(no cycle)" for cell in column.cells] if column else [""] * len(wrap_angle)
     shown = [
@@ -132,7 +132,7 @@ def _check_rising(column: Column, made: StretchTable) -> None:
     ]
     groups = [rows for rows in groups if len(np.unique(made.load[rows])) > 1]
     for together in [[rows] for rows in groups] + [groups]:
-        load, stretch = (_about_means(values, together) for values in (made.load, made.stretch))
+        load, stretch = (_subtract_group_means(values, together) for values in (made.load, made.stretch))
         if len(load) - len(together) < _FEWEST or np.ptp(stretch) == 0:
             continue
         if np.corrcoef(load, stretch)[0, 1] < -_SURE:
@@ -145,7 +145,7 @@ def _check_rising(column: Column, made: StretchTable) -> None:
             )
 
 
-def _about_means(values: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
+def _subtract_group_means(values: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
     """Values of all groups, each less the mean of its group."""
     return np.concatenate([values[rows] - values[rows].mean() for rows in groups]) if groups else np.zeros(0)
 
@@ -195,8 +195,8 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         angles = np.rad2deg(np.unique(table.wrap_angle))
         own = description.stretch.friction or "a friction coefficient of its own, mu_stretch"
         return [
-            f"{table.origin.files[0]}: {self.count_readings(table)}{down}, loads {in_words(table.load, 'N')}, at "
-            f"{len(angles)} wrap angle{'s' if len(angles) > 1 else ''}, {in_words(angles, 'deg')}; friction: {own}"
+            f"{table.origin.files[0]}: {self.count_readings(table)}{down}, loads {describe_range(table.load, 'N')}, at "
+            f"{len(angles)} wrap angle{'s' if len(angles) > 1 else ''}, {describe_range(angles, 'deg')}; friction: {own}"
         ]
 
     @override
@@ -235,7 +235,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
                 f"the rope of {file} gives {significant(stretch)} mm under {significant(more)} N more, as hardly any rope "
                 "does; the usual cause is a unit: check those of stretch and load."
             )
-        falling = _falling(table)
+        falling = _describe_falling_stretch(table)
         if falling:
             warnings.append(
                 f"in {file} the stretch falls while the load grows, {falling}; check its sign, and whether the readings "
@@ -245,7 +245,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
             warnings.append(
                 f"every row of {file} is at a wrap angle of 0, so it says nothing of friction; read at larger ones too."
             )
-        return warnings + one_angle_warning(measurements)
+        return warnings + warn_of_single_angle(measurements)
 
     @override
     def copied_readings(self, table: StretchTable) -> list[str]:
@@ -253,30 +253,32 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         settings = np.column_stack([table.load, table.wrap_angle, table.unloading])
         curve = 2 * table.cycle + table.unloading
         read = table.stretch[:, None]
-        return copies(Compared(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve))
+        return describe_copies(
+            ComparedReadings(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve)
+        )
 
     @override
     def why_implausible(self, measured: StretchTable, simulated: StretchTable) -> str:
         """Return that the stretch is of another size than the measured, or falls with the load."""
-        if not within_factor(np.ptp(measured.stretch), np.ptp(simulated.stretch)):
+        if not is_within_factor(np.ptp(measured.stretch), np.ptp(simulated.stretch)):
             return "the stretch is far from the measured one"
         of_cycle = 2 * simulated.cycle + simulated.unloading
         load, stretch = (
-            np.concatenate([part - part.mean() for part in parts(of_cycle, values)])
+            np.concatenate([part - part.mean() for part in split_by_group(of_cycle, values)])
             for values in (simulated.load, simulated.stretch)
         )
         return "the stretch falls with the load" if load @ stretch <= 0 else ""
 
     @override
-    def file_rows(self, table: StretchTable, description: Description) -> Page:
+    def file_rows(self, table: StretchTable, description: Description) -> FileRows:
         branch = np.where(table.unloading, "unload", "load")
-        columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, fixed(table.stretch, 4), strict=True)
+        columns = zip(np.rad2deg(table.wrap_angle), branch, table.load, format_fixed(table.stretch, 4), strict=True)
         rows = [[f"{angle:.6g}", way, f"{load:g}", stretch] for angle, way, load, stretch in columns]
         return ["wrap_angle_deg", "branch", "load_N", "stretch_mm"], rows
 
     @override
     def empty_table(self, design: StretchDesign, description: Description, file: str) -> StretchTable:
-        loads, angles = np.array(sorted(design.stretch.loads), dtype=float), radians(design.stretch.wrap_angles)
+        loads, angles = np.array(sorted(design.stretch.loads), dtype=float), convert_to_radians(design.stretch.wrap_angles)
         cycle = np.concatenate([loads, loads[-2::-1]]) if design.stretch.unloading else loads
         down = np.arange(len(cycle)) >= len(loads)
         n = len(angles)
@@ -288,7 +290,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         return StretchTable(load, wrap_angle, 0.01 * load, np.tile(down, n), peak, of_cycle, names, origin)
 
 
-def _falling(table: StretchTable) -> str:
+def _describe_falling_stretch(table: StretchTable) -> str:
     """Return where the stretch under the largest load is less than under the smallest, in words; empty if nowhere."""
     for cycle, unloading in product(range(len(table.cycle_names)), (False, True)):
         rows = np.flatnonzero((table.cycle == cycle) & (table.unloading == unloading))

@@ -17,9 +17,9 @@ from bowdenfit.kinds.candidate import (
     CandidateKind,
     Simulation,
     Situation,
-    one_reading_each,
-    some_bends,
-    some_loads,
+    choose_loads,
+    choose_wrap_angles,
+    simulate_rows,
 )
 from bowdenfit.kinds.shared_parameters import rope
 from bowdenfit.kinds.tables import AngleTable, StretchTable
@@ -47,7 +47,7 @@ class StretchTerm(IndependentReadings):
         return self.cable.elasticity.stretch_of_rows(values, data)
 
 
-def stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
+def make_stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
     """The term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
     data = {
@@ -82,7 +82,7 @@ class StretchCandidates(CandidateKind):
         table = at.measurements.table(StretchTable)
         if table is None:
             return []
-        bends, loads = some_bends(table.wrap_angle), some_loads(table.load)
+        bends, loads = choose_wrap_angles(table.wrap_angle), choose_loads(table.load)
         return [Candidate(self.name, angles=(bend,), load=load) for bend in bends for load in loads]
 
     @override
@@ -94,7 +94,7 @@ class StretchCandidates(CandidateKind):
             at.rows(candidates),
         )
         table = StretchTable(load, bend, 0.01 * load, up, load, cycle, tuple(str(i) for i in cycle), origin)
-        return one_reading_each(stretch_term(at.cable, table))
+        return simulate_rows(make_stretch_term(at.cable, table))
 
 
 class StretchTerms(TermKind[StretchTable]):
@@ -105,7 +105,7 @@ class StretchTerms(TermKind[StretchTable]):
 
     @override
     def terms(self, cable: Cable, table: StretchTable, angles: AngleTable | None) -> tuple[StretchTerm]:
-        return (stretch_term(cable, table),)
+        return (make_stretch_term(cable, table),)
 
     @override
     def parameters(self, table: StretchTable, at: Circumstances) -> list[Parameter]:
@@ -134,10 +134,10 @@ class StretchTerms(TermKind[StretchTable]):
     @override
     def draw(self, table: StretchTable, truth: Truth) -> dict[str, Array]:
         own_key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[0]
-        return {"stretch": truth.simulate(stretch_term(truth.cable, table), own_key)}
+        return {"stretch": truth.simulate(make_stretch_term(truth.cable, table), own_key)}
 
     @override
-    def places(self, table: StretchTable, term: Term) -> Mapping[str, np.ndarray]:
+    def covariates(self, table: StretchTable, term: Term) -> Mapping[str, np.ndarray]:
         return {LOAD: table.load, WRAP_ANGLE: np.rad2deg(table.wrap_angle)}
 
     @override

@@ -15,7 +15,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.scalar_priors import value_at
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import stiffness_with_springs
@@ -79,7 +79,7 @@ class ElasticAnswers(Display):
         """Distinct wrap angles at which anything was measured [rad]."""
         contact = self.fit.dataset.description.contact[self.contact]
         column, angles_by_table = contact.wrap_angle.column, []
-        for kind, table in each_table(self.fit.dataset.measurements):
+        for kind, table in iterate_tables(self.fit.dataset.measurements):
             if isinstance(kind, FrictionKind):
                 angles_by_table += [] if column is None else [kind.conditions(table).own.column(column)[0]]
             elif isinstance(kind, RopeKind):

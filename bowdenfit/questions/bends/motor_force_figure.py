@@ -56,7 +56,7 @@ class MotorForce:
 def data(fit: Record) -> tuple[MotorForce, ...] | None:
     """The loop of each run; None where no force was measured against displacement."""
     from bowdenfit.kinds.displacement.table import DisplacementTable
-    from bowdenfit.kinds.displacement.term import DisplacementTerm, readings, turns_by_depth
+    from bowdenfit.kinds.displacement.term import DisplacementTerm, reading_arrays, split_turns_by_depth
     from bowdenfit.questions.bends.curves import Values, evaluate_curves, quantiles_of_draws
 
     table = fit.dataset.measurements.table(DisplacementTable)
@@ -66,16 +66,16 @@ def data(fit: Record) -> tuple[MotorForce, ...] | None:
     path = _fine_path(table)
     both = [
         {
-            "turns": turns_by_depth(way.motion.turns),
+            "turns": split_turns_by_depth(way.motion.turns),
             "angles": term.data["angles"],
-            **readings(way, np.arange(len(way.run))),
+            **reading_arrays(way, np.arange(len(way.run))),
         }
         for way in (path, table)
     ]
 
     def curves(values: Values) -> dict[str, Any]:
-        mounted = term.mounted(values, term.data)
-        return {name: term.shown(values, way, mounted) for name, way in zip(("along", "read"), both, strict=True)}
+        mounted = term.mounted_exponents(values, term.data)
+        return {name: term.load_cell_force(values, way, mounted) for name, way in zip(("along", "read"), both, strict=True)}
 
     draws, runs = evaluate_curves(fit, curves), []
     along, fitted = draws["along"], np.median(draws["read"], axis=0)
@@ -90,7 +90,7 @@ def data(fit: Record) -> tuple[MotorForce, ...] | None:
 
 def _fine_path(table: DisplacementTable) -> DisplacementTable:
     """The way that the motor took in each run, in steps finer than its readings."""
-    from bowdenfit.kinds.displacement.table import in_order, sliding
+    from bowdenfit.kinds.displacement.table import follow_motor, history_of_sliding_rope
 
     x, run, stroke = [], [], []
     for number in range(len(table.run_names)):
@@ -104,7 +104,10 @@ def _fine_path(table: DisplacementTable) -> DisplacementTable:
             x.append(np.interp(np.arange(steps * (len(at) - 1) + 1) / steps, np.arange(len(at)), at))
         run.append(np.full(len(x[-1]), number))
     displacement, of_run = np.concatenate(x), np.concatenate(run)
-    motion = sliding(np.concatenate(stroke), displacement, of_run) if table.sliding else in_order(displacement, of_run)
+    if table.sliding:
+        motion = history_of_sliding_rope(np.concatenate(stroke), displacement, of_run)
+    else:
+        motion = follow_motor(displacement, of_run)
     no_force, nowhere = np.zeros(len(of_run)), np.full(len(of_run), np.nan)
     every = np.ones(len(of_run), dtype=bool)
     return replace(

@@ -75,10 +75,10 @@ def data(fit: Record) -> PreloadCurve | None:
 
 def _measured_range(fit: Record) -> tuple[float, float]:
     """Smallest and largest total wrap angle of any reading [rad]; from 0 where all are the same, to pi without one."""
-    from bowdenfit.kinds import each_table
+    from bowdenfit.kinds import iterate_tables
     from bowdenfit.kinds.kind import RopeKind
 
-    angles = [kind.bends(table) for kind, table in each_table(fit.dataset.measurements) if isinstance(kind, RopeKind)]
+    angles = [kind.bends(table) for kind, table in iterate_tables(fit.dataset.measurements) if isinstance(kind, RopeKind)]
     every = np.concatenate([np.zeros(0), *angles])
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
     return (low, high) if low < high else (0.0, high or np.pi)

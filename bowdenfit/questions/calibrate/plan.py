@@ -23,8 +23,8 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError, UsageError, suggest_name
 from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.inputs import read_toml_file
-from bowdenfit.kinds import each_table
-from bowdenfit.kinds.terms import measured_kinds
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.terms import iterate_term_kinds
 from bowdenfit.model import build_model
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.questions.calibrate.answer import QuantityLabel
@@ -115,7 +115,7 @@ def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
         DescriptionError, DatasetError, UsageError: It cannot; says why.
     """
     stated, assumed = plan.stated.description, plan.assumed.description
-    for kind, table in measured_kinds(plan.stated.measurements):
+    for kind, table in iterate_term_kinds(plan.stated.measurements):
         kind.check_drawable(stated, table)
     if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
         raise DescriptionError(
@@ -136,7 +136,7 @@ def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
 
 
 def _kinds(dataset: Dataset) -> list[str]:
-    return [kind.name for kind, _ in each_table(dataset.measurements)]
+    return [kind.name for kind, _ in iterate_tables(dataset.measurements)]
 
 
 def read_truths(path: Path) -> dict[str, Any]:

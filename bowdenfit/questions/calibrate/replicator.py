@@ -30,9 +30,9 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.scalar_priors import z_at
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.terms import Readings, drawn_readings, drawn_tables, slipped
+from bowdenfit.kinds.terms import Readings, any_slipped, draw_readings, iterate_replaced_tables
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.calibrate.plan import CalibrationPlan
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication, rank_truth
@@ -101,7 +101,7 @@ def why_implausible(measured: Dataset, simulated: Dataset) -> str:
     """
     reasons = (
         kind.why_implausible(measured.measurements.table(kind.table), table)
-        for kind, table in each_table(simulated.measurements)
+        for kind, table in iterate_tables(simulated.measurements)
     )
     return next((reason for reason in reasons if reason), "")
 
@@ -159,7 +159,7 @@ class Replicator:
 
         def readings(z: jax.Array, words: jax.Array) -> Any:
             values = model.space.constrain(z)
-            return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(words))
+            return draw_readings(model.cable, tables, values, jax.random.wrap_key_data(words))
 
         words = jax.ShapeDtypeStruct((2,), jnp.uint32)
         return compile_program(readings, jax.ShapeDtypeStruct((model.space.size,), jnp.float64), words)
@@ -237,11 +237,11 @@ class Replicator:
 
     def _tables_or_reason(self, readings: Readings) -> tuple[tuple[Any, ...], str]:
         """Return tables with simulated readings, and why no bench would hand them in: empty if one might."""
-        if slipped(readings):
+        if any_slipped(readings):
             return (), "held readings would have slipped"
         stated, tables = self.plan.stated, list[Any]()
         try:
-            for table in drawn_tables(stated.description, stated.measurements, readings):
+            for table in iterate_replaced_tables(stated.description, stated.measurements, readings):
                 why = self.why_implausible(stated, Dataset(stated.description, Measurements((table,)), {}))
                 if why:
                     return (), why

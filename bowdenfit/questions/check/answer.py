@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Rows, Several
 from bowdenfit.inference.prior_sensitivity import PriorConflict, Sensitivity, find_prior_conflicts, rescale_prior
-from bowdenfit.kinds.places import places_of
+from bowdenfit.kinds.covariates import collect_covariates
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.evidence import CheckFindings, CheckInputs, TableDraws, TableLoo, compute_findings
 from bowdenfit.questions.check.suspects import refit_influential_outliers
@@ -127,7 +127,7 @@ def _weakly_identified_noise(fit: Record) -> dict[str, tuple[int, int]]:
 
 def _checked_table(fit: Record, term: Term, loo: TableLoo) -> TableChecks:
     reading, at_most = readings_of(term)
-    positions = places_of(fit.dataset.description, fit.dataset.measurements, term)
+    positions = collect_covariates(fit.dataset.description, fit.dataset.measurements, term)
     return TableChecks(
         term.name, term.unit, term.labels, reading, at_most, loo.predicted, positions, loo.pit, loo.uniformity,
         np.zeros(len(reading), dtype=bool),

@@ -5,7 +5,7 @@ import numpy as np
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.fit_command import FitCommand
-from bowdenfit.kinds.recordings.kind import recordings_text
+from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.questions.check.file_words import describe_commands
 from bowdenfit.questions.check.row_words import describe_row_account
 from bowdenfit.recordings.recording import Recordings
@@ -48,7 +48,7 @@ def describe_recording_file(
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
     lines = [filled(title), "", listing, *more, "", *_first_and_last_samples(file), *account, *notes]
     if recordings is not None:
-        lines += ["", *recordings_text(recordings)]
+        lines += ["", *describe_preparations(recordings)]
         lines += [
             filled(f"Note: {remark}") for r in recordings.items for remark in (*r.account.remarks, *r.strokes.remarks)
         ]

@@ -83,13 +83,13 @@ def checked_tables(checks: Checks) -> tuple[CheckedTable, ...]:
 
 
 def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
-    from bowdenfit.kinds import readings_called
+    from bowdenfit.kinds import find_readings
 
     uniformity, off, low, high = table.uniformity, *[np.zeros(0)] * 3
     if uniformity is not None:
         off, low, high = (part - uniformity.at for part in (uniformity.share, uniformity.low, uniformity.high))
     return CheckedTable(
-        readings_called(table.table).words,
+        find_readings(table.table).words,
         table.z_score,
         dict(list(table.positions.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
         table.positions.group,

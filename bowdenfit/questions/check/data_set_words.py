@@ -4,8 +4,8 @@ import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
-from bowdenfit.kinds import each_table
-from bowdenfit.kinds.descriptions import measured_groups
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.tables import Measurements, StretchTable
 from bowdenfit.questions.check.copied import describe_copied_readings
@@ -42,7 +42,7 @@ def describe_data_set(dataset: Dataset) -> str:
     ]
     lines += ["", "Measurements:"]
     sections: list[str] = []
-    for kind, table in each_table(measurements):
+    for kind, table in iterate_tables(measurements):
         described = [kept_narrow(line, "  ") for line in kind.describe(table, description)]
         if kind.heading:
             sections += ["", f"{kind.heading}:", *described]
@@ -66,7 +66,7 @@ def _groups_note(dataset: Dataset, coefficient: str) -> str:
     contacts = [c for c in dataset.description.contact if c.friction == coefficient]
     if not (dataset.description.by_group and contacts[0].by_group):
         return ""
-    return f"; one for each of the groups {listed(measured_groups(dataset.description, dataset.measurements))}"
+    return f"; one for each of the groups {listed(order_groups(dataset.description, dataset.measurements))}"
 
 
 def warnings_of(dataset: Dataset) -> list[str]:
@@ -89,7 +89,7 @@ def warnings_of(dataset: Dataset) -> list[str]:
             f"{len(free)} friction coefficients are to be found from {conditions} different "
             f"condition{'s' if conditions > 1 else ''}; what these do not determine will rest on the priors."
         )
-    for kind, table in each_table(measurements):
+    for kind, table in iterate_tables(measurements):
         warnings += kind.warnings(table, description, measurements)
     if "wrap_angle" in description.preload.model_fields_set and not description.preload_follows_stretch:
         warnings.append(
@@ -102,7 +102,7 @@ def warnings_of(dataset: Dataset) -> list[str]:
 def _count_conditions(measurements: Measurements) -> int:
     """Number of different wrap-angle conditions under which force was measured."""
     rows = []
-    for kind, table in each_table(measurements):
+    for kind, table in iterate_tables(measurements):
         if isinstance(kind, FrictionKind):
             conditions = kind.conditions(table)
             rows += [

@@ -7,9 +7,9 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.matching import Quantity, find_candidates
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.file_kind import FileKind, columns_of_kind
-from bowdenfit.kinds.fit_command import FitCommand, columns_of
+from bowdenfit.kinds.fit_command import FitCommand, list_number_columns
 from bowdenfit.questions.check.row_words import describe_first_and_last_rows, describe_row_account
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
 
@@ -78,7 +78,7 @@ def wrap_command(command: str) -> str:
 
 
 def _kind_in_words(raw: RawTable, data: Dataset | None) -> str:
-    for kind, table in each_table(data.measurements) if data else ():
+    for kind, table in iterate_tables(data.measurements) if data else ():
         return kind.describe_single_file(table)
     return f"a table of {counted(len(raw.rows), 'row')}"
 
@@ -90,7 +90,7 @@ def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[st
     for quantity, columns in can_be.items():
         for candidate in columns:
             read_as[raw.header[candidate.position]] = quantity if len(columns) == 1 else f"{quantity}?"
-    numbers = {candidate.name: candidate for candidate in columns_of(raw)}
+    numbers = {candidate.name: candidate for candidate in list_number_columns(raw)}
     rows = []
     for heading, below in zip(raw.header, raw.units, strict=True):
         if heading:

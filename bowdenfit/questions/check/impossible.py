@@ -3,7 +3,7 @@
 import numpy as np
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.priors import LogNormal
@@ -18,7 +18,7 @@ def describe_impossible_efficiencies(fit: Record) -> str:
     """Describe efficiencies above 1 and above the prediction, beyond noise; empty where there are none."""
     impossible = []
     for term in fit.model.terms:
-        called = readings_called(term.name)
+        called = find_readings(term.name)
         if not called.are_efficiencies:
             continue
         measured, predicted = term.observed(), _predicted(fit, term)

@@ -6,7 +6,7 @@ from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.lack_of_fit import FALSE_ALARM, Departure
-from bowdenfit.kinds import reading_called, readings_called
+from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.parameters.priors import Normal
@@ -66,7 +66,7 @@ def _describe_far_readings(fit: Record, noise: str) -> tuple[str, ...]:
     far = fit.least_squares.far_readings
     if not far or fit.sampled is not None or noise == "student":
         return ()
-    return (_far_reading_sentence([reading_called(each.table, each.label) for each in far]),)
+    return (_far_reading_sentence([describe_reading(each.table, each.label) for each in far]),)
 
 
 def _far_reading_sentence(names: Sequence[str]) -> str:
@@ -81,7 +81,7 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     """'The model does not describe ...: the loss is 12 % larger ... What to do.'"""
     if departure.against == ZERO:
         return _describe_drift(departure)
-    readings = readings_called(departure.table)
+    readings = find_readings(departure.table)
     what = _readable_column(departure.group) if departure.group else readings.words
     read = "the loss" if readings.are_efficiencies else "what was read"
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
@@ -96,7 +96,7 @@ def _describe_drift(departure: Departure) -> str:
     """Describe a zero that drifts."""
     far = significant(departure.moved or 0.0, 2)
     return (
-        f"The model does not describe {readings_called(departure.table).words}: the zero of the output drifts, by about "
+        f"The model does not describe {find_readings(departure.table).words}: the zero of the output drifts, by about "
         f"{significant(abs(departure.high - departure.low), 2)} N from the start of a recording to its end (or that of the "
         f"input, the other way), which moves a coefficient by {far} of the half width of its interval; chance "
         f"does as much in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; leave out the "
@@ -136,7 +136,7 @@ def _where_low_and_high(departure: Departure, groups: Sequence[str]) -> tuple[st
 
 def _suggest_remedy(fit: Record, departure: Departure) -> str:
     """Suggest what to do about a departure."""
-    model, losses = fit.dataset.description.friction_model, readings_called(departure.table).are_efficiencies
+    model, losses = fit.dataset.description.friction_model, find_readings(departure.table).are_efficiencies
     if departure.group:
         return _suggest_curve(fit, departure.group)
     if departure.against == LOAD and losses:
@@ -203,12 +203,12 @@ def _describe_scatter(checks: Checks, noise: str) -> tuple[str, ...]:
         outside = table.measured - table.in_interval
         if outside and bdtrc(outside - 1, table.measured, 1 - _INTERVAL) * len(checks.tables) < FALSE_ALARM:
             sentences.append(
-                f"The model does not describe {readings_called(table.table).words}: {outside} of {table.measured} lie outside "
+                f"The model does not describe {find_readings(table.table).words}: {outside} of {table.measured} lie outside "
                 "their 90 % intervals. The usual causes are a unit or a column that is not what its heading says, labels of "
                 "runs that belong to several mountings, and noise that was stated too small."
             )
     n_readings = len(checks.readings)
     far = [r for r in checks.outliers if r.p_value * n_readings < FALSE_ALARM]
     if far and noise == "normal":
-        sentences.append(_far_reading_sentence([reading_called(r.table, r.label) for r in far]))
+        sentences.append(_far_reading_sentence([describe_reading(r.table, r.label) for r in far]))
     return tuple(sentences)

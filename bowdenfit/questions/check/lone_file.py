@@ -15,14 +15,14 @@ from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.naming import parse_sources
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.file_kind import FileKind, file_kind
+from bowdenfit.kinds.file_kind import FileKind, guess_file_kind
 from bowdenfit.kinds.fit_command import (
     FitCommand,
     HeadedColumn,
-    either,
     has_own_angles,
-    recording_command,
-    table_command,
+    make_both_commands,
+    make_recording_command,
+    make_table_command,
 )
 from bowdenfit.questions.check.channels_words import describe_recording_file
 from bowdenfit.questions.check.file_words import describe_table_file
@@ -46,14 +46,14 @@ def describe_single_file(path: Path, reading: Reading, check: Callable[..., Data
         BowdenfitError: The file cannot be read, or not with these keywords.
     """
     channels, named = reading.get("channels", ()), parse_sources(reading.get("columns", ()), "--column")
-    file = file_kind(path, bool(channels), tuple(named))
+    file = guess_file_kind(path, bool(channels), tuple(named))
     if KINDS[file.kind].takes_channels and not file.other:
         return _describe_recording(path, file, channels)
     raw = read_table(path)
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if file.other:
-        return describe_table_file(raw, file, either(path, raw, file), None, "", headings), True
-    command = table_command(path, raw, file.kind, named)
+        return describe_table_file(raw, file, make_both_commands(path, raw, file), None, "", headings), True
+    command = make_table_command(path, raw, file.kind, named)
     has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
     strict = any(reading.values()) and not command.names_more
     angle = None if has_angles or "wrap_angle=" in command.text else _ANY_ANGLE
@@ -106,7 +106,7 @@ def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str]) -
     headed = [
         HeadedColumn(each.name, each.unit, float(each.values[each.values == each.values].mean())) for each in signals
     ]
-    return recording_command(path, headed, any(each.time is not None for each in signals), parse_channels(channels))
+    return make_recording_command(path, headed, any(each.time is not None for each in signals), parse_channels(channels))
 
 
 def channels_of(path: str | Path, channels: Sequence[str] = ()) -> tuple[ChannelFile, Recordings | None, str]:

@@ -11,8 +11,8 @@ from jax import Array
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.places import places_of
+from bowdenfit.kinds import find_readings
+from bowdenfit.kinds.covariates import collect_covariates
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check.answer import readings_of
@@ -110,11 +110,11 @@ def _quantiles(draws: np.ndarray) -> np.ndarray:
 
 def _prior_table(dataset: Dataset, term: Term, draws: np.ndarray) -> PriorTable:
     """One table's readings beside their quantiles; a reading that is only a bound is outside where it is too low for them."""
-    naming = readings_called(term.name)
+    naming = find_readings(term.name)
     scale, (reading, at_most) = naming.shown_scale, readings_of(term)
     quantiles, reading = scale * _quantiles(draws), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
-    positions = places_of(dataset.description, dataset.measurements, term)
+    positions = collect_covariates(dataset.description, dataset.measurements, term)
     label, numbers = next(iter(positions.numbers.items()))
     return PriorTable(
         naming.words, naming.axis, numbers, label, positions.group,

@@ -2,7 +2,7 @@
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.words import filled, kept_narrow
 
 
@@ -30,12 +30,12 @@ def describe_row_account(account: RowAccount, file: str = "") -> list[str]:
 def describe_first_and_last_rows(data: Dataset) -> list[str]:
     """The first and the last row of each table as understood."""
     lines = []
-    for kind, table in each_table(data.measurements):
+    for kind, table in iterate_tables(data.measurements):
         page = kind.file_rows(table, data.description)
         if page is None:
             continue
         heads, rows = page
         for which, i in (("First", 0), ("Last", -1)):
             cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
-            lines.append(filled(f"{which} row, {table.origin.place(i)}: {cells}."))
+            lines.append(filled(f"{which} row, {table.origin.describe_row(i)}: {cells}."))
     return lines

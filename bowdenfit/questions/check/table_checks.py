@@ -8,7 +8,7 @@ import numpy as np
 from bowdenfit.display import Part
 from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
-from bowdenfit.kinds.places import Places
+from bowdenfit.kinds.covariates import Covariates
 
 _MIN_DEGREES_OF_FREEDOM = (
     5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
@@ -90,7 +90,7 @@ class TableChecks(Part):
     reading: np.ndarray
     at_most: np.ndarray
     predicted: LooPredictive
-    positions: Places
+    positions: Covariates
     pit: np.ndarray
     uniformity: Uniformity | None
     refitted: np.ndarray

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bowdenfit.kinds import each_table, kind_of
-from bowdenfit.kinds.plausibility import Coarse
+from bowdenfit.kinds import find_kind, iterate_tables
+from bowdenfit.kinds.plausibility import CoarseReadings
 from bowdenfit.kinds.term import Term
 from bowdenfit.results.record import Record
 from bowdenfit.words import percent
@@ -21,9 +21,9 @@ def describe_coarse_readings(fit: Record) -> tuple[str, ...]:
         return ()
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
     sentences = []
-    for kind, table in each_table(fit.dataset.measurements):
+    for kind, table in iterate_tables(fit.dataset.measurements):
         coarse = kind.coarse_readings(table)
-        terms = [term for term in fit.model.terms if kind_of(term.name) is kind and term.name in fit.posterior.expected]
+        terms = [term for term in fit.model.terms if find_kind(term.name) is kind and term.name in fit.posterior.expected]
         if coarse is None or not terms:
             continue
         left_open = coarse.log_sd * np.sqrt(min(coefficients / coarse.different, 1.0))
@@ -40,7 +40,7 @@ def _log_sd(fit: Record, term: Term) -> float:
     return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
 
 
-def _coarse_sentence(coarse: Coarse, term: Term) -> str:
+def _coarse_sentence(coarse: CoarseReadings, term: Term) -> str:
     noise = getattr(term, "reading_noise", "")
     stated = (
         f"[prior.{noise}] fixed = {coarse.sd:.2g} in cable.toml"

@@ -2,7 +2,7 @@
 
 from math import isfinite
 
-from bowdenfit.kinds import reading_called, readings_called
+from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import Checks
 from bowdenfit.questions.check.sensitivity_words import describe_prior_influence
 from bowdenfit.questions.check.table_checks import CheckedReading
@@ -50,7 +50,7 @@ def checks_page(checks: Checks) -> str:
 
 def _name(reading: CheckedReading) -> str:
     """A reading in words."""
-    return reading_called(reading.table, reading.label)
+    return describe_reading(reading.table, reading.label)
 
 
 def describe_misfits(checks: Checks) -> list[str]:
@@ -59,7 +59,7 @@ def describe_misfits(checks: Checks) -> list[str]:
     Args:
         checks: The checks.
     """
-    return [f"the readings of {readings_called(t.table).words} {t.misfit}" for t in checks.tables if t.misfit]
+    return [f"the readings of {find_readings(t.table).words} {t.misfit}" for t in checks.tables if t.misfit]
 
 
 def _describe_coverage(checks: Checks) -> str:
@@ -100,7 +100,7 @@ def _describe_reading(reading: CheckedReading) -> str:
 
 def value_with_unit(reading: CheckedReading, value: float) -> str:
     """A value of a reading's kind with its unit."""
-    if readings_called(reading.table).are_efficiencies:
+    if find_readings(reading.table).are_efficiencies:
         return f"{100 * value:z.{decimals(100 * reading.sd)}f} %"
     unit = "" if reading.unit == "1" else f" {reading.unit}"
     return f"{value:z.{decimals(reading.sd)}f}{unit}"

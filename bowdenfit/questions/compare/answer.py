@@ -15,9 +15,9 @@ from bowdenfit.inference.comparison import ElpdDifference, LooPrediction, compar
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.leave_one_out import LooDensity, leave_one_out
 from bowdenfit.inference.log_density import LogDensity as Density
-from bowdenfit.kinds import readings_called
+from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.run_parts import LeaveOut, RunParts
-from bowdenfit.kinds.terms import measured_kinds
+from bowdenfit.kinds.terms import iterate_term_kinds
 from bowdenfit.questions.compare.common_readings import (
     CommonReadings,
     OmittedReadings,
@@ -111,7 +111,7 @@ class Comparison(Display):
     @property
     def counts_runs(self) -> bool:
         """Whether some of the readings are whole runs."""
-        return self.left_out == "run" and any(readings_called(table).are_runs for table, _ in self.readings)
+        return self.left_out == "run" and any(find_readings(table).are_runs for table, _ in self.readings)
 
     def pointwise(self, name: str) -> np.ndarray:
         """Return how much worse a fit predicts each reading than the best one does."""
@@ -262,7 +262,7 @@ def _describe_fit(fit: Record) -> str:
         parts.append(f"{description.geometry} geometry")
     parts += [description.noise_in_words] if description.noise != "normal" else []
     parts += [
-        choice for kind, _ in measured_kinds(fit.dataset.measurements) if (choice := kind.describe_choice(description))
+        choice for kind, _ in iterate_term_kinds(fit.dataset.measurements) if (choice := kind.describe_choice(description))
     ]
     without_runs = [p for p in fit.model.space.fixed if p.name == RUN_SCATTER and p.fixed == 0.0]
     fixed = [p.name for p in fit.model.space.fixed if p not in without_runs]

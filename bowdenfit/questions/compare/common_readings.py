@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from bowdenfit.errors import UsageError
-from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, run_parts
-from bowdenfit.kinds.terms import term_kind
+from bowdenfit.kinds import find_readings
+from bowdenfit.kinds.run_parts import LeaveOut, RunParts, has_rows, split_runs
+from bowdenfit.kinds.terms import find_term_kind
 from bowdenfit.results.record import Record
 
 _FEW_RUNS = 5  # below which they are left out in parts, because little predicts a whole one; a judgement
@@ -88,7 +88,7 @@ def find_common_readings(fits: Mapping[str, Record], parts: Mapping[str, Mapping
     if len(common.readings) < 2:
         table, label = common.readings[0]
         raise UsageError(
-            f"{', '.join(fits)} have one reading in common, {label} of {readings_called(table).words}, and nothing predicts it "
+            f"{', '.join(fits)} have one reading in common, {label} of {find_readings(table).words}, and nothing predicts it "
             "once it is left out; read the same run at several loads, or mount the cable a second time."
         )
     return common
@@ -112,14 +112,14 @@ def choose_parts(
 
 def _run_parts(fit: Record, unit: LeaveOut) -> dict[str, RunParts]:
     """Return the parts of the runs of every table that has some."""
-    parts = {term.name: run_parts(term, unit) for term in fit.model.terms}
+    parts = {term.name: split_runs(term, unit) for term in fit.model.terms}
     return {name: parts for name, parts in parts.items() if parts is not None}
 
 
 def _input_files(fit: Record) -> tuple[list[tuple[str, str]], list[tuple[str, tuple[str, ...]]]]:
     """Return files that were read, description aside, with their checksums; and the readings that they leave no choice of."""
     files = sorted((file, digest) for file, digest in fit.dataset.sha256.items() if not file.endswith(".toml"))
-    return files, [(term.name, term.labels) for term in fit.model.terms if not term_kind(term.name).chooses_rows]
+    return files, [(term.name, term.labels) for term in fit.model.terms if not find_term_kind(term.name).chooses_rows]
 
 
 def match_events(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, RunParts]]) -> CommonReadings:
@@ -143,7 +143,7 @@ def match_events(fits: Mapping[str, Record], parts: Mapping[str, Mapping[str, Ru
         tuple((table, label) for table, label, _ in shared),
         {name: tuple(positions[name][key] for key in shared) for name in events},
         tuple(
-            OmittedReadings(table, some, most, term_kind(table).why_events_differ(table, descriptions))
+            OmittedReadings(table, some, most, find_term_kind(table).why_events_differ(table, descriptions))
             for table, (some, most) in counts.items()
             if some < most
         ),
@@ -159,7 +159,7 @@ def _collect_events(fit: Record, parts: Mapping[str, RunParts]) -> dict[Key, np.
     events: dict[Key, np.ndarray] = {}
     for term in fit.model.terms:
         in_parts = parts.get(term.name)
-        values = in_parts.said if in_parts else term_kind(term.name).events(term, fit.dataset.description)
+        values = in_parts.event_keys if in_parts else find_term_kind(term.name).events(term, fit.dataset.description)
         for label, event in zip((in_parts or term).labels, values, strict=True):
             earlier = sum(key[:2] == (term.name, label) for key in events)
             events[term.name, label, earlier] = event

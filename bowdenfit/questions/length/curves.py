@@ -5,8 +5,8 @@ import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function
-from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.places import route_values
+from bowdenfit.kinds import find_readings
+from bowdenfit.kinds.covariates import route_values
 from bowdenfit.plots.curves import BAND_QUANTILES, Band
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
 from bowdenfit.results.along_route import route_grid
@@ -47,7 +47,7 @@ def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
     """Every measured efficiency, by table."""
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
-        reading_kind, position = readings_called(term.name), route_values(term)
+        reading_kind, position = find_readings(term.name), route_values(term)
         if not reading_kind.are_efficiencies:
             continue
         if route is None or position is None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Situation
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
@@ -33,7 +33,7 @@ def list_candidates(fit: Record) -> tuple[Candidate, ...]:
     """
     candidates = _suitable_candidates(fit)
     if not candidates:
-        names = [kind.name for kind, _ in each_table(fit.dataset.measurements)]
+        names = [kind.name for kind, _ in iterate_tables(fit.dataset.measurements)]
         raise UsageError(
             f"the next reading of this fit's tables ({listed(names)}) cannot be simulated yet; {_suggest_alternative(fit)}."
         )
@@ -82,13 +82,13 @@ def why_unsuitable(fit: Record, candidate: Candidate) -> str:
         return reason
     low, high = route.range
     stands_in = (
-        situation.angles is not None and not kind.tells_curves and candidate.route in situation.angles.route.tolist()
+        situation.angles is not None and not kind.measures_curves and candidate.route in situation.angles.route.tolist()
     )
     if low <= candidate.route <= high or stands_in:
         return ""
     why = (
         "an angle there tells nothing of the curves"
-        if kind.tells_curves
+        if kind.measures_curves
         else "no angles were measured there that could stand in"
     )
     return (
@@ -106,7 +106,7 @@ def route_variable(fit: Record) -> str:
 def describe_candidate(fit: Record, candidate: Candidate) -> str:
     """Return a candidate in words, such as "the wrap angles at 450 mm"."""
     route = fit.dataset.description.route
-    what = candidate_kinds()[candidate.kind].measured(fit.model.cable)
+    what = candidate_kinds()[candidate.kind].describe_measurement(fit.model.cable)
     if route is not None and np.isfinite(candidate.route):
         what += f" at {candidate.route:g} {route.unit}"
     if candidate.angles:

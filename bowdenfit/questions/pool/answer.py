@@ -138,7 +138,7 @@ class Curves(Part):
 
 
 @dataclass(frozen=True, repr=False)
-class LeftOut(Part):
+class ExcludedFit(Part):
     """An inspection that is not pooled.
 
     Args:
@@ -180,7 +180,7 @@ class Pool(Display):
     name: str
     cables: tuple[PooledCable, ...]
     inspections: int
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[ExcludedFit, ...]
     coefficients: dict[str, Interval]
     typical: dict[str, Interval]
     spreads: dict[str, Interval]

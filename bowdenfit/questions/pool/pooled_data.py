@@ -14,7 +14,7 @@ from bowdenfit.inference.population.likelihoods import JointReadings, Summaries,
 from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
 from bowdenfit.inference.population.sampling import PopulationDraws
 from bowdenfit.questions.fleet.inspections import Case, read_cases, read_inspections
-from bowdenfit.questions.pool.answer import LeftOut
+from bowdenfit.questions.pool.answer import ExcludedFit
 from bowdenfit.reading import Reading
 from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import counted, few, listed
@@ -54,7 +54,7 @@ class PoolingData:
     labels: tuple[str, ...]
     cycles: np.ndarray
     reference_cycles: float
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[ExcludedFit, ...]
     notes: tuple[str, ...]
     inputs: tuple[str, ...]
     own_names: tuple[str, ...]
@@ -165,7 +165,7 @@ def _parse_log_prior(about: Mapping[str, str]) -> Any:
 
 def _select_usable(
     fleet: FleetDraws, values: Mapping[str, np.ndarray], notes: list[str]
-) -> tuple[np.ndarray, tuple[LeftOut, ...]]:
+) -> tuple[np.ndarray, tuple[ExcludedFit, ...]]:
     """Return a mask of the inspections that are pooled, and why the others are not."""
     trusted = fleet.stats["trusted"].astype(bool)
     has = np.any([np.isfinite(draws).all(axis=1) for draws in values.values()], axis=0)
@@ -173,11 +173,11 @@ def _select_usable(
     left = []
     for i, label in enumerate(fleet.label):
         if not trusted[i]:
-            left.append(LeftOut(label, "its fit must not be trusted"))
+            left.append(ExcludedFit(label, "its fit must not be trusted"))
         elif not has[i]:
-            left.append(LeftOut(label, "it has none of the coefficients that are pooled"))
+            left.append(ExcludedFit(label, "it has none of the coefficients that are pooled"))
         elif some and not dated[i]:
-            left.append(LeftOut(label, "nobody says after how many cycles it was made"))
+            left.append(ExcludedFit(label, "nobody says after how many cycles it was made"))
     kept = trusted & has & (dated if some else np.ones(len(has), dtype=bool))
     if left:
         named = few([inspection.inspection for inspection in left])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.results.record import Record
@@ -46,7 +46,7 @@ class MeasuredRange:
 def measured_range(fit: Record) -> MeasuredRange:
     """What the tables of a fit were measured at."""
     measurements, route = fit.dataset.measurements, fit.dataset.description.route
-    tables = list(each_table(measurements))
+    tables = list(iterate_tables(measurements))
     friction = [(kind, table) for kind, table in tables if isinstance(kind, FrictionKind)]
     lengths = [np.ravel(getattr(table, "route", ())) for kind, table in tables if not isinstance(kind, FrictionKind)]
     lengths += [kind.conditions(table).route for kind, table in friction]

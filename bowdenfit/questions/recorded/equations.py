@@ -12,9 +12,9 @@ from jaxtyping import Float
 from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.load_cells import LoadCells
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.recordings.blocks import beside
-from bowdenfit.kinds.recordings.reader import recorded_angles
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.recordings.blocks import pad_columns
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.recordings.preparation.input_smoothing import smooth_input
@@ -64,13 +64,13 @@ def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | Non
     chosen = list(zip(recordings.items, shown, strict=True))
     drive = LoopDrive if model.cable.is_loop else RopeDrive
     rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
-    rows = row_angles(model.description, recorded_angles(recordings), angles).data
+    rows = collect_row_angles(model.description, angles_of_recordings(recordings), angles).data
     held = {
-        name: beside([getattr(r.blocks, name)[s] for r, s in chosen])
+        name: pad_columns([getattr(r.blocks, name)[s] for r, s in chosen])
         for name in ("input_force", "output_force", "velocity")
     }
-    likely = beside([smooth_input(r.blocks.input_force)[s] for r, s in chosen])
-    return rows | held | {"likely_force": likely, "drift": beside(rates, "constant")}
+    likely = pad_columns([smooth_input(r.blocks.input_force)[s] for r, s in chosen])
+    return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant")}
 
 
 def _follow_function(model: Model) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.inference.draws import for_each_value
-from bowdenfit.kinds.recordings.reader import recorded_angles
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.questions.recorded.equations import choose_blocks
 from bowdenfit.recordings.recording import Recording, Recordings
@@ -41,7 +41,7 @@ def loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
 def _recording_angles(fit: Record, recordings: Recordings) -> np.ndarray:
     """Wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
     cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
-    measured = row_angles(cable.description, recorded_angles(recordings), angles).data
+    measured = collect_row_angles(cable.description, angles_of_recordings(recordings), angles).data
     middle = {name: np.median(draws, keepdims=True) for name, draws in parameter_values(fit).items()}
 
     def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:

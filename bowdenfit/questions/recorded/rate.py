@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
@@ -73,7 +73,7 @@ def rate_effect(fit: Record) -> RateEffect | None:
 
 def typical_speeds(fit: Record) -> tuple[float, float]:
     """The lowest and the highest typical speed of a recording or run, internal unit."""
-    friction = [(kind, table) for kind, table in each_table(fit.dataset.measurements) if isinstance(kind, FrictionKind)]
+    friction = [(kind, table) for kind, table in iterate_tables(fit.dataset.measurements) if isinstance(kind, FrictionKind)]
     speeds = [speed for kind, table in friction for speed in kind.typical_speeds(table)]
     return min(speeds), max(speeds)
 

@@ -21,7 +21,7 @@ from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.kinds.terms import drawn_readings, with_drawn_readings
+from bowdenfit.kinds.terms import draw_readings, replace_table_readings
 from bowdenfit.model import build_model
 from bowdenfit.questions.simulate.tables import (
     TRUTH_FILE,
@@ -141,7 +141,7 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
     worn = list(model.cable.coefficients)
 
     def readings(values: dict[str, jax.Array], key_words: jax.Array) -> Any:
-        return drawn_readings(model.cable, tables, values, jax.random.wrap_key_data(key_words), 1.0 if noise else 0.0)
+        return draw_readings(model.cable, tables, values, jax.random.wrap_key_data(key_words), 1.0 if noise else 0.0)
 
     value_shapes = {name: jax.ShapeDtypeStruct((), jnp.float64) for name in common}
     program = compile_program(readings, value_shapes, jax.ShapeDtypeStruct((2,), jnp.uint32), run_once=True)
@@ -158,7 +158,7 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
             change += fleet.per_degree * (temperature - fleet.reference_temperature)
             values = common | {k: float(np.exp(start[k] + change)) for k in worn}
             drawn = program(values, generator.integers(2**32, size=2, dtype=np.uint32))
-            dataset = Dataset(bench.description, with_drawn_readings(bench.description, tables, drawn), {})
+            dataset = Dataset(bench.description, replace_table_readings(bench.description, tables, drawn), {})
             displayed = {k: value * scale[k] for k, value in values.items()}
             inspections.append(SimulatedInspection(name, cycles, temperature, lubricated, displayed, dataset))
     return inspections, {"seed": seed, "population": fleet.model_dump() | {"truth": dict(bench.truth)}, "cables": truth}

@@ -20,13 +20,13 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inputs import read_toml_file
-from bowdenfit.kinds import KINDS, each_table
-from bowdenfit.kinds.angles.term import drawn_angles
+from bowdenfit.kinds import KINDS, iterate_tables
+from bowdenfit.kinds.angles.term import draw_angles
 from bowdenfit.kinds.descriptions import parse_description, read_design
 from bowdenfit.kinds.kind import Design, PlannedKind
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Truth
-from bowdenfit.kinds.terms import Readings, drawn_readings, with_drawn_readings
+from bowdenfit.kinds.terms import Readings, draw_readings, replace_table_readings
 from bowdenfit.model import build_model
 from bowdenfit.results.folder import fill_folder_atomically, write_text
 from bowdenfit.words import shown
@@ -174,7 +174,7 @@ def resimulate(
         table = angles
 
         def draw(named: Mapping[str, jax.Array], key: jax.Array) -> dict[str, jax.Array]:
-            return drawn_angles(table, Truth(cable, table, named, key, scale), everywhere=True)
+            return draw_angles(table, Truth(cable, table, named, key, scale), everywhere=True)
 
         beyond = {"angles": _evaluate(draw, named, key, run_once=run_once)}
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
@@ -183,7 +183,7 @@ def resimulate(
     tables = dataset.measurements
 
     def readings(named: Mapping[str, jax.Array], key: jax.Array) -> Readings:
-        return drawn_readings(cable, tables, named, key, scale)
+        return draw_readings(cable, tables, named, key, scale)
 
     return replace_readings(dataset, _evaluate(readings, named, key, run_once=run_once) | beyond)
 
@@ -232,12 +232,12 @@ def empty_tables(description: Description, design: Design) -> Measurements:
 
 
 def replace_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.Array]]) -> Dataset:
-    """Return the data set with what `drawn_readings` gave; checksums do not hold for it.
+    """Return the data set with what `draw_readings` gave; checksums do not hold for it.
 
     Raises:
         DatasetError: The strokes of a recording cannot be found.
     """
-    return Dataset(dataset.description, with_drawn_readings(dataset.description, dataset.measurements, readings), {})
+    return Dataset(dataset.description, replace_table_readings(dataset.description, dataset.measurements, readings), {})
 
 
 def _evaluate(function: Callable[..., Any], *arguments: Any, run_once: bool) -> Any:
@@ -273,7 +273,7 @@ def write_folder(folder: Path, cable: str, files: Mapping[str, str], truth: Mapp
 def table_texts(description: Description, measured: Measurements) -> dict[str, str]:
     """Return every table as the text of its file, by file name."""
     texts = {}
-    for kind, table in each_table(measured):
+    for kind, table in iterate_tables(measured):
         settings = description.tables.stated.get(kind.name)
         if settings and (page := kind.file_rows(table, description)):
             heads, rows = page

@@ -9,7 +9,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.files.matching import Quantity
 from bowdenfit.files.spellings import without_accents
-from bowdenfit.kinds.file_kind import stated_angle
+from bowdenfit.kinds.file_kind import find_stated_angle
 from bowdenfit.questions.start.measured_file import (
     FileColumn,
     MeasuredFile,
@@ -276,7 +276,7 @@ def _is_wrap_angle(file: MeasuredFile, column: FileColumn, asker: Asker) -> bool
 def _add_single_contact(measured_files: Sequence[MeasuredFile], layout: CableLayout, asker: Asker) -> None:
     """Add the contact of a cable of which no table has any; every recording may have its own."""
     recorded = [file for file in measured_files if file.kind and file.kind.takes_channels]
-    own_angles = [stated[0] for file in recorded if (stated := stated_angle(file.path))]
+    own_angles = [stated[0] for file in recorded if (stated := find_stated_angle(file.path))]
     apart = len(recorded) == len(own_angles) and len(set(own_angles)) > 1
     if apart or (
         len(recorded) > 1
@@ -285,7 +285,7 @@ def _add_single_contact(measured_files: Sequence[MeasuredFile], layout: CableLay
     ):
         layout.add_contact("cable", {"column": _WRAP_ANGLE})
         return
-    known = {stated[0] for file in measured_files if (stated := stated_angle(file.path))}
+    known = {stated[0] for file in measured_files if (stated := find_stated_angle(file.path))}
     default = next(iter(known)) if len(known) == 1 else None
     files = listed([file.name for file in measured_files])
     why = f"no column of {files} is a wrap angle; add one, such as wrap_angle_deg."

@@ -12,7 +12,7 @@ from typing import Any
 from bowdenfit.description import SCHEMA
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.file_kind import stated_angle
+from bowdenfit.kinds.file_kind import find_stated_angle
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.questions.start.cable_layout import CableLayout, find_layout
 from bowdenfit.questions.start.measured_file import (
@@ -162,7 +162,7 @@ def _recording_entries(
         if layout.route:
             entry["at"] = _ask_length(file, layout, asker)
         for name in [] if layout.route else angles:
-            stated = stated_angle(file.path)
+            stated = find_stated_angle(file.path)
             why = (
                 f"{file.name} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
             )

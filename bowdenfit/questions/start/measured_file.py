@@ -19,8 +19,8 @@ from bowdenfit.files.matching import Quantity, find_candidates, plain_name
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.file_kind import FORCES, FileKind, file_kind
-from bowdenfit.kinds.fit_command import columns_of
+from bowdenfit.kinds.file_kind import FORCES, FileKind, guess_file_kind
+from bowdenfit.kinds.fit_command import list_number_columns
 from bowdenfit.kinds.kind import Kind
 from bowdenfit.kinds.table_files import WantedColumn
 from bowdenfit.questions.start.question import Asker, choice_question, number_question, unit_question, yes_no_question
@@ -156,7 +156,7 @@ def inspect_file(path: Path) -> MeasuredFile:
     Raises:
         DatasetError: It cannot be read.
     """
-    detected = file_kind(path)
+    detected = guess_file_kind(path)
     if not detected.other and KINDS[detected.kind].takes_channels:
         return inspect_recording(path, detected.why)
     return _inspect_table(path, detected)
@@ -194,7 +194,7 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
     """Inspect a table: its columns, and the kind that their headings and units say."""
     table = read_table(path)
-    number_columns = {column.name: column for column in columns_of(table)}
+    number_columns = {column.name: column for column in list_number_columns(table)}
     columns = []
     for i, (heading, below) in enumerate(zip(table.header, table.units, strict=True)):
         if not heading or (names_time(heading) and not parse_heading(heading, below)):

@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 
-from bowdenfit.kinds import reading_called
+from bowdenfit.kinds import describe_reading
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
 from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
@@ -116,7 +116,7 @@ def say_no_outliers(readings: Sequence[CheckedReading]) -> str:
 
 def format_reading(reading: CheckedReading) -> tuple[str, str, str, str]:
     """A reading beside what all the others say of it, under `READING_HEADS`."""
-    name = reading_called(reading.table, reading.label)
+    name = describe_reading(reading.table, reading.label)
     measured, expected, low, high = (
         value_with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
     )

@@ -7,8 +7,8 @@ from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.load_cells import RUN_SCATTER
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import KINKED, Estimate
-from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.recordings.kind import recordings_text
+from bowdenfit.kinds import find_readings
+from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import checks_of
@@ -151,7 +151,7 @@ def _curve_family_lines(family: type[Curve], names: list[str], page: dict[str, A
 
 
 def _residual_sentence(page: dict[str, Any]) -> str:
-    deviations = [(readings_called(name), sd) for name, sd in page["least_squares"]["residual_sd"].items() if sd is not None]
+    deviations = [(find_readings(name), sd) for name, sd in page["least_squares"]["residual_sd"].items() if sd is not None]
     parts = [
         f"{called.name.replace('_', ' ')} {called.shown_scale * sd:.2f} {called.scatter_unit}"
         for called, sd in deviations
@@ -164,7 +164,7 @@ def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
     """The scatter from mounting to mounting, in words."""
     tau, runs = (
         page["parameters"].get(RUN_SCATTER, {}),
-        {r["label"] for r in page["measured"] if readings_called(r["table"]).are_runs},
+        {r["label"] for r in page["measured"] if find_readings(r["table"]).are_runs},
     )
     if "median" not in tau or not runs:
         return ""
@@ -185,7 +185,7 @@ def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
 
 def _recordings_block(fit: Record) -> str:
     recordings = fit.dataset.measurements.table(Recordings)
-    return "Recordings\n" + "\n".join(recordings_text(recordings)) if recordings is not None else ""
+    return "Recordings\n" + "\n".join(describe_preparations(recordings)) if recordings is not None else ""
 
 
 def _friction_model_block(fit: Record) -> str:
@@ -230,7 +230,7 @@ def _measured_block(fit: Record, page: dict[str, Any]) -> str:
     rows = []
     for row in page["measured"]:
         interval = [f"{percent(row['q05'], 2)} to {percent(row['q95'], 2)}"] if has_draws else []
-        what = "run " if readings_called(row["table"]).are_runs else ""
+        what = "run " if find_readings(row["table"]).are_runs else ""
         rows.append(
             [
                 what + row["label"],

@@ -10,7 +10,7 @@ from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.row_angles import resolve_angles, row_angles
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.questions.bends.curves import evaluate_curves, quantiles_of_draws
@@ -66,7 +66,7 @@ def _predict_forces(
 ) -> dict[str, np.ndarray]:
     """Law at each place, expected output of each row, and wrap angles, of some draws or of least squares alone."""
     cable, friction = fit.model.cable, fit.model.cable.friction
-    arrays = row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
+    arrays = collect_row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
     arrays |= {"group": group_numbers(friction.groups, table.group, len(table.run))}
     least, velocity = friction.conditions.least_force, table.velocity
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.kinds import each_table
-from bowdenfit.kinds.terms import term_kind
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.terms import find_term_kind
 from bowdenfit.pages.section import PageSection
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.summary.verdict import assess_fit
@@ -59,8 +59,8 @@ def methods_section(fit: Record) -> PageSection:
 def describe_counts(fit: Record) -> str:
     """What was fitted to: '17 wrap angles and 4 efficiencies'."""
     description, tables = fit.dataset.description, fit.dataset.measurements
-    entered = [term_kind(term.name).count_readings(term, description) for term in fit.model.terms]
-    read = [kind.count_readings(table) for kind, table in each_table(tables)]
+    entered = [find_term_kind(term.name).count_readings(term, description) for term in fit.model.terms]
+    read = [kind.count_readings(table) for kind, table in iterate_tables(tables)]
     return listed([count for count in (*entered, *read) if count])
 
 
@@ -89,7 +89,7 @@ def _model_sentences(fit: Record) -> str:
         + (f" (friction model {description.friction_model})" if description.friction_model != "capstan" else "")
         + (f"; {description.geometry} geometry" if description.curved else "")
         + ".",
-        *(kind.methods_sentence for kind, _ in each_table(fit.dataset.measurements)),
+        *(kind.methods_sentence for kind, _ in iterate_tables(fit.dataset.measurements)),
         f"Readings scattered with {description.noise_in_words}.",
     ]
     return " ".join(dict.fromkeys(filter(None, sentences)))

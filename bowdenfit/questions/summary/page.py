@@ -10,8 +10,8 @@ from bowdenfit.inference.diagnostics import describe_convergence_shortfalls
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommend_sampler
-from bowdenfit.kinds import readings_called
-from bowdenfit.kinds.recordings.kind import preparation_pages
+from bowdenfit.kinds import find_readings
+from bowdenfit.kinds.recordings.kind import list_preparations
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
 from bowdenfit.questions.check.answer import checks_of
@@ -83,7 +83,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         "versions": dict(fit.provenance.versions),
     }
     if (recordings := fit.dataset.measurements.table(Recordings)) is not None:
-        page["recordings"] = preparation_pages(recordings)
+        page["recordings"] = list_preparations(recordings)
     if elastic := elastic_overview(fit):
         page["elastic"] = elastic
     if groups := contrast_groups(fit):
@@ -186,7 +186,7 @@ def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
     """
     rows = []
     for term in fit.model.terms:
-        if not readings_called(term.name).are_efficiencies:
+        if not find_readings(term.name).are_efficiencies:
             continue
         observed, forces = term.observed(), _input_forces(fit, term)
         for i, label in enumerate(term.labels):

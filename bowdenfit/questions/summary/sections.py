@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bowdenfit.kinds import each_table
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.words import describe_checks
@@ -47,7 +47,7 @@ def answer_section(fit: Record) -> PageSection:
 def measured_section(fit: Record) -> PageSection:
     """Every table, as `bowdenfit check` has it."""
     data = fit.dataset
-    described = [(kind, kind.describe(table, data.description)) for kind, table in each_table(data.measurements)]
+    described = [(kind, kind.describe(table, data.description)) for kind, table in iterate_tables(data.measurements)]
     items = [line for kind, lines in described if not kind.heading for line in lines]
     longer = [(kind.heading, "\n".join(lines)) for kind, lines in described if kind.heading]
     return prose_section(

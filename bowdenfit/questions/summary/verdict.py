@@ -5,7 +5,7 @@ from typing import Any
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
-from bowdenfit.kinds import reading_called, readings_called
+from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import checks_of
 from bowdenfit.questions.check.copied import describe_copied_readings
 from bowdenfit.questions.check.impossible import describe_implausible_friction, describe_impossible_efficiencies
@@ -104,7 +104,7 @@ def _doubts(fit: Record) -> tuple[str, ...]:
     checks = checks_of(fit)
     if checks is None:
         return ()
-    outliers = [reading_called(reading.table, reading.label) for reading in checks.outliers]
+    outliers = [describe_reading(reading.table, reading.label) for reading in checks.outliers]
     sentences = [f"{few(outliers)} {'lies' if len(outliers) == 1 else 'lie'} far from what the others say"] if outliers else []
     return (*sentences, *describe_misfits(checks))
 
@@ -173,7 +173,7 @@ def suggest_next_step(fit: Record) -> str:
 
 
 def _reading_name(reading: CheckedReading) -> str:
-    return reading_called(reading.table, reading.label)
+    return describe_reading(reading.table, reading.label)
 
 
 def interval_width_caveat(fit: Record) -> str:
@@ -219,7 +219,7 @@ def describe_contradiction(fit: Record) -> str:
         return ""
     unit, digits = _unit(fit, worst), decimals(worst.others_sd)
     name, *others = (
-        readings_called(d.table).table
+        find_readings(d.table).table
         for d in (worst, *(d for d in fit.least_squares.disagreements if d is not worst))
         if d.conflict > _COMPARABLE * worst.conflict
     )

@@ -8,18 +8,18 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.display import Part
-from bowdenfit.kinds import kind_of
+from bowdenfit.kinds import find_kind
 from bowdenfit.kinds.sliding_rows import STROKE as STROKE
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.term import WRAP_ANGLE, Term
-from bowdenfit.kinds.terms import term_kind
+from bowdenfit.kinds.terms import find_term_kind
 
 RUN = "Run"
 _ONE_PLACE = 0.02  # of all route values or wrap angles, within which those of a run are one
 
 
 @dataclass(frozen=True, repr=False)
-class Places(Part):
+class Covariates(Part):
     """Where the readings of one table were taken.
 
     Args:
@@ -35,7 +35,7 @@ class Places(Part):
     inside: np.ndarray
 
 
-def places_of(description: Description, measurements: Measurements, term: Term) -> Places:
+def collect_covariates(description: Description, measurements: Measurements, term: Term) -> Covariates:
     """Where the readings of a term were taken; numbered in their order where nothing else is known.
 
     Args:
@@ -44,8 +44,8 @@ def places_of(description: Description, measurements: Measurements, term: Term) 
         term: One table of its model.
     """
     n, route = len(term.labels), description.route
-    numbers, back = _of_kind(measurements, term)
-    bends = _bends(term)
+    numbers, back = _covariates_of_kind(measurements, term)
+    bends = _mean_wrap_angles(term)
     if bends is not None:
         numbers = {WRAP_ANGLE: bends, **numbers}
     at = route_values(term)
@@ -54,21 +54,21 @@ def places_of(description: Description, measurements: Measurements, term: Term) 
         numbers = {route.label: at, **numbers}
         inside = (at >= route.range[0]) & (at <= route.range[1])
     varying = {label: values for label, values in numbers.items() if len(np.unique(values)) > 1}
-    return Places(varying or {RUN: np.arange(1.0, n + 1)}, _groups(term), back, inside)
+    return Covariates(varying or {RUN: np.arange(1.0, n + 1)}, _columns_of_angles(term), back, inside)
 
 
-def _of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
+def _covariates_of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
     """Loads and wrap angles of the tables that have them."""
-    kind = kind_of(term.name)
+    kind = find_kind(term.name)
     table = measurements.table(kind.table) if kind is not None else None
     if table is None:
         return {}, np.zeros(len(term.labels), dtype=bool)
-    terms = term_kind(term.name)
+    terms = find_term_kind(term.name)
     back = terms.on_way_back(table)
-    return terms.places(table, term), np.zeros(len(term.labels), dtype=bool) if back is None else back
+    return terms.covariates(table, term), np.zeros(len(term.labels), dtype=bool) if back is None else back
 
 
-def _bends(term: Term) -> np.ndarray | None:
+def _mean_wrap_angles(term: Term) -> np.ndarray | None:
     """Total of the measured wrap angles of each reading or run [deg]; None where curves tell them, or a run has several."""
     rows = getattr(term, "rows", None)
     at = term.data if rows is None else rows.angles
@@ -94,7 +94,7 @@ def route_values(term: Term) -> np.ndarray | None:
     if at is None:
         return None
     if isinstance(at, Mapping):
-        return _flat(at)[data["order"]]
+        return _concatenate_curves(at)[data["order"]]
     values = np.asarray(at, dtype=float)
     if "run" not in data:
         return values if len(values) == n else None
@@ -102,11 +102,11 @@ def route_values(term: Term) -> np.ndarray | None:
     return np.array([at_run.mean() if np.ptp(at_run) <= _ONE_PLACE * np.ptp(values) else np.nan for at_run in of_run])
 
 
-def _flat(by_curve: Mapping[str, Any]) -> np.ndarray:
+def _concatenate_curves(by_curve: Mapping[str, Any]) -> np.ndarray:
     return np.concatenate([np.asarray(values, dtype=float) for values in by_curve.values()])
 
 
-def _groups(term: Term) -> tuple[str, ...]:
+def _columns_of_angles(term: Term) -> tuple[str, ...]:
     """The column of each angle reading; nothing of other tables."""
     at = term.data.get("route")
     if not isinstance(at, Mapping):

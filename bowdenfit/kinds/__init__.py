@@ -56,12 +56,12 @@ def iterate_tables(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]
 
 
 def find_kind(readings: str) -> Kind[Any] | None:
-    """Return the kind whose readings have a name in results; None if none has."""
+    """Return the kind that has readings of this name; None if none has."""
     return next((kind for kind in KINDS.values() if any(one.name == readings for one in kind.readings)), None)
 
 
 def find_readings(name: str) -> Readings:
-    """Return what readings of this name are called; by their name where no kind has such."""
+    """Return the words for readings of this name; the name itself where no kind has such."""
     kind = find_kind(name)
     return next(
         (one for one in (kind.readings if kind else ()) if one.name == name), Readings(name, name, name, "{}", name)
@@ -69,5 +69,5 @@ def find_readings(name: str) -> Readings:
 
 
 def describe_reading(name: str, label: str) -> str:
-    """Return what one of the readings of this name is called."""
+    """Return the words for one of the readings of this name."""
     return find_readings(name).one.format(label)

@@ -46,7 +46,7 @@ class Candidate:
 
     @property
     def _key(self) -> tuple[object, ...]:
-        """What makes two the same; NaN equals nothing, None does."""
+        """Fields by which two candidates are equal; None stands for NaN, which equals nothing."""
         route, load = (None if np.isnan(value) else value for value in (self.route, self.load))
         return self.kind, route, self.angles, load, self.stroke
 
@@ -82,7 +82,7 @@ class Situation:
         return [] if route is None else [float(at) for at in (route.choices or np.linspace(*route.range, GRID))]
 
     def along_cable(self, kind: str, own: OwnAngles | None) -> list[Candidate]:
-        """At each length, also those outside the range at which angles were read; without a route at angles measured before."""
+        """Return a candidate at each length, and at lengths outside the range at which angles were read."""
         route = self.cable.description.route
         if route is not None:
             read = self.angles.route if self.angles is not None else np.zeros(0)
@@ -96,7 +96,7 @@ class Situation:
         return [Candidate(kind, angles=tuple(float(angle) for angle in case)) for case in chosen]
 
     def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, RowOrigin]:
-        """Route values and wrap angles of a table with one row a candidate, and where its rows stand."""
+        """Return route values, wrap angles and row origins of a table with one row a candidate."""
         n, names = len(wanted), self.cable.description.angle_columns
         own = OwnAngles.none(names, n)
         for row, candidate in enumerate(wanted):
@@ -150,7 +150,7 @@ class CandidateKind(ABC):
     @property
     @abstractmethod
     def order(self) -> int:
-        """Place among the kinds where none is named."""
+        """Position among the candidate kinds where the user names none."""
 
     @property
     @abstractmethod
@@ -160,11 +160,11 @@ class CandidateKind(ABC):
     @property
     @abstractmethod
     def unknown(self) -> str:
-        """Why they then cannot, in a sentence."""
+        """Sentence that says why readings cannot be simulated where one of `needs` is missing."""
 
     @abstractmethod
     def candidates(self, at: Situation) -> list[Candidate]:
-        """Return those that the tables of the description can hold."""
+        """Return the candidates that the tables of the description can hold."""
 
     @abstractmethod
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
@@ -175,29 +175,29 @@ class CandidateKind(ABC):
         return True
 
     def designs(self, at: Situation) -> list[tuple[float, int]]:
-        """Return loads [N] and strokes at which all its readings could be taken, where a candidate leaves them open.
+        """Return loads [N] and strokes at which a run could be read, where a candidate leaves them open.
 
         NaN and 0 stand for those of the runs made so far.
         """
         return []
 
     def describe_usual(self, at: Situation) -> str:
-        """Return loads and strokes of those made so far, in words; asked for where there are `designs`."""
+        """Return loads and strokes of the runs made so far, in words; needed where there are `designs`."""
         return ""
 
     @property
     def noun(self) -> str:
-        """What one is called, such as "force run"."""
+        """Noun for one such reading or run, such as "force run"."""
         return self.name
 
     @property
     def phrase(self) -> str:
-        """One of them in a sentence, such as "a stretch"."""
+        """The noun with its article, such as "a stretch"."""
         return f"{'an' if self.noun[0] in 'aeiou' else 'a'} {self.noun}"
 
     @property
     def heading(self) -> str:
-        """What figures call them."""
+        """Heading of such candidates in figures."""
         return self.noun[0].upper() + self.noun[1:]
 
     def describe_measurement(self, cable: Cable) -> str:
@@ -209,7 +209,7 @@ class CandidateKind(ABC):
         return "" if set(self.needs) <= at.parameters and self.is_possible(at) else self.unknown
 
     def example(self, at: Situation) -> Candidate:
-        """Return one that makes sense of this cable as far as its place goes: halfway along the route, or at right angles."""
+        """Return a plausible candidate for this cable: halfway along the route, or at right angles."""
         lengths = at.lengths if self.along_route else []
         n = {"none": 0, "columns": len(at.columns_without_curve), "total": 1}[self.angles] if not lengths else 0
         route = lengths[len(lengths) // 2] if lengths else float("nan")
@@ -217,26 +217,26 @@ class CandidateKind(ABC):
 
 
 def simulate_rows(term: Any) -> Simulation:
-    """How candidates are read that are the rows of a term, one each."""
+    """Return the simulation of candidates that are one row of a term each."""
     return Simulation(term.simulate, term.data, [(row,) for row in range(len(term.labels))])
 
 
 def choose_loads(loads: np.ndarray, most: int = MOST_LOADS) -> list[float]:
-    """Some of the loads measured at, to two digits: as they were meant, without the noise of their reading."""
+    """Choose some of the measured loads, rounded to two digits: as they were meant, without the noise of reading."""
     return _choose_distinct(np.array([float(f"{load:.2g}") for load in loads if load > 0]), most)
 
 
 def choose_wrap_angles(angles: np.ndarray) -> list[float]:
-    """Some of the wrap angles measured at [rad], to a tenth of a degree."""
+    """Choose some of the measured wrap angles [rad], rounded to a tenth of a degree."""
     return _choose_distinct(np.deg2rad(np.rad2deg(angles).round(1)), MOST_ANGLES)
 
 
 def _choose_distinct(values: np.ndarray, most: int) -> list[float]:
-    """Distinct values, evenly chosen where there are many."""
+    """Return the distinct values, evenly thinned where there are more than `most`."""
     different = np.unique(values)
     return [float(v) for v in different[_evenly_spaced(len(different), most)]] if len(different) else []
 
 
 def _evenly_spaced(n: int, most: int) -> np.ndarray:
-    """Places of at most so many of n things."""
+    """Return indices of at most `most` of n items, evenly spaced."""
     return np.unique(np.linspace(0, n - 1, most).round().astype(int))

@@ -20,7 +20,7 @@ _ONE_PLACE = 0.02  # of all route values or wrap angles, within which those of a
 
 @dataclass(frozen=True, repr=False)
 class Covariates(Part):
-    """Where the readings of one table were taken.
+    """Covariates of the readings of one table: what residuals are plotted and tested against.
 
     Args:
         numbers: By axis label, such as "Load (N)"; the first is what the table varies most.
@@ -36,7 +36,7 @@ class Covariates(Part):
 
 
 def collect_covariates(description: Description, measurements: Measurements, term: Term) -> Covariates:
-    """Where the readings of a term were taken; numbered in their order where nothing else is known.
+    """Collect the covariates of a term's readings; their order where nothing else is known.
 
     Args:
         description: What was said about the cable.
@@ -58,7 +58,7 @@ def collect_covariates(description: Description, measurements: Measurements, ter
 
 
 def _covariates_of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
-    """Loads and wrap angles of the tables that have them."""
+    """Return loads, wrap angles and the like that the kind knows, and which readings are of the return stroke."""
     kind = find_kind(term.name)
     table = measurements.table(kind.table) if kind is not None else None
     if table is None:
@@ -69,7 +69,7 @@ def _covariates_of_kind(measurements: Measurements, term: Term) -> tuple[Mapping
 
 
 def _mean_wrap_angles(term: Term) -> np.ndarray | None:
-    """Total of the measured wrap angles of each reading or run [deg]; None where curves tell them, or a run has several."""
+    """Return the total measured wrap angle of each reading or run [deg]; None where curves give it, or a run has several."""
     rows = getattr(term, "rows", None)
     at = term.data if rows is None else rows.angles
     if "is_own" not in at:
@@ -88,7 +88,7 @@ def _mean_wrap_angles(term: Term) -> np.ndarray | None:
 
 
 def route_values(term: Term) -> np.ndarray | None:
-    """Route value of each reading: of its row, of its curve's reading, or of its run, NaN where that is at several."""
+    """Return the route value of each reading or run; NaN for a run that was read at several."""
     data, n = term.data, len(term.labels)
     at = data.get("route")
     if at is None:
@@ -107,7 +107,7 @@ def _concatenate_curves(by_curve: Mapping[str, Any]) -> np.ndarray:
 
 
 def _columns_of_angles(term: Term) -> tuple[str, ...]:
-    """The column of each angle reading; nothing of other tables."""
+    """Return the column of each angle reading; empty strings for other tables."""
     at = term.data.get("route")
     if not isinstance(at, Mapping):
         return ("",) * len(term.labels)

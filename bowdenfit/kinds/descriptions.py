@@ -68,12 +68,12 @@ def load_description(
 
 
 def _concerns_placeholder(key_path: Place, placeholders: Mapping[Place, DescriptionError]) -> bool:
-    """Whether a fault is one of a placeholder's."""
+    """Return whether the key of a fault is, contains or belongs to a placeholder."""
     return any(bool(key_path) and key_path[: len(placeholder)] == placeholder[: len(key_path)] for placeholder in placeholders)
 
 
 def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Description:
-    """A description from plain data, with errors that name the key.
+    """Return a description from plain data; errors name the key.
 
     Raises:
         DescriptionError: A key is unknown, or a value is missing or impossible.
@@ -93,7 +93,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
 
 
 def add_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:
-    """Plain data of a description whose table has the named columns.
+    """Add the columns that the user names to the plain data of a description.
 
     Args:
         raw: The data; changed in place.
@@ -126,7 +126,7 @@ def _has_columns(name: str, settings: Any) -> bool:
 
 @lru_cache
 def _description_models(kinds: tuple[Kind[Any], ...]) -> tuple[type[Description], type[Tables]]:
-    """A description, and its tables, with a field for each kind."""
+    """Return the models of a description and of its tables, with a field for each kind."""
     fields: dict[str, Any] = {kind.name: (kind.settings | None, None) for kind in kinds}
     tables = create_model("CableTables", __base__=Tables, __module__=__name__, **fields)
     return create_model("CableDescription", __base__=Description, __module__=__name__, tables=(tables, ...)), tables
@@ -136,7 +136,7 @@ CableDescription, CableTables = _description_models(tuple(KINDS.values()))  # fo
 
 
 def read_design(page: Mapping[str, Any], description: Description, file: str) -> Design:
-    """The design of a plan.
+    """Read the design of a plan.
 
     Args:
         page: [design] as read.
@@ -154,7 +154,7 @@ def read_design(page: Mapping[str, Any], description: Description, file: str) ->
 
 
 def make_design(**measured: Any) -> Design:
-    """A design of any cable, from keywords; what a cable does not have of it is not measured."""
+    """Return a design from keywords, for any cable; parts that a cable does not have are not measured."""
     return _parse_design(measured, "the design")
 
 
@@ -173,7 +173,7 @@ def _parse_design(page: Mapping[str, Any], file: str) -> Design:
 
 @lru_cache
 def _design_page_model(parts: tuple[type[Design], ...]) -> type[BaseModel]:
-    """What is read of a plan."""
+    """Return the model of a plan's [design], with the fields of every kind that can be planned."""
     whole = create_model("WholeDesign", __base__=parts, __module__=__name__)
     return create_model("DesignPage", __base__=Frozen, __module__=__name__, design=(whole, ...))
 
@@ -211,12 +211,12 @@ def description_without_recordings(raw: Mapping[str, Any], file: str) -> Descrip
 
 
 def design_without_recordings(description: Description, angles: Sequence[float]) -> Design:
-    """What is measured beside them, at those route values; the table that stands in is read where all curves hold."""
+    """Return the design of the tables that are made beside recordings, at some route values."""
     return make_design(angles=angles, efficiencies=(description.route.middle if description.route else 0.0,))
 
 
 def order_groups(description: Description, measurements: Measurements) -> tuple[str, ...]:
-    """Groups in the order in which they come, but first the one that predictions are for where that is stated.
+    """Return the groups in order of appearance, but first the one that predictions are for where that is stated.
 
     Raises:
         DescriptionError: Groups are to have coefficients of their own, and a table says nothing of groups, or there is one

@@ -57,7 +57,7 @@ _POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))
 
 
 def find_stated_angle(path: Path) -> tuple[str, str] | None:
-    """The wrap angle that a file states, such as "90deg", and where; None if it states none, or several.
+    """Return the wrap angle that a file states, such as "90deg", and where; None if it states none, or several.
 
     Args:
         path: The file; only the first lines of a text are looked at.
@@ -74,7 +74,7 @@ def _angle(match: re.Match[str]) -> str:
 
 
 def _lines(path: Path) -> list[str]:
-    """The first lines of a text without accents; none of another file."""
+    """Return the first lines of a text file without accents; none of a binary one."""
     if path.suffix.lower() not in TEXT:
         return []
     try:
@@ -85,13 +85,13 @@ def _lines(path: Path) -> list[str]:
 
 
 def columns_of_kind(kind: str) -> tuple[Quantity, ...]:
-    """What a table of a kind may have, without a description."""
+    """Return the columns that a table of a kind may have, without a description."""
     return (*COLUMNS, _ONE_FORCE[0], *_POSITION) if kind == "displacement" else COLUMNS
 
 
 @dataclass(frozen=True)
 class FileKind:
-    """What a file without a description is.
+    """Kind of measurement that a file without a description holds.
 
     Args:
         kind: Name of the kind of measurement that it holds.
@@ -105,7 +105,7 @@ class FileKind:
 
 
 def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str] = ()) -> FileKind:
-    """What kind of measurement a file without a description holds.
+    """Guess the kind of measurement that a file without a description holds.
 
     A time column makes a recording, unless a column of runs, strokes or groups says that its rows are readings of their own;
     its number of rows does not.
@@ -135,7 +135,7 @@ def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str]
 
 
 def _guess_without_headings(path: Path, error: DatasetError) -> FileKind:
-    """A file whose first rows are no table; a short one is refused for what is wrong with them.
+    """Guess the kind of a file whose first rows are no table; refuse a short one for what is wrong with them.
 
     Raises:
         DatasetError: It is short, or no text.
@@ -173,7 +173,7 @@ def _lines_above(path: Path, table: RawTable) -> list[str]:
 
 
 def _has_one_force_and_a_position(table: RawTable) -> bool:
-    """Whether a table has a single column of forces, at the motor if it says where, and one of displacements."""
+    """Return whether a table has a single column of forces, at the motor if it says where, and one of displacements."""
     headings = _headings(table)
     counts = {name: len(columns) for name, columns in find_candidates(headings, (*_ONE_FORCE, *_POSITION)).items()}
     units = [heading_of(heading, unit).unit for heading, unit in headings]
@@ -207,7 +207,7 @@ def _headings(table: RawTable) -> list[tuple[str, str]]:
 
 
 def _is_time(table: RawTable, column: int) -> bool:
-    """Whether a column is one of time, by its heading or by a unit of time over numbers that rise; T1 is a tension."""
+    """Return whether a column is one of time, by its heading, or by a unit of time over rising numbers; T1 is a tension."""
     heading, unit = table.header[column], table.units[column]
     other = parse_heading(heading, unit)
     steps = _steps(table, column)
@@ -220,7 +220,7 @@ def _is_time(table: RawTable, column: int) -> bool:
 
 
 def read_numbers(table: RawTable, column: int) -> list[float]:
-    """The numbers of a column, as they stand there; NaN where a cell holds none."""
+    """Return the numbers of a column as written; NaN where a cell holds none."""
     numbers = []
     for row in table.rows:
         try:
@@ -231,7 +231,7 @@ def read_numbers(table: RawTable, column: int) -> list[float]:
 
 
 def _steps(table: RawTable, column: int) -> list[float]:
-    """Seconds from each of the first rows to the next; empty where these are no numbers."""
+    """Return the seconds from each of the first rows to the next; empty where these are no numbers."""
     values = read_numbers(table, column)
     known = [value for value in values if math.isfinite(value)]
     unit = heading_of(table.header[column], table.units[column]).unit
@@ -243,7 +243,7 @@ def _steps(table: RawTable, column: int) -> list[float]:
 
 
 def _is_smooth(table: RawTable) -> bool:
-    """Whether the first force changes from row to row as one that is sampled does, through many values."""
+    """Return whether the first force changes from row to row as a sampled one does, through many values."""
     for i, (heading, unit) in enumerate(_headings(table)):
         other = parse_heading(heading, unit)
         if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):

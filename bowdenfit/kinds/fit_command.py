@@ -39,7 +39,7 @@ _MOST_RADIANS = 13.0  # two turns
 
 @dataclass(frozen=True)
 class HeadedColumn:
-    """A column or channel of numbers as far as naming it goes.
+    """A column or channel of numbers: its heading and range.
 
     Args:
         name: What it is called.
@@ -55,7 +55,7 @@ class HeadedColumn:
 
 
 def list_number_columns(table: RawTable) -> list[HeadedColumn]:
-    """The columns of numbers of a table but for clocks."""
+    """List the columns of numbers of a table, without clocks."""
     columns = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
         known = [value for value in read_numbers(table, i) if np.isfinite(value)]
@@ -71,7 +71,7 @@ def list_number_columns(table: RawTable) -> list[HeadedColumn]:
 def name_force_columns(
     columns: Sequence[HeadedColumn], option: str, stated: Mapping[str, ColumnSource], always: bool = False
 ) -> tuple[list[str], list[str]]:
-    """Options that name the forces at both ends, and what they take for granted.
+    """Return the options that name the forces at both ends, and what they take for granted.
 
     Args:
         columns: Columns or channels of numbers.
@@ -107,7 +107,7 @@ def name_force_columns(
 
 
 def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
-    """The columns that can be forces: those in units of force, or where there are none those without any unit."""
+    """Return the columns that can be forces: those in units of force, or else those without any unit."""
     measured = [column for column in columns if not _SPREAD.search(column.name)]
     of_force = [column for column in measured if (unit := _unit(column)) and is_unit(unit) and dimension_of(unit) == "force"]
     return of_force or [column for column in measured if not _unit(column)]
@@ -120,7 +120,7 @@ def _unit(column: HeadedColumn) -> str:
 
 @dataclass(frozen=True)
 class FitCommand:
-    """What fits a file.
+    """A command that fits one file, and what it takes for granted.
 
     Args:
         text: The command, as it can be pasted.
@@ -136,7 +136,7 @@ class FitCommand:
 def make_table_command(
     path: Path, table: RawTable, kind: str, stated: Mapping[str, ColumnSource], always: bool = False
 ) -> FitCommand:
-    """The command that fits a table.
+    """Make the command that fits a table.
 
     Args:
         path: Its file.
@@ -164,7 +164,7 @@ def make_recording_command(
     stated: Mapping[str, ColumnSource],
     always: bool = False,
 ) -> FitCommand:
-    """The command that fits a recording.
+    """Make the command that fits a recording.
 
     Args:
         path: Its file.
@@ -182,7 +182,7 @@ def make_recording_command(
 
 
 def make_both_commands(path: Path, table: RawTable, guess: FileKind) -> list[FitCommand]:
-    """The commands for a file that could be a table or a recording, in this order."""
+    """Make the commands that fit a file as a table and as a recording, in this order."""
     kind = guess.kind if guess.other == "recordings" else guess.other
     clocks = [i for i, heading in enumerate(table.header) if names_time(heading)]
     channels = [HeadedColumn(*_split_heading(column.name, column.unit), column.mean) for column in list_number_columns(table)]
@@ -190,7 +190,7 @@ def make_both_commands(path: Path, table: RawTable, guess: FileKind) -> list[Fit
 
 
 def make_ambiguity_error(path: Path, table: RawTable, guess: FileKind) -> DatasetError:
-    """The refusal of a file that could be a table or a recording."""
+    """Return the refusal of a file that could be a table or a recording."""
     of_table, of_recording = make_both_commands(path, table, guess)
     return DatasetError(
         f"{path.name} could be a table of readings or a recording: {guess.why}; say which, for a table by {of_table.text}, for "
@@ -199,7 +199,7 @@ def make_ambiguity_error(path: Path, table: RawTable, guess: FileKind) -> Datase
 
 
 def require_one_kind(path: Path, has_channels: bool, named: Sequence[str]) -> str:
-    """Name of the kind of measurement that a file without a description holds.
+    """Return the name of the kind of measurement that a file without a description holds.
 
     Raises:
         DatasetError: It could be of either of two; says the command for each.
@@ -211,7 +211,7 @@ def require_one_kind(path: Path, has_channels: bool, named: Sequence[str]) -> st
 
 
 def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) -> bool:
-    """Whether the rows of a file have wrap angles of their own.
+    """Return whether the rows of a file have wrap angles of their own.
 
     Args:
         path: The file.
@@ -255,7 +255,7 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
 
 
 def _find_columns_of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
-    """Forces whose columns say what they are and hold no numbers, so that no other column is to be taken for them."""
+    """Find forces whose columns hold no numbers, so that no other column is taken for them."""
     known = {column.name for column in numbers}
     names_of = {
         name: [headings[column.position][0] for column in columns]
@@ -267,19 +267,19 @@ def _find_columns_of_words(headings: Sequence[tuple[str, str]], numbers: Sequenc
 
 
 def _find_other_columns(headings: Sequence[tuple[str, str]]) -> set[str]:
-    """Columns that say themselves that they are something other than a force, such as the label of a run."""
+    """Find columns whose headings say that they are not forces, such as the label of a run."""
     candidates = find_candidates(headings, BESIDE_FORCES)
     return {headings[columns[0].position][0] for columns in candidates.values() if len(columns) == 1}
 
 
 def _split_heading(heading: str, unit: str) -> tuple[str, str]:
-    """Name and unit as a recording has them."""
+    """Return name and unit as a recording has them."""
     both = heading_of(heading, unit)
     return both.name, both.unit
 
 
 def _wrap_angle_options(table: RawTable, path: Path) -> tuple[list[str], list[str]]:
-    """What gives the wrap angle of a table: a column of its own, one that may be, or the user."""
+    """Return options that give the wrap angle of a table, and what they assume."""
     if find_candidates(list(zip(table.header, table.units, strict=True)), (WRAP_ANGLE,))["wrap_angle"]:
         return [], []
     likely = likely_wrap_angles(table)
@@ -293,7 +293,7 @@ def _wrap_angle_options(table: RawTable, path: Path) -> tuple[list[str], list[st
 
 
 def likely_wrap_angles(table: RawTable) -> dict[str, str]:
-    """Columns of numbers that are likely to be wrap angles, with the unit that must be said; empty where the heading has it.
+    """Return columns of numbers that are likely wrap angles, with the unit to state; empty where the heading has it.
 
     A column without a unit is taken to be in rad where its values are none of degrees: whole turns at most, not all whole.
     """
@@ -313,7 +313,7 @@ def _column_options(stated: Mapping[str, ColumnSource], option: str) -> list[str
 
 
 def _stated_angle_options(path: Path) -> tuple[list[str], list[str]]:
-    """The wrap angle that a file states, or any."""
+    """Return the option for one wrap angle, as the file states it or as an example, and what it assumes."""
     stated = find_stated_angle(path)
     if stated is None:
         return ["--wrap-angle 180deg"], ["180 deg is the wrap angle of the bench"]

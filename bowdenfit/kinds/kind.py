@@ -68,17 +68,17 @@ class Readings:
 
     @property
     def shown_scale(self) -> float:
-        """Shown value over value."""
+        """Factor from a value to how it is shown: 100 for efficiencies in percent."""
         return 100.0 if self.are_efficiencies else 1.0
 
 
 def efficiency_readings(name: str, table: str, words: str, one: str, are_runs: bool = False) -> Readings:
-    """Readings that are efficiencies."""
+    """Return words for readings that are efficiencies."""
     return Readings(name, table, words, one, "Efficiency (%)", "% of the force", True, are_runs)
 
 
 class Design(Frozen):
-    """What a kind reads of the [design] of a plan, as written; a whole design has the fields of every kind (`designs.py`)."""
+    """Part of a plan's [design] that a kind reads; a whole design has the fields of every kind (`descriptions.py`)."""
 
 
 class Kind(ABC, Generic[AnyTable]):
@@ -142,7 +142,7 @@ class Kind(ABC, Generic[AnyTable]):
         return getattr(settings, "file", None) or f"{self.name}.csv"
 
     def contradiction(self, settings: Any, description: Description) -> str:
-        """Return what a description says that cannot be, in a sentence without its full stop; empty if it can.
+        """Return what is contradictory in a description, in a sentence without its full stop; empty if nothing is.
 
         Args:
             settings: What stands under [tables]; None where there is no such table.
@@ -151,7 +151,7 @@ class Kind(ABC, Generic[AnyTable]):
         return ""
 
     def quantities(self, settings: Any, description: Description) -> list[Stated]:
-        """Return the quantities in the settings, whose units are then checked."""
+        """Return the quantities in the settings, whose units are checked."""
         return []
 
     def check(self, table: AnyTable, description: Description, measurements: Measurements) -> None:
@@ -162,7 +162,7 @@ class Kind(ABC, Generic[AnyTable]):
         """
 
     def warnings(self, table: AnyTable, description: Description, measurements: Measurements) -> list[str]:
-        """Return what a table will not be able to tell, as far as counting shows."""
+        """Return warnings of what a table cannot determine, as far as counting shows."""
         return []
 
     def copied_readings(self, table: AnyTable) -> list[str]:
@@ -194,7 +194,7 @@ class FrictionKind(Kind[AnyTable]):
         return np.zeros(0)
 
     def typical_speeds(self, table: AnyTable) -> list[float]:
-        """Return the few speeds that stand for all [`velocity_unit`]."""
+        """Return a few speeds that represent all [`velocity_unit`]."""
         return []
 
     def velocity_unit(self, table: AnyTable) -> str:
@@ -224,7 +224,7 @@ class PlannedKind(Kind[AnyTable]):
     @property
     @abstractmethod
     def design(self) -> type[Design]:
-        """What it reads of [design]."""
+        """Model of the part of [design] that it reads."""
 
     @abstractmethod
     def empty_table(self, design: Any, description: Description, file: str) -> AnyTable:
@@ -295,7 +295,7 @@ def _check_contact(description: Description, angles: AngleTable | None, contact:
 
 
 def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:
-    """Return what is wrong with a column in a row of a table, behind the value that stands there."""
+    """Return an error about a column in a row of a table, behind the value that stands there."""
     error = DatasetError(f"{table.origin.describe_row(i)}, column {column!r}: {value}{what}")
     error.fault_key, error.row = (table.origin.files[table.origin.file[i]], column, what), int(table.origin.row[i])
     return error

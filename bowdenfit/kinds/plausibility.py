@@ -42,7 +42,7 @@ _WHOLE = 1e-9  # as part of a multiple of a last digit, by which it may be off
 
 
 def explain_impossible_loss(loss: np.ndarray, what: str) -> str:
-    """Why friction exponents are none of a cable's, in words; empty if they may be.
+    """Return why no cable has such friction exponents, in words; empty if one may.
 
     Args:
         loss: Friction exponents [1].
@@ -54,18 +54,18 @@ def explain_impossible_loss(loss: np.ndarray, what: str) -> str:
 
 
 def split_by_group(group: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
-    """The values of each group."""
+    """Split values by group, in order of the group's labels."""
     return [values[group == label] for label in np.unique(group)]
 
 
 def is_within_factor(real: float, made: float) -> bool:
-    """Whether a simulated quantity is within a factor of ten of the measured one."""
+    """Return whether a simulated quantity is within a factor of `FACTOR` of the measured one."""
     return bool(real / FACTOR <= made <= real * FACTOR)
 
 
 @dataclass(frozen=True)
 class ComparedReadings:
-    """Readings of a table, as they are compared with each other.
+    """Readings of a table, prepared for comparison with each other.
 
     Args:
         file: What the table is called.
@@ -87,14 +87,14 @@ class ComparedReadings:
 
     @property
     def rows(self) -> Matrix:
-        """Whatever stands in a row; -1 where nothing is."""
+        """All columns of each row; -1 where nothing was read."""
         return np.nan_to_num(np.column_stack([self.settings, self.read]), nan=-1.0)
 
 
 def compare_without_runs(
     origin: RowOrigin, settings: np.ndarray, read: np.ndarray, along: Vector, curve: Any = 0
 ) -> ComparedReadings:
-    """A table that has no runs; its settings and readings may be one column.
+    """Prepare a table without runs for comparison; its settings and readings may be one column.
 
     Args:
         origin: Where its rows were read.
@@ -106,12 +106,12 @@ def compare_without_runs(
 
 
 def route_or_wrap_angle(rows: ForceRows) -> Vector:
-    """Where rows were read: on the route, or at which wrap angle where there is none."""
+    """Return the route value of each row, or its total wrap angle [rad] where there is no route."""
     return rows.route if np.isfinite(rows.route).all() else np.nansum(rows.own.angle, axis=1)
 
 
 def describe_copies(compared: ComparedReadings) -> list[str]:
-    """Which readings are copies of others, in sentences without a first capital or remedy; none where chance may do it."""
+    """Describe readings that are copies of others, in sentences without first capital or remedy; empty if chance may do it."""
     rows = compared.rows
     parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
     alike, repeated = _find_equal_runs(rows, parts), _find_repeated_rows(rows, parts)
@@ -136,7 +136,7 @@ def describe_copies(compared: ComparedReadings) -> list[str]:
 
 
 def _find_equal_runs(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
-    """Runs that hold the same rows, in whatever order, two or more each time."""
+    """Return groups of runs that hold the same rows, in whatever order."""
     known: dict[bytes, list[int]] = defaultdict(list)
     for k, where in parts.items():
         known[rows[where][np.lexsort(rows[where].T)].tobytes()].append(k)
@@ -144,7 +144,7 @@ def _find_equal_runs(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list
 
 
 def _find_repeated_rows(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[int, list[int]]:
-    """Runs in which every row stands equally often, by how often that is, if more than once."""
+    """Return runs in which every row stands equally often, by how often that is, if more than once."""
     runs_by_count: dict[int, list[int]] = defaultdict(list)
     for k, where in parts.items():
         times = gcd(*Counter(row.tobytes() for row in rows[where]).values())
@@ -154,12 +154,12 @@ def _find_repeated_rows(rows: Matrix, parts: Mapping[int, np.ndarray]) -> dict[i
 
 
 def _log_agreement_probability(chances: Float[np.ndarray, " columns"], read: Matrix) -> float:
-    """Logarithm of the chance that as many other readings are the same."""
+    """Return the logarithm of the probability that as many other readings are the same."""
     return float(np.sum(np.isfinite(read).sum(axis=0) * np.log(chances)))
 
 
 def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " readings"]:
-    """Chance that two readings of the same agree to the last digit, by column; 1 where that is not known.
+    """Return the probability that two readings of one quantity agree to the last digit, by column; 1 where it is unknown.
 
     By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
     width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
@@ -184,7 +184,7 @@ def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " 
 
 
 def _residuals_of_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
-    """Sum of squares about a polynomial of x, and its degrees of freedom."""
+    """Return the sum of squares about a polynomial of x, and its degrees of freedom."""
     n_different = len(np.unique(x))
     degree = min(_DEGREE, n_different - 2) if n_different > 3 else n_different - 1
     width = np.ptp(x)
@@ -195,7 +195,7 @@ def _residuals_of_polynomial(x: Vector, y: Vector) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class CoarseReadings:
-    """What is known of such a table.
+    """Resolution of a table whose repeated readings are equal to the last digit.
 
     Args:
         file: What the table is called.
@@ -215,7 +215,7 @@ class CoarseReadings:
 def find_coarse_readings(
     file: str, settings: Float[np.ndarray, "rows settings"], read: Vector, unit: str = ""
 ) -> CoarseReadings | None:
-    """What is known of a table whose repeated readings are all alike; None of any other.
+    """Return the resolution of a table whose repeated readings are all alike; None for any other.
 
     Args:
         file: What the table is called.
@@ -238,7 +238,7 @@ def find_coarse_readings(
 
 
 def _last_digit(values: Vector) -> float:
-    """The largest power of ten of which all values are multiples; 0 if there is none that a display would show."""
+    """Return the largest power of ten of which all values are multiples; 0 if there is none that a display would show."""
     for power in _POWERS:
         if 10.0**power < NO_NOISE * values.max():
             break

@@ -16,9 +16,14 @@ from bowdenfit.kinds.tables import AngleTable
 
 @dataclass(frozen=True)
 class RowAngles:
-    """Which wrap angle each row of a table has: the curve's, or its own measured one with its error.
+    """Wrap angle of each row of a table: the curve's, or its own measured one with its error.
 
-    All are arrays over rows and contacts; `data` hands them to jitted functions.
+    Args:
+        route: Route variable of each row; 0 without one.
+        own: Own angle of each row and contact [rad]; 0 without one.
+        is_own: Whether a row has an angle of its own there.
+        known_sd: Its stated standard deviation [rad]; 0 without one.
+        has_angle_noise: Whether the noise of the angle table applies to it.
     """
 
     route: np.ndarray
@@ -29,7 +34,7 @@ class RowAngles:
 
     @property
     def data(self) -> dict[str, np.ndarray]:
-        """As plain data."""
+        """The arrays as a dictionary, for jitted functions."""
         return {
             "route": self.route,
             "own": self.own,
@@ -41,7 +46,7 @@ class RowAngles:
 
 
 def collect_row_angles(description: Description, table: ForceRows, angles: AngleTable | None) -> RowAngles:
-    """The wrap angles of a table's rows, before any parameter is known.
+    """Return what is known of the wrap angles of a table's rows before any parameter is.
 
     A row's own angle comes first; then, outside the range of the curves, the angle table's row at the same length;
     else the curve. An own angle without a stated sd has the angle table's noise where its contact has a curve, and is
@@ -72,7 +77,7 @@ def collect_row_angles(description: Description, table: ForceRows, angles: Angle
 def _complete_outside_curves(
     description: Description, column: str, route: np.ndarray, angle: np.ndarray, sd: np.ndarray, angles: AngleTable
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Own angles completed from the angle table for rows outside the range of the curves."""
+    """Complete own angles from the angle table for rows outside the range of the curves."""
     limits = description.route
     angle, sd = angle.copy(), sd.copy()
     measured, detection_limit = angles.column(column)
@@ -90,7 +95,7 @@ def _complete_outside_curves(
 def resolve_angles(
     cable: Cable, values: Mapping[str, Array], rows: Mapping[str, Array]
 ) -> tuple[Float[Array, "rows contacts"], Float[Array, "rows contacts"]]:
-    """Wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
+    """Return wrap angle [rad] and its variance [rad^2] for each row and contact, at given parameters."""
     angles = jnp.where(rows["is_own"], rows["own"], cable.wrap_angles(values, rows["route"]))
     variance = rows["known_variance"]
     if ANGLE_NOISE in values:

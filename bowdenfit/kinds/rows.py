@@ -43,7 +43,7 @@ _SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}
 
 @dataclass(frozen=True, repr=False)
 class RowOrigin(Part):
-    """Where each row of a table was read, so that any row can be named.
+    """File and line of each row of a table, so that any row can be named.
 
     Args:
         files: File names.
@@ -57,11 +57,11 @@ class RowOrigin(Part):
 
     @classmethod
     def below_heading(cls, file: str, n: int) -> "RowOrigin":
-        """Rows of a file that is written with one line of headings."""
+        """Return the origin of rows in a file that is written with one line of headings."""
         return cls((file,), np.zeros(n, dtype=int), np.arange(2, n + 2))
 
     def describe_row(self, i: int) -> str:
-        """Row i in words."""
+        """Return file and line of row `i` in words."""
         return f"{self.files[self.file[i]]}, row {self.row[i]}"
 
 
@@ -81,11 +81,11 @@ class OwnAngles(Part):
 
     @classmethod
     def none(cls, names: tuple[str, ...], n: int) -> "OwnAngles":
-        """Rows without wrap angles of their own."""
+        """Return rows without wrap angles of their own."""
         return cls(names, np.full((n, len(names)), np.nan), np.full((n, len(names)), np.nan))
 
     def column(self, name: str) -> tuple[Vector, Vector]:
-        """Angles and standard deviations of one contact; all NaN if the table has no such column."""
+        """Return angles and standard deviations of one contact [rad]; all NaN if the table has no such column."""
         if name not in self.names:
             return np.full(len(self.angle), np.nan), np.full(len(self.angle), np.nan)
         k = self.names.index(name)
@@ -94,7 +94,7 @@ class OwnAngles(Part):
 
 @runtime_checkable
 class ForceRows(Protocol):
-    """Under what forces were measured, row by row."""
+    """Length and wrap angles at which forces were measured, row by row."""
 
     @property
     def route(self) -> Vector:
@@ -109,7 +109,7 @@ class ForceRows(Protocol):
 
 @dataclass(frozen=True)
 class RowConditions:
-    """Where and at which wrap angles something was measured, row by row; see `ForceRows`."""
+    """Length and wrap angles of measurements, row by row; see `ForceRows`."""
 
     route: Vector
     own: OwnAngles
@@ -117,7 +117,7 @@ class RowConditions:
 
 @runtime_checkable
 class Rows(ForceRows, Protocol):
-    """The same of a table, whose rows can be named."""
+    """Rows of a table that can be named."""
 
     @property
     def origin(self) -> RowOrigin:
@@ -126,12 +126,12 @@ class Rows(ForceRows, Protocol):
 
 
 def route_column(route: Route) -> Quantity:
-    """The route variable as tables call it: column name and the unit to convert to."""
+    """Return the route variable as a quantity: column name and the unit to convert to."""
     return Quantity(route.variable, "route", route.unit)
 
 
 def read_angle(cell: Cell, column: Column) -> float:
-    """A wrap angle between 0 and 2000 deg [rad]."""
+    """Return a wrap angle between 0 and 2000 deg [rad]."""
     angle = column.value(cell)
     if angle < 0:
         raise cell.refuse(f"{cell.shown} is negative; wrap angles add up without sign, so write the absolute value.")
@@ -145,7 +145,7 @@ def read_angle(cell: Cell, column: Column) -> float:
 def read_strokes(
     columns: Mapping[str, Column], n_rows: int, held: str = ", or hold (0, read while nothing slides)"
 ) -> Labels:
-    """Strokes of a table; all pulling without a column.
+    """Return the strokes of a table; all pulling without a column.
 
     Args:
         columns: Columns of the table.
@@ -167,25 +167,25 @@ def _stroke(cell: Cell, held: str) -> int:
 
 
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
-    """Columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
+    """Return the columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
     angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
     return (*([route_column(route)] if route else []), *angles)
 
 
 def read_route(table: RawTable, columns: Mapping[str, Column], route: Route | None) -> Vector:
-    """Route variable of every row; NaN without a route."""
+    """Return the route variable of every row; NaN without a route."""
     if route is None:
         return np.full(len(table.rows), np.nan)
     return round_lengths(require_column(table, columns, route.variable, f"{route.variable}_{route.unit}").numbers())
 
 
 def round_lengths(values: Iterable[float]) -> Vector:
-    """Values to 12 digits, so that one length is one number whatever unit each table gives it in."""
+    """Round values to 12 digits, so that one length is one number whatever unit each table gives it in."""
     return np.array([float(f"{value:.12g}") for value in values])
 
 
 def read_own_angles(table: RawTable, columns: Mapping[str, Column], contacts: Sequence[str]) -> OwnAngles:
-    """Wrap angles that rows carry themselves."""
+    """Return the wrap angles that rows carry themselves."""
     n = len(table.rows)
     angle, sd = np.full((n, len(contacts)), np.nan), np.full((n, len(contacts)), np.nan)
     for k, name in enumerate(contacts):
@@ -206,13 +206,13 @@ def _own_angle(column: Column, cell: Cell) -> float:
 
 
 def origin_of_rows(table: RawTable) -> RowOrigin:
-    """Where the rows of one file stand."""
+    """Return file and line of the rows of one table."""
     rows = np.array([row[0].row for row in table.rows])
     return RowOrigin((table.file,), np.zeros(len(rows), dtype=int), rows)
 
 
 def read_tension(cell: Cell, column: Column, what: str) -> float:
-    """A tension [N], 0 for a slack rope; `what` it is, for refusals."""
+    """Return a tension [N], 0 for a slack rope; `what` names it in refusals."""
     if cell.limit() is not None:
         raise cell.refuse(f"{cell.shown} is a bound, no reading; write the value, and 0 for a slack rope.")
     value = column.value(cell)
@@ -225,7 +225,7 @@ def read_tension(cell: Cell, column: Column, what: str) -> float:
 
 
 def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Sequence[Quantity]) -> None:
-    """A column that nothing reads must not be a misspelled one that would have been read."""
+    """Refuse a column that nothing reads where its heading is nearly that of an optional one."""
     read = {column.heading for column in columns.values()}
     missing = [quantity.name for quantity in optional if quantity.name not in columns]
     for heading in table.header:
@@ -240,7 +240,7 @@ def check_spelling(table: RawTable, columns: Mapping[str, Column], optional: Seq
 
 
 def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *, is_loop: bool = False) -> Column:
-    """The column of one end, "input" or "output".
+    """Return the column of one end, "input" or "output".
 
     Args:
         table, columns: Where it is looked for.
@@ -258,7 +258,7 @@ def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *,
 
 
 def convert_to_forces(values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
-    """Forces at one end [N], from what its column holds.
+    """Return the forces at one end [N], from its forces or torques.
 
     Args:
         values: Numbers of `find_end_column`, in N or N mm.
@@ -273,17 +273,17 @@ def convert_to_forces(values: Vector, table: RawTable, columns: Mapping[str, Col
 
 
 def route_heading(description: Description) -> list[str]:
-    """Heading of the route variable's column in a file that is written; none without a route."""
+    """Return the heading of the route variable's column in a written file; none without a route."""
     return [f"{description.route.variable}_{description.route.unit}"] if description.route else []
 
 
 def route_cells(route: float, description: Description) -> list[str]:
-    """A row's cell in that column."""
+    """Return a row's cell in the route variable's column; none without a route."""
     return [f"{route:g}"] if description.route else []
 
 
 def format_fixed(values: Iterable[float], decimals: int) -> list[str]:
-    """Cells of a column: so many decimals, and more where its largest value would else have fewer than five digits."""
+    """Return cells with so many decimals, and more where the largest value would otherwise have fewer than five digits."""
     column = np.array(list(values), dtype=float)
     largest = float(np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
     enough = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
@@ -291,17 +291,17 @@ def format_fixed(values: Iterable[float], decimals: int) -> list[str]:
 
 
 def describe_range(values: np.ndarray, unit: str) -> str:
-    """The range of values, or their one value."""
+    """Return the range of values in words, or their one value."""
     low, high = float(values.min()), float(values.max())
     least, most = significant(low, 4), significant(high, 4)
     return f"{least} {unit}" if low == high else f"{least} to {most} {unit}"
 
 
 def stroke_signs(strokes: Sequence[Stroke]) -> list[int]:
-    """+1 for each pull, -1 for each return."""
+    """Return +1 for each pull and -1 for each return."""
     return [_SIGNS[stroke] for stroke in strokes]
 
 
 def convert_to_radians(degrees: Sequence[float]) -> Vector:
-    """Wrap angles as tables have them."""
+    """Return wrap angles in rad, as tables have them."""
     return np.deg2rad(np.array(degrees, dtype=float))

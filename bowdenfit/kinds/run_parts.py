@@ -24,7 +24,7 @@ _MOST_PARTS = 400
 
 @dataclass(frozen=True)
 class RunParts:
-    """Parts of the runs of a term.
+    """Parts of the runs of a term that can be left out one by one.
 
     Args:
         labels: Each in words.
@@ -40,12 +40,12 @@ class RunParts:
 
 
 def has_rows(term: Term) -> bool:
-    """Whether a term is one of runs whose readings are known one by one."""
+    """Return whether a term is one of runs whose single readings are known."""
     return isinstance(term, RunsTerm) and term.rows is not None
 
 
 def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
-    """The parts of a term's runs; None where whole runs, or readings as they are, are all that can be left out.
+    """Split a term's runs into parts; None where only whole runs, or the readings as they are, can be left out.
 
     Args:
         term: A term of the model.
@@ -78,13 +78,13 @@ def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
 
 
 def _select_rows(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
-    """Some of the readings."""
+    """Return the kept readings."""
     arrays = {name: value[kept] for name, value in vars(rows).items() if isinstance(value, np.ndarray)}
     return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
 
 
 def _assign_parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:
-    """The part of each reading, and each part in words."""
+    """Return the part of each reading, and each part in words."""
     run = np.unique(rows.run, return_inverse=True)[1]
     level = np.arange(len(run)) if unit == "reading" else _load_levels(rows, run)
     keys, part = np.unique(np.column_stack([run, rows.stroke > 0, level]), axis=0, return_inverse=True)
@@ -98,7 +98,7 @@ def _assign_parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[La
 
 
 def _load_levels(rows: SlidingRows, run: Labels) -> Labels:
-    """The load of each reading as one of a few levels of its run and stroke, equally many readings in each."""
+    """Return the load of each reading as one of a few levels of its run and stroke, with equal counts."""
     level = np.zeros(len(run), dtype=int)
     group = run * 2 + (rows.stroke > 0)
     for which in np.unique(group):

@@ -74,7 +74,7 @@ class RunsTerm:
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """Runs scatter by their mounting; the cells of a run about its mean by the load cells."""
+        """Runs, which scatter by their mounting, and cells, which scatter about their run by the load cells."""
         runs, cells, filled = len(self.labels), len(self.data["mean"]), int(np.sum(self.data["weight"] > 0))
         return ((runs, runs), (cells, filled - runs))
 
@@ -86,7 +86,7 @@ class RunsTerm:
 
     @property
     def inside(self) -> InsideRuns | None:
-        """Readings one by one, with the cell of each among the residuals inside runs."""
+        """Single readings, with the cell of each among the residuals inside runs."""
         if self.rows is None:
             return None
         cell, first = _assign_cells(self.cable, self.rows)
@@ -100,7 +100,7 @@ class RunsTerm:
     def _shown_log_ratio(
         self, values: Mapping[str, Array], data: Mapping[str, Any], exponent: Float[Array, " cells"]
     ) -> tuple[Float[Array, " cells"], Float[Array, " cells"], Float[Array, " cells"]]:
-        """Log ratio that the load cells show, and its derivatives by the friction exponent and by the log of the load."""
+        """Return the log ratio that the load cells show, and its derivatives by friction exponent and log load."""
         friction, stroke, cells = self.cable.friction, data["stroke"], LoadCells.of(values)
         from_delay = cells.late(data["drift"])
         if not (friction.depends_on_load or friction.depends_on_stroke or OUTPUT_OFFSET in values):
@@ -144,11 +144,11 @@ class RunsTerm:
         return _Deviations(deviation - slope * of_cell, mounting, sd, total, plain, by_run)
 
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
-        """Weighted sum over the cells of each run."""
+        """Return the weighted sum over the cells of each run."""
         return jnp.sum((data["weight"] * cells).reshape(len(self.labels), -1), axis=1)
 
     def scatter_of_single_readings(self, values: Mapping[str, Array]) -> dict[str, float]:
-        """What makes runs of a single reading scatter: mountings at all loads alike, load cells more at low loads [1, N].
+        """Split the scatter of single-reading runs into that of mountings [1] and the noise of the load cells [N].
 
         By maximum likelihood about given values; empty where runs have more readings, of which the noise is told, or are few.
         """
@@ -199,8 +199,15 @@ class RunsTerm:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class _Deviations:
-    """Of cells from their run's mounting effect; of each run: mounting effect, its sd, information, mean deviation, and
-    what the change of friction and of a delay's part inside its cells takes off (or adds to) their scatter.
+    """Deviations of cells from what the model expects, with the mounting effects of their runs.
+
+    Args:
+        within: Deviation of each cell from its run's mounting effect [1].
+        mounting: Mounting effect of each run [1].
+        sd: Standard deviation of that effect as observed, with the noise of the run's mean [1].
+        total: Information of a run's readings on its mounting effect, at unit noise [N^2].
+        plain: Weighted mean deviation of each run [1].
+        inside: What changes of friction and delay inside cells take off, or add to, their sum of squares [N^2].
     """
 
     within: Array
@@ -212,7 +219,7 @@ class _Deviations:
 
 
 def sum_runs(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
-    """Readings reduced to cells, cells to runs: all that the likelihood needs, whatever the number of readings."""
+    """Reduce readings to cells and cells to runs: all that the likelihood needs, whatever the number of readings."""
     cell, first = _assign_cells(cable, rows)
     weight = rows.weight(cable.description.sensors.noise_ratio)
     cell_weight = np.bincount(cell, weight)
@@ -253,7 +260,7 @@ def sum_runs(cable: Cable, rows: SlidingRows) -> dict[str, Any]:
 
 
 def pad_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, Any]:
-    """The same sums with more cells for each run, which have no weight.
+    """Return the same sums with more cells for each run, which have no weight.
 
     Args:
         data: What `sum_runs` gave.
@@ -269,7 +276,7 @@ def pad_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, 
 
 
 def _pad_runs(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.ndarray]:
-    """Cells, in order of their runs, padded to equally many a run with weightless copies of the run's first."""
+    """Pad cells, in order of their runs, to equally many a run, with weightless copies of the run's first."""
     starts, counts = np.searchsorted(run, np.arange(run[-1] + 1)), np.bincount(run)
     position = np.arange(np.max(counts))[None, :]
     source = np.where(position < counts[:, None], starts[:, None] + position, starts[:, None]).ravel()
@@ -279,7 +286,7 @@ def _pad_runs(cells: dict[str, np.ndarray], run: np.ndarray) -> dict[str, np.nda
 
 
 def _assign_cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarray]:
-    """The cell of each reading, and the first reading of each cell."""
+    """Return the cell of each reading, and the first reading of each cell."""
     keys = [rows.run, rows.stroke, *(rows.angles[name] for name in ROW_ARRAYS)]
     if cable.friction.depends_on_rate:
         keys.append(_bin_values(_round_speeds(rows.velocity), rows.run * 2 + (rows.stroke > 0), _SPEED_BINS))
@@ -293,13 +300,13 @@ def _assign_cells(cable: Cable, rows: SlidingRows) -> tuple[np.ndarray, np.ndarr
 
 
 def _round_speeds(velocity: Vector) -> Vector:
-    """Speeds in steps of a few percent; NaN where they are not known."""
+    """Round speeds to steps of a few percent; NaN where they are not known."""
     speed = np.abs(velocity)
     return np.exp(_ALIKE * np.round(np.log(np.where(speed > 0, speed, np.nan)) / _ALIKE))
 
 
 def _bin_values(values: Vector, group: Labels, most: int) -> Labels:
-    """Bins of equal counts within each group; values that are few or all alike keep to themselves."""
+    """Return bins of equal counts within each group; few or equal values keep to themselves."""
     bins = np.zeros(len(values), dtype=int)
     for name in np.unique(group):
         rows = group == name

@@ -14,13 +14,13 @@ from bowdenfit.parameters.space import Parameter, Scale
 
 
 def run_scatter(at: Circumstances) -> Parameter:
-    """Scatter from mounting to mounting, of readings that are made of one mounting each."""
+    """Return tau, the scatter from mounting to mounting."""
     meaning = at.noise.meaning("scatter of the log ratio from mounting to mounting")
     return Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfCauchy(at.defaults.run_scatter))
 
 
 def force_noise(at: Circumstances, meaning: str = "standard deviation of a force reading") -> Parameter:
-    """Noise of a force reading, the output's: free, or as the data sheet says, with its standard deviation or without."""
+    """Return the noise of an output force reading: free, fixed, or with the prior of the data sheet."""
     stated, ratio = at.description.sensors.force_noise, at.description.sensors.noise_ratio
     meaning += "" if ratio == 1 else f" at the output; at the input {f'{ratio:.3g} times that' if ratio else 'none'}"
     free = noise_of_forces(at, FORCE_NOISE, r"$\sigma_F$", meaning)
@@ -32,13 +32,13 @@ def force_noise(at: Circumstances, meaning: str = "standard deviation of a force
 
 
 def noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
-    """How forces scatter, in proportion to the loads."""
+    """Return a noise of forces whose prior is in proportion to the loads."""
     load, part = at.cable.friction.conditions.load, at.defaults.force_noise_share
     return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.describe_share(part))
 
 
 def offsets(at: Circumstances) -> list[Parameter]:
-    """What each load cell shows of no force, where the description says that this is fitted."""
+    """Return the offset of each load cell, where the description says that offsets are fitted."""
     if not at.description.fits_offsets:
         return []
     stated, load, part = at.description.sensors.offset_sd, at.cable.friction.conditions.load, at.defaults.offset_share
@@ -53,7 +53,7 @@ def offsets(at: Circumstances) -> list[Parameter]:
 
 
 def gain_error(description: Description) -> list[Parameter]:
-    """The relative gain error between the two load cells, where the description says how large that of each may be."""
+    """Return the relative gain error between the load cells, where the description says how large that of each may be."""
     sd = description.sensors.gain_sd
     if not sd:
         return []
@@ -62,13 +62,13 @@ def gain_error(description: Description) -> list[Parameter]:
 
 
 def preload(at: Circumstances) -> list[Parameter]:
-    """What readings that depend on the preload need: the preload, and the rope where bending changes it."""
+    """Return the preload, and the rope where bending changes the preload."""
     own = rope(at) if at.description.preload_follows_stretch else []
     return [*own, preload_parameter(at.description, at.defaults, preload_scale(at))]
 
 
 def preload_scale(at: Circumstances) -> Scale:
-    """The preloads that were read, or what a loop lost of them by friction as usual, or else the loads."""
+    """Return the scale of the preload: as read, or else by the force that a loop loses, or else the loads."""
     table, loop = at.measurements.table(PreloadTable), at.measurements.table(LoopTable)
     taut = table.preload[table.preload > 0] if table is not None else np.zeros(0)
     if len(taut):
@@ -83,12 +83,12 @@ def preload_scale(at: Circumstances) -> Scale:
 
 
 def rope(at: Circumstances) -> list[Parameter]:
-    """How the rope stretches and the sheath lengthens, with priors by what was read of the stretch."""
+    """Return the parameters of stretch and lengthening, with priors by the stretch that was read."""
     return rope_parameters(at.defaults, _rope_scales(at))
 
 
 def _rope_scales(at: Circumstances) -> RopeScales:
-    """Of the stretch that was read; where none was, of the loads and a usual stretch."""
+    """Return the scales of the stretch that was read; of the loads and a usual stretch where none was."""
     load, table = at.cable.friction.conditions.load, at.measurements.table(StretchTable)
     usual, bend = at.defaults.stretch_mm_without_data, at.defaults.lengthening_mm_per_radian_without_data
     if table is None or not (np.ptp(table.stretch) > 0 and np.ptp(table.load) > 0):

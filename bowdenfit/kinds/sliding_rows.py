@@ -75,7 +75,7 @@ class SlidingRows:
 
 @dataclass(frozen=True)
 class ExpectedForces:
-    """Forces as the line through a group of readings has them.
+    """Forces by the line through a group of readings.
 
     Args:
         input_force, output_force: Forces [N].
@@ -95,7 +95,7 @@ def expected_forces(
     noise: float | None,
     offsets: bool = False,
 ) -> ExpectedForces:
-    """The forces that readings together say there were.
+    """Return the forces that the readings of each group together estimate.
 
     Args:
         input_force, output_force: Readings [N].
@@ -138,7 +138,7 @@ def expected_forces(
 def _slopes(
     input_force: Vector, output_force: Vector, group: Labels, noise_ratio: float
 ) -> Float[np.ndarray, " groups"]:
-    """Slope of each group: the line through the origin with the least squares of its distances in units of their noise."""
+    """Return the slope of each group's line through the origin, by total least squares."""
     of_input, of_both, of_output = (
         np.bincount(group, product) for product in (input_force**2, input_force * output_force, output_force**2)
     )
@@ -151,7 +151,7 @@ def _slopes(
 
 
 def _fit_straight_line(along: Vector, distance: Vector) -> tuple[Vector, int]:
-    """What is left over as a straight line along the line, and its further coefficients."""
+    """Return a straight line through the distances, and the number of its further coefficients."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
         return np.zeros(len(along)), 0
@@ -160,7 +160,7 @@ def _fit_straight_line(along: Vector, distance: Vector) -> tuple[Vector, int]:
 
 
 def _fit_parabola(along: Vector, distance: Vector) -> tuple[Vector, int]:
-    """What is left over as a parabola along the line, and its coefficients; nothing where that may be noise."""
+    """Return a parabola through the distances, and its further coefficients; zeros where it may be noise."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
         return np.zeros(len(along)), 0
@@ -172,7 +172,7 @@ def _fit_parabola(along: Vector, distance: Vector) -> tuple[Vector, int]:
 
 @dataclass(frozen=True)
 class InsideRuns:
-    """Readings of runs, of which the likelihood takes several for one cell.
+    """Single readings of runs whose likelihood joins several in one cell.
 
     Args:
         cell: Cell of each reading, in the order of the term's residuals.
@@ -196,7 +196,7 @@ class InsideRuns:
 
 
 def list_readings_inside_runs(cell: Labels, run: Labels, rows: SlidingRows, noise_ratio: float) -> InsideRuns:
-    """Readings as they were taken; of very many, neighbors in one cell together.
+    """Return single readings; where there are very many, neighbors in one cell joined.
 
     Args:
         cell: Cell of each reading.

@@ -19,7 +19,7 @@ AnyTable = TypeVar("AnyTable")
 
 @dataclass(frozen=True)
 class Source:
-    """Where a table is to be read from, and what is said of it.
+    """Files of a table and what the description says of it.
 
     Args:
         kind: Name of its kind.
@@ -37,7 +37,7 @@ class Source:
 
     @property
     def files(self) -> list[Path]:
-        """Its files; patterns are expanded in sorted order.
+        """Files of the table; patterns are expanded in sorted order.
 
         Raises:
             DatasetError: A pattern matches none.
@@ -57,7 +57,7 @@ class Source:
 
     @property
     def file(self) -> Path:
-        """Its only file.
+        """The only file of the table.
 
         Raises:
             DatasetError: It has several.
@@ -69,17 +69,17 @@ class Source:
 
     @property
     def columns(self) -> dict[str, ColumnSource]:
-        """Columns that do not carry the usual names."""
+        """Columns that do not have the usual names."""
         return self.settings.columns
 
     def name_of(self, path: Path) -> str:
-        """A file as seen from the folder."""
+        """Return a file's path as seen from the folder."""
         return path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name
 
 
 @dataclass(frozen=True)
 class TableFromFiles(Generic[AnyTable]):
-    """A table and where it came from.
+    """A table with its files, remarks and row accounts.
 
     Args:
         table: The table.
@@ -121,7 +121,7 @@ STROKE = WantedColumn(
 
 @dataclass(frozen=True)
 class YesNoQuestion:
-    """A question whose yes writes a setting beside the file.
+    """A question of `bowdenfit init` whose yes writes a setting beside the file.
 
     Args:
         unless: Name of the column that answers it; it is asked only where there is none.

@@ -18,7 +18,7 @@ AnyTable = TypeVar("AnyTable")
 
 @dataclass(frozen=True, repr=False)
 class Measurements(Display):
-    """The tables of one cable, each found by its class, and remarks on how they were read.
+    """Tables of one cable, looked up by class, and remarks on how they were read.
 
     Args:
         tables: At most one of a class.
@@ -29,15 +29,15 @@ class Measurements(Display):
     remarks: tuple[str, ...] = ()
 
     def sentences(self) -> list[str]:
-        """Which tables there are."""
+        """Return which tables there are."""
         return [f"{', '.join(type(table).__name__ for table in self.tables) or 'No table'}.", *self.remarks]
 
     def table(self, of: type[AnyTable]) -> AnyTable | None:
-        """The table of a class; None if nothing of that kind was measured."""
+        """Return the table of a class; None if nothing of that kind was measured."""
         return next((table for table in self.tables if type(table) is of), None)
 
     def with_tables(self, *tables: Any) -> "Measurements":
-        """The same with other tables in place of those of their classes; None changes nothing."""
+        """Return the measurements with other tables in place of those of their classes; None changes nothing."""
         new = {type(table): table for table in tables if table is not None}
         kept = {type(table): table for table in self.tables}
         return replace(self, tables=tuple((kept | new).values()))
@@ -69,7 +69,7 @@ class AngleTable(Part):
     origin: RowOrigin
 
     def column(self, name: str) -> tuple[Vector, Vector]:
-        """Angles and detection limits of one contact."""
+        """Return angles and detection limits of one contact [rad]."""
         k = self.names.index(name)
         return self.angle[:, k], self.limit[:, k]
 
@@ -104,7 +104,7 @@ class PreloadTableSettings(Table):
 
     @property
     def measures_preload(self) -> bool:
-        """It does."""
+        """Whether the table measures the preload, which it does."""
         return True
 
 
@@ -147,7 +147,7 @@ class LoopTable(Part):
 
 
 def warn_of_single_angle(measurements: Measurements) -> list[str]:
-    """Return a warning where stretch and preload are all read at one wrap angle, which tells no lengthening."""
+    """Warn where stretch and preload are all read at one wrap angle, which leaves the lengthening unidentified."""
     tables = measurements.table(StretchTable), measurements.table(PreloadTable)
     different = np.unique(np.concatenate([table.wrap_angle for table in tables if table is not None]))
     if len(different) != 1:

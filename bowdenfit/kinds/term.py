@@ -71,7 +71,7 @@ class Term(Protocol):
 
     @property
     def noise(self) -> str:
-        """The noise scale that its residuals are standardized by."""
+        """Name of the noise scale by which its residuals are standardized."""
         ...
 
     @property
@@ -102,7 +102,7 @@ class Term(Protocol):
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What a kind looks at when it says which parameters it needs.
+    """Cable, measurements and defaults by which a kind decides which parameters it needs.
 
     Args:
         cable: The cable.
@@ -129,7 +129,7 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class Truth:
-    """What tables are measured again with on the computer.
+    """True values and random key with which tables are simulated anew.
 
     Args:
         cable: The cable.
@@ -317,23 +317,23 @@ class IndependentReadings(ABC):
 
 
 def deviations_of_readings(reading: Float[Array, " read"], expected: Float[Array, " rows"]) -> Float[Array, " read"]:
-    """Readings less what is expected of the first rows; 0 where there is no reading."""
+    """Return readings less what is expected of the first rows; 0 where there is no reading."""
     of_read = expected[: reading.shape[0]]
     return jnp.where(jnp.isnan(reading), 0.0, reading - of_read)
 
 
 def deviations_of_bounds(bound: Float[Array, " bounds"], expected: Float[Array, " rows"]) -> Float[Array, " bounds"]:
-    """Bounds less what is expected of the last rows; 0 where there is no bound."""
+    """Return bounds less what is expected of the last rows; 0 where there is no bound."""
     of_bounds = expected[expected.shape[0] - bound.shape[0] :]
     return jnp.where(jnp.isnan(bound), 0.0, bound - of_bounds)
 
 
 def join_contributions(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
-    """What each reading and bound contributes, one after the other; nothing where there is none."""
+    """Concatenate the contributions of readings and bounds; 0 where there is none."""
     return jnp.concatenate([jnp.where(jnp.isnan(known), 0.0, contributed) for known, contributed in parts])
 
 
 def round_up_count(count: int) -> int:
-    """The next of few counts: each to eight, then four to every doubling, at most a quarter more than asked for."""
+    """Return the next of few counts: each up to eight, then four to every doubling, at most a quarter more than `count`."""
     step = 1 << max(0, (count - 1).bit_length() - 3)
     return -(-count // step) * step

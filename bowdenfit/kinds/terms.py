@@ -75,13 +75,13 @@ Readings = dict[str, dict[str, jax.Array]]
 
 
 def iterate_term_kinds(measurements: Measurements) -> Iterator[tuple[TermKind[Any], Any]]:
-    """Every table with what its kind adds to the likelihood, in the order of the kinds."""
+    """Yield every table with what its kind adds to the likelihood, in the order of the kinds."""
     for kind, table in iterate_tables(measurements):
         yield TERMS[kind.name], table
 
 
 def collect_parameters(cable: Cable, measurements: Measurements) -> list[Parameter]:
-    """The parameters that the kinds of a data set ask for, each declared once."""
+    """Collect the parameters that the kinds of a data set need, each declared once."""
     kinds = list(iterate_term_kinds(measurements))
     circumstances = Circumstances(cable, measurements, any(kind.shows_mounting_scatter for kind, _ in kinds))
     needed = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
@@ -90,13 +90,13 @@ def collect_parameters(cable: Cable, measurements: Measurements) -> list[Paramet
 
 
 def candidate_kinds() -> dict[str, CandidateKind]:
-    """What can be measured next, by its name."""
+    """Return what can be measured next, by name."""
     kinds = (kind.candidate for kind in TERMS.values() if kind.candidate is not None)
     return {candidate.name: candidate for candidate in sorted(kinds, key=lambda candidate: candidate.order)}
 
 
 def find_term_kind(readings: str) -> TermKind[Any]:
-    """The kind whose readings have a name in results.
+    """Return the kind that has readings of this name.
 
     Raises:
         KeyError: None has.
@@ -150,7 +150,7 @@ def _concatenate_positive(parts: Sequence[np.ndarray]) -> np.ndarray:
 def draw_readings(
     cable: Cable, tables: Measurements, values: Mapping[str, jax.Array], key: jax.Array, scale: float = 1.0
 ) -> Readings:
-    """New readings by kind of table, of a function that JAX can compile.
+    """Draw new readings by kind of table, in a function that JAX can compile.
 
     Args:
         cable: The cable.
@@ -164,14 +164,14 @@ def draw_readings(
 
 
 def any_slipped(readings: Mapping[str, Mapping[str, jax.Array]]) -> bool:
-    """Whether a bench could not have taken some of the readings as it says it did."""
+    """Return whether a bench could not have taken some of the readings as it says it did."""
     return any(np.any(np.asarray(of.get("slipped", False))) for of in readings.values())
 
 
 def replace_table_readings(
     description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
 ) -> Measurements:
-    """The tables with what `draw_readings` gave; remarks on how tables were read do not hold for them.
+    """Return the tables with what `draw_readings` gave; remarks on how tables were read do not hold for them.
 
     Raises:
         DatasetError: The strokes of a recording cannot be found.
@@ -182,7 +182,7 @@ def replace_table_readings(
 def iterate_replaced_tables(
     description: Description, tables: Measurements, readings: Mapping[str, Mapping[str, jax.Array]]
 ) -> Iterator[Any]:
-    """The same one by one: most that a bench would not hand in are known before the strokes of recordings are looked for.
+    """Yield the tables with new readings one by one: most implausible ones are known before strokes are searched for.
 
     Raises:
         DatasetError: The strokes of a recording cannot be found.

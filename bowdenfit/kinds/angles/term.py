@@ -55,7 +55,7 @@ class AnglesTerm:
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """All readings scatter alike."""
+        """One block: all readings scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
     @property
@@ -75,7 +75,7 @@ class AnglesTerm:
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " detected"], Float[Array, " undetected"]]:
-        """Standardized deviations: of the detected readings, and of the limits of the undetected ones."""
+        """Return standardized deviations of the detected readings, and of the limits of the undetected ones."""
         theta, sigma = self._expected(values, data), values[ANGLE_NOISE]
         return deviations_of_readings(data["angle"], theta) / sigma, deviations_of_bounds(data["limit"], theta) / sigma
 
@@ -105,7 +105,7 @@ class AnglesTerm:
 
 
 def make_angles_term(cable: Cable, table: AngleTable) -> AnglesTerm:
-    """The term of an angle table, with undetected angles entering as the description says."""
+    """Return the term of an angle table, with undetected angles entering as the description says."""
     description = cable.description
     settings, route, published = (
         description.table(AngleSettings),
@@ -211,7 +211,7 @@ class AngleCandidates(CandidateKind):
 
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
-        """Return how they would be read; what is below the detection limit is not detected."""
+        """Return how the angles would be read; what is below the detection limit is not detected."""
         columns, settings = tuple(at.cable.curves), at.cable.description.table(AngleSettings)
         route, _, origin = at.rows(candidates)
         shape = (len(candidates), len(columns))
@@ -237,7 +237,7 @@ class AngleTerms(TermKind[AngleTable]):
 
     @override
     def parameters(self, table: AngleTable, at: Circumstances) -> list[Parameter]:
-        """Return those of every curve, with priors by the angles inside its range, and how angles scatter."""
+        """Return the parameters of every curve, with priors by the angles inside its range, and the noise of an angle."""
         route, degree, sd = at.description.route, float(np.rad2deg(1.0)), at.defaults.angle_noise_degrees
         assert route is not None  # an angle table is read only with one
         inside = (table.route >= route.range[0]) & (table.route <= route.range[1])

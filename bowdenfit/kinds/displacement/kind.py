@@ -147,7 +147,7 @@ class DisplacementKind(
 
     @override
     def why_implausible(self, measured: DisplacementTable, simulated: DisplacementTable) -> str:
-        """Return that forces are of another size than the measured, or that one is below nothing."""
+        """Return that forces differ much in size from the measured ones, or that one is negative."""
         if np.any(simulated.force < _NEGATIVE * max(simulated.force.max(), 0.0)):
             return "a force is negative"
         close = is_within_factor(np.ptp(measured.force), np.ptp(simulated.force))

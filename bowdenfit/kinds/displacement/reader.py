@@ -97,7 +97,7 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
 
 
 def _require_either_name(table: RawTable, columns: Mapping[str, Column], name: str, unit: str) -> Column:
-    """A column by either of its names."""
+    """Return a column by either of its names."""
     present = [spelling for spelling in _NAMES[name] if spelling in columns]
     if len(present) > 1:
         raise DatasetError(
@@ -107,7 +107,7 @@ def _require_either_name(table: RawTable, columns: Mapping[str, Column], name: s
 
 
 def _check_tensions(values: Vector, column: Column) -> None:
-    """Forces are tensions; noise about no force may be a little below 0."""
+    """Refuse forces that are clearly negative; noise about no force may be a little below 0."""
     low = int(np.argmin(values))
     if values[low] < -_NEGATIVE * max(values.max(), 0.0):
         raise column.cells[low].refuse(
@@ -117,7 +117,7 @@ def _check_tensions(values: Vector, column: Column) -> None:
 
 
 def _check_strokes(strokes: Labels, columns: Mapping[str, Column]) -> Labels | None:
-    """The strokes, of which none is held; None without a column."""
+    """Return the strokes, None without such a column; refuse held ones."""
     if "stroke" not in columns:
         return None
     if not strokes.all():
@@ -127,7 +127,7 @@ def _check_strokes(strokes: Labels, columns: Mapping[str, Column]) -> Labels | N
 
 
 def _assign_runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
-    """One run is what the column calls so, at one route value and one set of wrap angles."""
+    """Return the run of each row and the names of runs: one label at one route value and one set of wrap angles."""
     labels = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
     conditions = [
         ", ".join(
@@ -147,7 +147,7 @@ def _assign_runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[
 
 
 def _check_runs(table: DisplacementTable) -> None:
-    """A run of one reading says nothing, because where its displacement begins is fitted."""
+    """Refuse a run of one reading, which says nothing because where its displacement begins is fitted."""
     n = np.bincount(table.run)
     single_rows = np.flatnonzero(n[table.run] == 1).tolist()
     if single_rows:
@@ -160,7 +160,7 @@ def _check_runs(table: DisplacementTable) -> None:
 
 
 def _check_force(table: DisplacementTable) -> None:
-    """The force follows the displacement, and the pull takes more of it than the return."""
+    """Refuse a force that does not follow the displacement, or a return that takes more force than the pull."""
     file, x, force, pulls = table.origin.files[0], table.displacement, table.force, table.pulls
     these = pulls if pulls.sum() >= _FEWEST else table.used
     if these.sum() >= _FEWEST and np.ptp(x[these]) > 0:
@@ -186,7 +186,7 @@ def _check_force(table: DisplacementTable) -> None:
 
 
 def _mean_between(low: float, high: float, x: Vector, force: Vector) -> float:
-    """Mean force between two displacements [N]."""
+    """Return the mean force between two displacements [N]."""
     order = np.argsort(x, kind="stable")
     return float(np.mean(np.interp(np.linspace(low, high, 9), x[order], force[order])))
 
@@ -244,7 +244,7 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
 
 
 def find_early_rows(table: DisplacementTable) -> Flags:
-    """Rows of the first stroke of each run in which the force may depend on what was before it."""
+    """Flag rows of the first stroke of each run in which the force may depend on what was before it."""
     unknown = np.zeros(len(table.run), dtype=bool)
     for run in range(len(table.run_names)):
         rows = np.flatnonzero((table.run == run) & table.motion.first)
@@ -256,13 +256,13 @@ def find_early_rows(table: DisplacementTable) -> Flags:
 
 
 def _is_before_middle(table: DisplacementTable, rows: np.ndarray) -> Flags:
-    """Rows of a stroke before its middle, where no other stroke tells more."""
+    """Flag rows before the middle of a stroke, where no other stroke gives more information."""
     x = table.displacement[rows]
     return np.asarray(table.motion.stroke[rows[0]] * (x - (x[0] + x[-1]) / 2) < 0)
 
 
 def _is_before_full_slip(table: DisplacementTable, rows: np.ndarray, back: np.ndarray) -> Flags:
-    """Rows of a stroke before all of the rope is known to slide, by the way back."""
+    """Flag rows of a stroke before all of the rope is known to slide, judged by the way back."""
     way, x, force = int(table.motion.stroke[rows[0]]), table.displacement, table.force
     order = back[np.argsort(x[back], kind="stable")]
     first, low, high = x[rows[0]], x[order[0]], x[order[-1]]

@@ -19,7 +19,7 @@ ZERO = "displacement_zero"  # parameter: where the displacement of a run begins
 
 @dataclass(frozen=True)
 class Turns:
-    """Turns of the motor, those that others come after first.
+    """Turns of the motor, ordered so that a turn stands before those that come after it.
 
     Args:
         at: Displacement [mm].
@@ -38,7 +38,7 @@ class Turns:
 
 @dataclass(frozen=True, repr=False)
 class StrokeHistory(Part):
-    """How the motor moved at each reading.
+    """Stroke of each reading, and the turn of the motor that it comes after.
 
     Args:
         stroke: +1 pulling, -1 letting out.
@@ -56,14 +56,14 @@ class StrokeHistory(Part):
 
 
 def history_of_sliding_rope(stroke: Labels, displacement: Vector, run: Labels) -> StrokeHistory:
-    """Readings of which each is known to be taken while all of the rope slides."""
+    """Return the history of readings that were all taken while the whole rope slides."""
     n, start = len(stroke), np.zeros(1, dtype=int)
     turns = Turns(displacement[:1], np.ones(1, dtype=int), start, run[:1], start)
     return StrokeHistory(stroke, np.zeros(n, dtype=int), np.ones(n, dtype=bool), np.zeros(n, dtype=bool), turns)
 
 
 def follow_motor(displacement: Vector, run: Labels) -> StrokeHistory:
-    """Readings in the order in which they were taken, run by run.
+    """Return the history of readings in the order in which they were taken, run by run.
 
     A run starts as if the motor had come to its first displacement the other way, all of the rope sliding. Turns are
     remembered, and forgotten in pairs once the displacement has passed the one before, as friction between solids has it.
@@ -93,7 +93,7 @@ def follow_motor(displacement: Vector, run: Labels) -> StrokeHistory:
 
 
 def _find_turns(x: Vector, least: float) -> list[int]:
-    """First and last reading, and those between at which the displacement turned by more than jitter."""
+    """Return the first and last reading, and those between at which the displacement turned by more than jitter."""
     ends, far = [0], 0
     way = 0
     for i in range(1, len(x)):
@@ -109,23 +109,23 @@ def _find_turns(x: Vector, least: float) -> list[int]:
 
 
 class _Memory:
-    """Turns as they come, and which of them are still remembered."""
+    """Memory of turns, as in Preisach hysteresis: the turns so far, and which of them still matter."""
 
     def __init__(self) -> None:
         self.open: list[int] = []
         self._turns: list[tuple[float, int, int, int, int]] = []
 
     def begin(self, at: float, stroke: int, run: int) -> None:
-        """A run."""
+        """Begin a run, and forget the turns of the one before."""
         self.open = []
         self._add(at, stroke, run)
 
     def turn(self, at: float, stroke: int, run: int) -> None:
-        """The motor turns round, having moved one way."""
+        """Add a turn of the motor, which had moved one way."""
         self._add(at, stroke, run)
 
     def pass_by(self, at: float, way: int) -> None:
-        """The motor moves on to a displacement: what it passes is forgotten."""
+        """Move on to a displacement, and forget the pairs of turns that it passes."""
         while len(self.open) > 1 and way * (at - self._turns[self.open[-2]][0]) >= 0:
             self.open = self.open[:-2]
 
@@ -137,7 +137,7 @@ class _Memory:
         self.open.append(number)
 
     def turns(self) -> Turns:
-        """All of them."""
+        """Return all turns as arrays."""
         at, *others = zip(*self._turns, strict=True)
         return Turns(np.array(at), *(np.array(values, dtype=int) for values in others))
 
@@ -183,12 +183,12 @@ class DisplacementTable(Part):
 
     @property
     def pulls(self) -> Flags:
-        """Which of the readings were taken while the motor pulled."""
+        """Readings that were taken while the motor pulled."""
         return self.used & (self.motion.stroke > 0)
 
     @property
     def shared(self) -> tuple[float, float]:
-        """The displacements that pulling and returning readings have in common [mm]; the second is smaller without any."""
+        """Range of displacements that pull and return have in common [mm]; its end is below its start without any."""
         x, back = self.displacement, self.used & (self.motion.stroke < 0)
         if not (self.pulls.any() and back.any()):
             return 0.0, -1.0

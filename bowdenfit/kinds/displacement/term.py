@@ -34,13 +34,13 @@ Data = Mapping[str, Any]
 
 
 def rows_by_run(table: DisplacementTable) -> np.ndarray:
-    """The rows that are used, in order of their runs."""
+    """Return the numbers of the used rows, ordered by run."""
     rows = np.flatnonzero(table.used)
     return rows[np.argsort(table.run[rows], kind="stable")]
 
 
 def reading_arrays(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]:
-    """Arrays of some rows, ordered by run."""
+    """Return the arrays that the likelihood takes of some rows, ordered by run."""
     run, motion = table.run[rows], table.motion
     return {
         "displacement": table.displacement[rows],
@@ -53,7 +53,7 @@ def reading_arrays(table: DisplacementTable, rows: np.ndarray) -> dict[str, Any]
 
 
 def split_turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
-    """Turns by depth, each with the place of the one before it among those of lower depth."""
+    """Split the turns by depth, each with the rank of the turn before it among those of lower depth."""
     rank = rank_by_depth(turns)
     at = {"at": turns.at, "stroke": turns.stroke.astype(float), "after": rank[turns.after], "run": turns.run}
     return tuple(
@@ -63,21 +63,21 @@ def split_turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
 
 
 def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, np.ndarray]:
-    """Wrap angles of every run, which are those of its first row."""
+    """Return the wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
     own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
     return collect_row_angles(cable.description, RowConditions(table.route[first], own), angles).data
 
 
 def rank_by_depth(turns: Turns) -> np.ndarray:
-    """Place of each turn where they are ordered by depth."""
+    """Return the rank of each turn in order of depth."""
     rank = np.empty(len(turns.depth), dtype=int)
     rank[np.argsort(turns.depth, kind="stable")] = np.arange(len(turns.depth))
     return rank
 
 
 def zero_names(table: DisplacementTable) -> tuple[str, ...]:
-    """Parameters of the displacement without force, one a run."""
+    """Return the names of the parameters for the displacement without force, one a run."""
     n = len(table.run_names)
     return (ZERO,) if n == 1 else tuple(f"{ZERO}_{i + 1}" for i in range(n))
 
@@ -121,7 +121,7 @@ class DisplacementTerm:
         return ((rows, rows - runs), (runs, runs))
 
     def exponents(self, values: Values, data: Data) -> tuple[Float[Array, " runs"], Float[Array, " runs"]]:
-        """Friction exponent of each run, and its variance from errors of the wrap angles."""
+        """Return the friction exponent of each run [1], and its variance from errors of the wrap angles."""
         angles, variance = resolve_angles(self.cable, values, data["angles"])
         exponent = self.cable.friction_exponent(values, angles)
         return exponent, self.cable.exponent_variance(values, angles, variance)
@@ -129,7 +129,7 @@ class DisplacementTerm:
     def load_cell_force(
         self, values: Values, data: Data, exponent: Float[Array, " runs"], beside: Array | float = 0.0
     ) -> Array:
-        """Force that the motor's load cell shows at each reading [N].
+        """Return the force that the motor's load cell shows at each reading [N].
 
         Args:
             values: Values of the parameters.
@@ -174,7 +174,7 @@ class DisplacementTerm:
         )
 
     def _predict_sequentially(self, values: Values, data: Data) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
-        """Mean and standard deviation of each reading by those before it in its run."""
+        """Return mean and standard deviation of each reading [N], given those before it in its run."""
         linear = self._linearize(values, data, values)
         information = _sum_before(linear.slope**2 / linear.variance, data["start"])
         score = _sum_before(linear.slope * linear.deviation / linear.variance, data["start"])
@@ -208,13 +208,13 @@ class DisplacementTerm:
         return mean + sd * scatter(key, mean.shape, self.cable.description)
 
     def mounted_exponents(self, values: Values, data: Data) -> Float[Array, " runs"]:
-        """Friction exponent of each run with what its readings say of its mounting."""
+        """Return the friction exponent of each run [1], its mounting effect estimated from its readings."""
         linear = self._linearize(values, data, values)
         mounting, variance = linear.mounting
         return self.exponents(values, data)[0] + mounting * linear.of_runs / (linear.of_runs + variance)
 
     def friction_effect(self, values: Mapping[str, float]) -> np.ndarray:
-        """What friction makes of each force [N], to first order."""
+        """Return the part of each force that is due to friction [N], to first order."""
 
         def effect(at: Values, data: Data) -> Float[Array, " rows"]:
             return self._linearize(at, data, at).slope * self.exponents(at, data)[0][data["run"]]
@@ -231,7 +231,16 @@ class DisplacementTerm:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class _Linearization:
-    """Of readings: mean without mountings, deviation, change of the mean with the exponent, variance; variance of runs."""
+    """Readings linearized in the mounting effects of their runs.
+
+    Args:
+        mean: Expected force of each reading without mounting effects [N].
+        deviation: Reading less that [N].
+        slope: Change of the expected force with the friction exponent [N].
+        variance: Variance of each reading in its run [N^2].
+        of_runs: Variance of each run's friction exponent [1].
+        run: Number of each reading's run.
+    """
 
     mean: Array
     deviation: Array
@@ -242,14 +251,14 @@ class _Linearization:
 
     @property
     def mounting(self) -> tuple[Array, Array]:
-        """What the readings of each run say of its mounting by themselves [1], and its variance."""
+        """Mounting effect of each run by its own readings [1], and the variance of that estimate."""
         none = jnp.zeros_like(self.of_runs)
         information = jnp.maximum(none.at[self.run].add(self.slope**2 / self.variance), 1e-300)
         return none.at[self.run].add(self.slope * self.deviation / self.variance) / information, 1 / information
 
 
 def _make_rope(values: Values) -> RopeStretch:
-    """As a table of stretch has it, or linear."""
+    """Return the rope as a table of stretch has it, or a linear one."""
     if ROPE_GIVE in values:
         return RopeStretch(values[END_SPRING] / jnp.maximum(values[ROPE_GIVE], _LEAST_GIVE))
     if ROPE_STIFFNESS in values:
@@ -262,13 +271,13 @@ def _select_turns(turns: Turn, which: Array) -> Turn:
 
 
 def _sum_before(terms: Float[Array, " rows"], start: Array) -> Float[Array, " rows"]:
-    """Sum over the readings of the same run before each; `start` is the first of its run."""
+    """Return the sum over the readings before each in its run; `start` is the first of its run."""
     total = jnp.cumsum(terms) - terms
     return total - total[start]
 
 
 def make_displacement_term(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> DisplacementTerm:
-    """The term of a table of force against displacement."""
+    """Return the term of a table of force against displacement."""
     rows = rows_by_run(table)
     settings = cable.description.table(DisplacementSettings)
     stop = settings is not None and settings.end == "stop"
@@ -278,7 +287,7 @@ def make_displacement_term(cable: Cable, table: DisplacementTable, angles: Angle
 
 
 def _force_per_displacement(table: DisplacementTable) -> Scale:
-    """Range of forces over that of displacements."""
+    """Return the range of forces over that of displacements [N/mm]."""
     force, x = table.force[table.used], table.displacement[table.used]
     ranges = [float(np.ptp(values)) if len(values) else 0.0 for values in (force, x)]
     together = ranges[0] / ranges[1] if min(ranges) > 0 else 1.0
@@ -286,7 +295,7 @@ def _force_per_displacement(table: DisplacementTable) -> Scale:
 
 
 def _zero_parameters(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
-    """Where each run has no force."""
+    """Return the displacement without force of each run, as parameters."""
     share, parameters = at.defaults.displacement_zero_ranges, []
     for run, name in enumerate(zero_names(table)):
         x = table.displacement[table.run == run]
@@ -299,7 +308,7 @@ def _zero_parameters(table: DisplacementTable, at: Circumstances) -> list[Parame
 
 
 def _stiffness_parameters(table: DisplacementTable, at: Circumstances) -> list[Parameter]:
-    """Spring and rope; of a rope that nothing is said of how it gives beside the spring, which may be next to nothing."""
+    """Return spring and rope; without a table of stretch the rope's give is relative to the spring's, and may be next to 0."""
     by, settings = _force_per_displacement(table), at.description.table(DisplacementSettings)
     prior, rests = LogNormal(by.value, at.defaults.end_stiffness_log_sd), str(by)
     spring = Parameter(
@@ -322,7 +331,7 @@ def _stiffness_parameters(table: DisplacementTable, at: Circumstances) -> list[P
 
 
 def _offset_parameter(table: DisplacementTable, at: Circumstances) -> Parameter:
-    """What the cell shows of no force: a force that is off by little looks like friction, and the loop tells it."""
+    """Return the offset of the motor's load cell, which looks like friction where it is ignored."""
     stated = [p for p in offsets(at) if p.name == INPUT_OFFSET]
     if stated:
         return stated[0]
@@ -376,7 +385,7 @@ class DisplacementTerms(TermKind[DisplacementTable]):
 
     @override
     def covariates(self, table: DisplacementTable, term: Term) -> Mapping[str, np.ndarray]:
-        """Return displacement, how far the motor has moved since its turn, and wrap angle of each reading."""
+        """Return displacement, distance from the last turn, and wrap angle of each reading."""
         rows = rows_by_run(table)
         angles = np.rad2deg(np.nansum(table.own.angle[rows], axis=1))
         turns, after = table.motion.turns.at, table.motion.after[rows]

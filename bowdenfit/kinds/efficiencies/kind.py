@@ -65,7 +65,7 @@ class EfficiencyDesign(Design):
 
 
 class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyTable]):
-    """Efficiencies that somebody worked out already, one a row."""
+    """Efficiencies that were calculated before, one a row."""
 
     name = "efficiencies"
     table = EfficiencyTable
@@ -109,7 +109,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
 
     @override
     def describe(self, table: EfficiencyTable, description: Description) -> list[str]:
-        """Return how many there are, and how large."""
+        """Return how many efficiencies there are, and how large."""
         low, high = table.efficiency.min(), table.efficiency.max()
         return [f"{table.origin.files[0]}: {self.count_readings(table)}, {percent(low)} to {percent(high)}"]
 
@@ -128,7 +128,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
 
     @override
     def coarse_readings(self, table: EfficiencyTable) -> CoarseReadings | None:
-        """Look at tables where no scatter is stated."""
+        """Check tables in which no standard deviation is stated."""
         if np.any(table.sd > 0):
             return None
         settings = np.column_stack([table.route, table.own.angle])
@@ -176,7 +176,7 @@ def _is_in_percent(cell: Cell, column: Column) -> bool:
 
 
 def _read_efficiency(cell: Cell, column: Column, sd: float) -> float:
-    """Return an efficiency; noise may show one above 1, as it may show more force out than in."""
+    """Return an efficiency [1]; one slightly above 1 may be noise."""
     value = _read_ratio(cell, column)
     if value <= 0:
         raise cell.refuse(f"an efficiency of {cell.shown} is not possible; it is output force over input force.")

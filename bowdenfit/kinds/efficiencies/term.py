@@ -58,7 +58,7 @@ class EfficienciesTerm:
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """All rows scatter alike."""
+        """One block: all rows scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
     def _mean_and_sd(
@@ -98,7 +98,7 @@ class EfficienciesTerm:
 
 
 def make_efficiencies_term(cable: Cable, table: EfficiencyTable, angles: AngleTable | None) -> EfficienciesTerm:
-    """The term of an efficiency table."""
+    """Return the term of an efficiency table."""
     rows = collect_row_angles(cable.description, table, angles)
     data = rows.data | {"loss": -np.log(table.efficiency), "log_sd": table.sd / table.efficiency}
     route = cable.description.route
@@ -154,13 +154,13 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
     def with_readings(
         self, description: Description, table: EfficiencyTable, readings: Mapping[str, np.ndarray]
     ) -> EfficiencyTable:
-        """Return the table with them; a stated standard deviation is taken to be in proportion to the efficiency."""
+        """Return the table with new efficiencies, and stated standard deviations in proportion to them."""
         efficiency = readings["efficiency"]
         return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
 
     @override
     def check(self, table: EfficiencyTable, space: ParameterSpace) -> None:
-        """Refuse mountings that are all alike where nothing else makes a row scatter."""
+        """Refuse tau = 0 where a row has no standard deviation of its own, because nothing would make it scatter."""
         if any(p.name == RUN_SCATTER and p.fixed == 0 for p in space.fixed) and not np.all(table.sd > 0):
             row = table.origin.describe_row(int(np.argmin(table.sd > 0)))
             raise DescriptionError(

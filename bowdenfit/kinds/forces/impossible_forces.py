@@ -54,7 +54,7 @@ _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 
 @dataclass(frozen=True)
 class LogGains:
-    """Sliding readings of a force table.
+    """Log ratios by which sliding readings of a force table gain force.
 
     Args:
         log_gain: Logarithm of what each gains: output over input while pulling, input over output while returning [1].
@@ -70,7 +70,7 @@ class LogGains:
 
 
 def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tuple[Flags, Flags]:
-    """Which rows noise does not explain, and which rows of cells, or of the whole table, whose mean it does not explain.
+    """Flag rows whose gain noise does not explain, and rows of cells, or of the table, whose mean gain it does not.
 
     Args:
         excess: What each reading gains beyond what load cells explain [1].
@@ -98,7 +98,7 @@ def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tupl
 
 
 def _flag_gains_without_repeats(excess: Vector, log_gain: Vector, limit: float) -> tuple[Flags, Flags]:
-    """The same of readings that stand alone, with the usual noise beside what their differences show."""
+    """Flag gains where no readings repeat: their noise is the usual one, together with how the readings differ."""
     n, freedom = len(excess), _USUAL_FREEDOM + len(excess) - 1.0
     known = _USUAL_FREEDOM * _USUAL_NOISE**2
     squares = (log_gain - log_gain.mean()) ** 2
@@ -110,7 +110,7 @@ def _flag_gains_without_repeats(excess: Vector, log_gain: Vector, limit: float) 
 
 
 def flag_outliers(readings: LogGains) -> Flags:
-    """Which readings lie off the others of their cell by a factor of two and far beyond their noise."""
+    """Flag readings that lie off the others of their cell by a factor of two and far beyond their noise."""
     if len(readings.cell) - np.max(readings.cell) - 1 < _FEWEST:
         return np.zeros(len(readings.cell), dtype=bool)
     off, noise, freedom = _residual_scatter(readings)
@@ -121,7 +121,7 @@ def flag_outliers(readings: LogGains) -> Flags:
 
 
 def _residual_scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
-    """Of each row, its deviation from a straight line in one over the load; noise that all other rows show, its freedom.
+    """Return residuals of each row about a line in one over the load, the noise that all other rows show, and its freedom.
 
     The line takes what zeros and hidden tension do at low loads out of the noise.
     """
@@ -146,7 +146,7 @@ def _residual_scatter(readings: LogGains) -> tuple[Vector, Vector, Vector]:
 
 
 def _p_value(t: Vector, freedom: Vector) -> Vector:
-    """Probability of a larger Student's t; of a larger normal deviate where the freedom is infinite."""
+    """Return the probability of a larger Student's t; of a larger normal deviate where the freedom is infinite."""
     from scipy.special import ndtr, stdtr
 
     return np.asarray(np.where(np.isinf(freedom), ndtr(-t), stdtr(np.where(np.isinf(freedom), 1.0, freedom), -t)))
@@ -173,7 +173,7 @@ def check_following(table: ForceTable) -> None:
 
 
 def _does_not_follow(table: ForceTable, rows: np.ndarray, stroke: int) -> bool:
-    """Whether the output of the rows of a stroke hangs on the input by far less than a rope's, run by run."""
+    """Return whether the output of a stroke's rows depends on the input by far less than a rope's, run by run."""
     force_in, force_out = table.input_force[rows], table.output_force[rows]
     settings = np.column_stack([table.run[rows], np.nan_to_num(table.route[rows])])
     cell = np.unique(settings, axis=0, return_inverse=True)[1].ravel()
@@ -210,13 +210,13 @@ class ForceGains:
     together: Flags
 
     def share(self, stroke: int) -> float:
-        """Share of the rows of a stroke that gain force; 0 without any."""
+        """Return the share of the rows of a stroke that gain force; 0 without any."""
         on_stroke = self.stroke == stroke
         return float(np.mean(self.excess[on_stroke] > 0)) if on_stroke.any() else 0.0
 
     @property
     def mixed(self) -> bool:
-        """Whether a table of one stroke looks as if it had both: some rows gain about what the others lose."""
+        """Whether a table of one stroke seems to hold both: some rows gain about what the others lose."""
         up = self.excess > 0
         if len(np.unique(self.stroke)) > 1 or not _MIXED[0] < np.mean(up) < _MIXED[1]:
             return False
@@ -224,7 +224,7 @@ class ForceGains:
 
     @property
     def wide(self) -> bool:
-        """Whether a mistake is the whole table's."""
+        """Whether the mistake concerns the whole table."""
         return self.mixed or max(self.share(1), self.share(-1)) > _MOSTLY
 
 
@@ -252,7 +252,7 @@ def check_gains(table: ForceTable, description: Description) -> None:
 
 
 def find_gains(table: ForceTable, description: Description) -> ForceGains | None:
-    """Gains of force beyond what load cells explain; None where there are none."""
+    """Find gains of force beyond what errors of the load cells explain; None where there are none."""
     rows, readings = _log_gains(table, description)
     excess = readings.log_gain - _allowed_gain(table.input_force[rows], table.output_force[rows], description)
     if not np.any(excess > 0):
@@ -265,7 +265,7 @@ def find_gains(table: ForceTable, description: Description) -> ForceGains | None
 
 
 def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, LogGains]:
-    """Numbers of the sliding rows, and what each gains."""
+    """Return the numbers of the sliding rows, and what each gains."""
     rows = np.flatnonzero(table.stroke != 0)
     force_in, force_out, stroke = table.input_force[rows], table.output_force[rows], table.stroke[rows]
     weight = 1 / ((description.sensors.noise_ratio / force_in) ** 2 + 1 / force_out**2)
@@ -274,7 +274,7 @@ def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, Log
 
 
 def _allowed_gain(force_in: Vector, force_out: Vector, description: Description) -> Vector:
-    """What errors of gain and zero of the load cells may add to the log ratio."""
+    """Return what errors of gain and zero of the load cells may add to each log ratio [1]."""
     sensors, zero = description.sensors, _ZERO_ERROR * max(force_in.max(), force_out.max())
     of_gain = GAIN_ERROR if sensors.gain_sd is None else _SDS * sensors.gain_sd
     if sensors.offset_sd is not None:
@@ -298,7 +298,7 @@ def _refuse_gains(table: ForceTable, gains: ForceGains) -> NoReturn:
 
 
 def _describe_cause_of_table(gains: ForceGains) -> str:
-    """The usual cause of a mistake of a whole table, by which strokes show it, and its remedy."""
+    """Return the usual cause of a mistake in a whole table, by which strokes show it, and its remedy."""
     strokes = [stroke for stroke in (1, -1) if np.any(gains.stroke == stroke)]
     wrong = [stroke for stroke in strokes if gains.share(stroke) > _MOSTLY]
     units = _find_mistaken_units(gains, wrong[0]) if wrong else ""
@@ -320,7 +320,7 @@ def _describe_cause_of_table(gains: ForceGains) -> str:
 
 
 def _find_mistaken_units(gains: ForceGains, stroke: int) -> str:
-    """The units by which a table's efficiencies would be possible, in words; empty if by none."""
+    """Return the units that would make a table's efficiencies possible, in words; empty if none would."""
     ratio = float(np.exp(np.median(gains.log_gain[gains.stroke == stroke])))
     if ratio < _NO_SWAP:
         return ""
@@ -328,7 +328,7 @@ def _find_mistaken_units(gains: ForceGains, stroke: int) -> str:
 
 
 def _describe_cause_of_row(table: ForceTable, gains: ForceGains, row: int) -> str:
-    """The usual cause where most of the table is as it should be, and its remedy."""
+    """Return the usual cause where most of the table is sound, and its remedy."""
     same = (table.run[gains.rows] == table.run[row]) & (gains.stroke == table.stroke[row])
     if np.sum(same) > 1 and np.mean(gains.excess[same] > 0) > _MOSTLY:
         name = shown(table.run_names[table.run[row]])

@@ -161,12 +161,12 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 
     @override
     def warnings(self, table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
-        """Return what cannot be told from friction: gains of the load cells, and the mounting of a group that has one."""
+        """Warn of what cannot be separated from friction: gains of the load cells, and the only mounting of a group."""
         return _warn_of_gains(table, description) + _warn_of_single_mountings(table, description)
 
     @override
     def copied_readings(self, table: ForceTable) -> list[str]:
-        """Compare runs wherever they are said to be read, since a run that is copied is often given another place.
+        """Compare runs whatever their length, since a copied run is often given another one.
 
         Runs of one reading are compared by how their losses scatter along the bend, as one table.
         """
@@ -183,14 +183,14 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 
     @override
     def coarse_readings(self, table: ForceTable) -> CoarseReadings | None:
-        """Look at the output force; the input force may be set."""
+        """Check the output force; the input force may be set."""
         stroke = table.stroke.astype(float)
         settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
         return find_coarse_readings(listed(table.origin.files), settings, table.output_force, "N")
 
     @override
     def why_implausible(self, measured: ForceTable, simulated: ForceTable) -> str:
-        """Look at runs; and readings of one run and stroke must not scatter more than errors of forces may."""
+        """Check runs, and that readings of one run and stroke scatter no more than errors of forces may."""
         if np.any(simulated.input_force <= 0) or np.any(simulated.output_force <= 0):
             return "a force is not positive"
         slides = simulated.stroke != 0

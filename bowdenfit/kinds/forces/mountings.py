@@ -41,7 +41,7 @@ class ForceSettings(Table):
 def find_mountings(
     labels: Sequence[str], group: Sequence[str], route: Vector, own: OwnAngles, limits: Route | None
 ) -> tuple[Labels, list[str]]:
-    """The mounting of each row, and the name of each: a label at one length and one bend, in one group.
+    """Return the mounting of each row and the name of each mounting: a label at one length and one bend, in one group.
 
     Args:
         labels: What the table calls the run of each row.
@@ -75,7 +75,7 @@ def find_mountings(
 def remark_on_reused_labels(
     labels: Sequence[str], group: Sequence[str], n_mountings: int, file: str, route: Route | None
 ) -> str:
-    """What is said of labels that come back elsewhere or in another group; empty where none does."""
+    """Return a remark on labels that come back at another length or in another group; empty where none does."""
     distinct = list(dict.fromkeys(labels))
     if n_mountings == len(distinct):
         return ""
@@ -92,7 +92,7 @@ def remark_on_reused_labels(
 
 
 def remark_on_one_row_runs(n_rows: int, file: str) -> str:
-    """What it means that every row is a run of its own."""
+    """Return a remark on what it means that every row is a run of its own."""
     return (
         f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows tell a "
         "coefficient as surely as that many mountings do, and the scatter from mounting to mounting cannot be told from the "
@@ -102,7 +102,7 @@ def remark_on_one_row_runs(n_rows: int, file: str) -> str:
 
 
 def _cluster_values(values: Vector, step: float) -> Labels:
-    """Groups of values that leave a gap between them."""
+    """Return cluster numbers of values, parted wherever there is a gap wider than `step`."""
     known = np.nan_to_num(values, nan=-1e300)
     order = np.argsort(known, kind="stable")
     group = np.empty(len(values), dtype=int)
@@ -111,7 +111,7 @@ def _cluster_values(values: Vector, step: float) -> Labels:
 
 
 def _describe_mounting(rows: np.ndarray, route: Vector, own: OwnAngles, limits: Route | None) -> str:
-    """Length of a mounting, and its bends where there is none."""
+    """Return the length of a mounting in words, or its bends where there is none."""
     if limits is not None:
         return f"{np.mean(route[rows]):g} {limits.unit}"
     angles = [float(np.rad2deg(np.mean(column[rows]))) for column in own.angle.T if np.isfinite(column[rows]).all()]
@@ -121,7 +121,7 @@ def _describe_mounting(rows: np.ndarray, route: Vector, own: OwnAngles, limits: 
 def read_groups(
     columns: Mapping[str, Column], file: str, may_be_numbers: bool, by_group: bool
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Group of each row, empty where the table has none, and what is said of them.
+    """Return the group of each row, empty where the table has none, and remarks on them.
 
     Args:
         columns: Columns of the table.
@@ -164,7 +164,7 @@ def read_groups(
 
 
 def group_numbers(groups: Sequence[str], names: Sequence[str], n_rows: int) -> Labels:
-    """Number of each row's group among those of the cable, 0 where they share their coefficients.
+    """Return the number of each row's group among those of the cable; 0 where all share their coefficients.
 
     Args:
         groups: Groups of the cable that have coefficients of their own.
@@ -177,7 +177,7 @@ def group_numbers(groups: Sequence[str], names: Sequence[str], n_rows: int) -> L
 
 
 def _explain_no_groups(column: Column, distinct: Sequence[str], may_be_numbers: bool) -> str:
-    """Why a column does not name groups; empty where it does."""
+    """Return why a column does not name groups, in a sentence; empty where it does."""
     named = [cell for cell in column.cells if cell.text.strip()]
     heading, values = shown(column.heading), few([shown(name) for name in distinct if name], _NAMED)
     if named and not may_be_numbers and all(_is_number(cell) for cell in named):
@@ -204,5 +204,5 @@ def _is_number(cell: Cell) -> bool:
 
 
 def describe_groups(groups: Sequence[str]) -> str:
-    """'the groups new and old'"""
+    """Return the groups in words, such as "the groups new and old"."""
     return f"the groups {listed(list(groups))}"

@@ -57,7 +57,7 @@ class RunDesign:
 
 
 def typical_run(measurements: Measurements) -> RunDesign | None:
-    """The design of the runs made so far: that of the run of median length; None where none slides."""
+    """Return the design of the run of median length so far; None where none slides."""
     forces, recordings = measurements.table(ForceTable), measurements.table(Recordings)
     if forces is not None and np.any(forces.stroke != 0):
         return _run_of_table(forces)
@@ -87,7 +87,7 @@ def _run_of_recordings(recordings: Recordings) -> RunDesign | None:
 
 
 def _join_readings(force: Vector, stroke: Any, velocity: Vector, n_effective: Vector, noise: str) -> RunDesign:
-    """Readings of like force joined, stroke by stroke."""
+    """Join readings of like force, stroke by stroke."""
     groups = []
     for way in (1, -1):
         rows = np.flatnonzero(stroke == way)
@@ -99,7 +99,7 @@ def _join_readings(force: Vector, stroke: Any, velocity: Vector, n_effective: Ve
 
 
 def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesign:
-    """As many readings as a run has, all at one load and of one stroke.
+    """Return the run with all its readings at one load and of one stroke.
 
     Args:
         design: The run.
@@ -113,7 +113,7 @@ def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesig
 def make_run_simulator(
     cable: Cable, design: RunDesign
 ) -> tuple[Callable[[Mapping[str, Array], Mapping[str, Any], Array], Array], int]:
-    """Function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
+    """Return a function that simulates runs at rows of wrap angles, and how many numbers it gives for each.
 
     A run is told by the coefficients of a weighted straight-line fit to its log ratios: their mean, what differs between
     the strokes (the gain error of the load cells), and how they change with load and speed where the model lets them.
@@ -145,7 +145,7 @@ def make_run_simulator(
 
 
 def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
-    """Matrix from log ratios to the coefficients of their weighted least-squares fit."""
+    """Return the matrix from log ratios to the coefficients of their weighted least-squares fit."""
     columns = [np.ones(len(design.stroke))]
     if len(np.unique(design.stroke)) > 1:
         columns.append(design.stroke)
@@ -162,7 +162,7 @@ def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
 
 
 class ForceRunCandidates(CandidateKind):
-    """A run of forces: as many readings in one mounting as those made so far have."""
+    """A run of forces: as many readings in one mounting as the typical run so far."""
 
     name = "force"
     noun = "force run"
@@ -201,7 +201,7 @@ class ForceRunCandidates(CandidateKind):
 
     @override
     def describe_usual(self, at: Situation) -> str:
-        """Return '24 readings at 20 to 60 N, pulling and returning'."""
+        """Return the typical run in words, such as "24 readings at 20 to 60 N, pulling and returning"."""
         run = typical_run(at.measurements)
         assert run is not None
         low, high = run.input_force.min(), run.input_force.max()

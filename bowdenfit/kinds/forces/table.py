@@ -128,7 +128,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
 
 
 def _concatenate_groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
-    """Group of each row of all files; empty where none has groups."""
+    """Return the group of each row of all files; empty where none has groups."""
     if not any(t.group for t in tables):
         return ()
     return tuple(name for t in tables for name in (t.group or (NO_GROUP,) * len(t.run)))
@@ -175,7 +175,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
 
 
 def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
-    """Velocities, NaN where blank or without a column, and their internal unit."""
+    """Return velocities, NaN where blank or without a column, and their internal unit."""
     if column is None:
         return np.full(n_rows, np.nan), ""
     values = np.array(column.read_cells(lambda cell: np.nan if cell.blank else column.value(cell), np.nan))
@@ -185,7 +185,7 @@ def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:
 def _assign_runs(
     column: Column | None, source: Source, route: Vector, own: OwnAngles, origin: RowOrigin, group: tuple[str, ...]
 ) -> tuple[Labels, tuple[str, ...], list[str]]:
-    """Run of each row, the name of each run, and what had to be assumed."""
+    """Return the run of each row, the name of each run, and remarks on what had to be assumed."""
     limits, how, file = source.description.route, source.settings.run, origin.files[0]
     if how == "each row":
         return np.arange(len(route)), tuple(f"row {row}" for row in origin.row), [remark_on_one_row_runs(len(route), file)]
@@ -208,14 +208,14 @@ def _assign_runs(
 
 
 def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
-    """Where each row was read, such as "440 mm" or "45 deg"."""
+    """Return length and wrap angles of each row in words, such as "440 mm" or "45 deg"."""
     rows, units = np.column_stack([route, np.rad2deg(own.angle)]), [unit, *["deg"] * len(own.names)]
     known = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
 def _read_tensions(table: RawTable, columns: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
-    """Tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
+    """Return the tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
     column = find_end_column(table, columns, end)
     return convert_to_forces(np.array(column.read_cells(partial(_read_force, column), np.nan)), table, columns, end, pulleys)
 

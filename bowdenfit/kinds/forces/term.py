@@ -61,13 +61,13 @@ class HeldForcesTerm:
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """An interval has no scatter."""
+        """One block without degrees of freedom, because an interval has no scatter."""
         return ((len(self.labels), 0),)
 
     def _difference(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
-        """Difference of the forces on the scale on which friction is a shift, and its variance from the load cells."""
+        """Return input less output force on the scale on which friction is a shift, and its variance from the load cells."""
         friction, cells, least = self.cable.friction, LoadCells.of(values), self.cable.friction.conditions.least_force
         input_force = cells.true_input(data["input_force"], least)
         output_force = cells.true_output(data["output_force"], least)
@@ -103,7 +103,7 @@ class HeldForcesTerm:
     def _output_force(
         self, values: Mapping[str, Array], data: Mapping[str, Any], shift: Float[Array, " rows"]
     ) -> Float[Array, " rows"]:
-        """Output force that the load cell shows at a shift on the scale g; it stays positive."""
+        """Return the output force that the load cell shows at a shift on the scale g [N]; it stays positive."""
         cells, least = LoadCells.of(values), self.cable.friction.conditions.least_force
         input_force = cells.true_input(data["input_force"], least)
         output = self.cable.friction.output_force(values, input_force, shift, jnp.ones(()))
@@ -126,14 +126,14 @@ class HeldForcesTerm:
 
 
 def _number_groups(cable: Cable, table: ForceTable) -> Labels:
-    """Number of each row's group."""
+    """Return the number of each row's group."""
     return group_numbers(cable.friction.groups, table.group, len(table.run))
 
 
 def make_sliding_rows(
     description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
 ) -> SlidingRows:
-    """Some rows of a table with what its readings together say of their forces.
+    """Return some rows of a table, with the forces that the readings of each run together estimate.
 
     Args:
         description: What was said about the cable.
@@ -161,7 +161,7 @@ def make_sliding_rows(
 def _expect_forces(
     description: Description, table: ForceTable, used: np.ndarray, keys: np.ndarray
 ) -> tuple[ExpectedForces, Vector]:
-    """What the readings of a run together say of their forces, and how much each tells of its log ratio [N^2].
+    """Return the forces that readings of a run together estimate, and the information of each on its log ratio [N^2].
 
     A reading that is alone in its run is taken as it is, because a mounting of its own moves the forces themselves; but it is
     weighed by what all such readings say, so that one whose output noise makes larger does not count for more.
@@ -197,7 +197,7 @@ def _expect_forces(
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
-    """Name of a run, with its route value where it has just one."""
+    """Return the name of a run, with its route value where it has just one."""
     route = cable.description.route
     if route is None:
         return table.run_names[run]
@@ -278,7 +278,7 @@ class ForceTerms(TermKind[ForceTable]):
 
     @override
     def covariates(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
-        """Return the load of each run, where each was made at one and not all at the same; number of its group, from 1."""
+        """Return the load of each run, where each was made at one load and these differ; its group, numbered from 1."""
         if not isinstance(term, RunsTerm) or term.rows is None:
             return {}
         runs, run = np.unique(term.rows.run, return_inverse=True)

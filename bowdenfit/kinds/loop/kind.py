@@ -172,7 +172,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
 
     @override
     def contradiction(self, settings: Table | None, description: Description) -> str:
-        """Return that the table is of a cable that is no loop."""
+        """Return that the cable is no loop, in a sentence; empty if it is one."""
         wrong = settings is not None and description.cable.kind != "loop"
         return 'the table loop needs kind = "loop" under [cable]' if wrong else ""
 

@@ -58,13 +58,13 @@ class LoopTerm:
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """All rows scatter alike."""
+        """One block: all rows scatter alike."""
         return ((len(self.labels), len(self.labels)),)
 
     def _response(
         self, values: Mapping[str, Array], data: Mapping[str, Any]
     ) -> tuple[Array, Array, Array, Array | float]:
-        """Output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
+        """Return output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
         force, elastic = LoadCells.of(values).true_input(data["input_force"]), self.cable.elasticity
         if "cases" in data:
@@ -115,7 +115,7 @@ class LoopTerm:
 
 
 def make_loop_term(cable: Cable, table: LoopTable, angles: AngleTable | None) -> LoopTerm:
-    """The term of a loop table."""
+    """Return the term of a loop table."""
     rows = collect_row_angles(cable.description, table, angles)
     data = rows.data | {
         "input_force": table.input_force,
@@ -179,7 +179,7 @@ class LoopTerms(TermKind[LoopTable]):
 
     @override
     def parameters(self, table: LoopTable, at: Circumstances) -> list[Parameter]:
-        """Return preload, noise and offsets; and what its one mounting did, if other readings tell how mountings scatter."""
+        """Return preload, noise and offsets; and its mounting effect, if other readings show how mountings scatter."""
         meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
         mounting = Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
         noise = force_noise(at, at.noise.meaning("standard deviation of a force reading"))

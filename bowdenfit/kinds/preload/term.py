@@ -58,7 +58,7 @@ class PreloadTerm(IndependentReadings):
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """All readings scatter alike; a bound has no scatter."""
+        """A block of readings that scatter alike, and one of bounds, which have no scatter."""
         read = len(self.data["reading"])
         return ((read, read), (len(self.labels) - read, 0))
 
@@ -76,7 +76,7 @@ class PreloadTerm(IndependentReadings):
     def _deviations(
         self, values: Mapping[str, Array], data: Mapping[str, Any], noise: Array
     ) -> tuple[Float[Array, " read"], Float[Array, " at_most"]]:
-        """Standardized deviations: of the readings, and of those that are only known to be at most 0."""
+        """Return standardized deviations of the readings, and of those that are only known to be at most 0."""
         expected = self.expected(values, data)
         return deviations_of_readings(data["reading"], expected) / noise, deviations_of_bounds(
             data["at_most"], expected
@@ -108,7 +108,7 @@ class PreloadTerm(IndependentReadings):
 
 
 def make_preload_term(cable: Cable, table: PreloadTable) -> PreloadTerm:
-    """The term of a table of preload; rows that read 0 come last."""
+    """Return the term of a table of preload; rows that read 0 come last."""
     slack = table.preload == 0
     angles = np.concatenate([table.wrap_angle[~slack], table.wrap_angle[slack]])
     data = {"reading": table.preload[~slack], "at_most": table.preload[slack], "wrap_angle": angles}
@@ -150,7 +150,7 @@ class PreloadTerms(TermKind[PreloadTable]):
 
     @override
     def parameters(self, table: PreloadTable, at: Circumstances) -> list[Parameter]:
-        """Return the preload, and how readings scatter."""
+        """Return the preload and the noise of its readings."""
         part, by = at.defaults.preload_noise_share, preload_scale(at)
         noise = Parameter(
             PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
@@ -160,7 +160,7 @@ class PreloadTerms(TermKind[PreloadTable]):
 
     @override
     def draw(self, table: PreloadTable, truth: Truth) -> dict[str, Array]:
-        """Draw readings of a table of which nobody knows yet which rows will be slack."""
+        """Draw readings as if every row were taut; those below 0 read 0."""
         taut = replace(table, preload=np.ones(len(table.preload)))
         own_key = jax.random.split(jax.random.fold_in(truth.key, 3), 3)[1]
         return {"preload": truth.simulate(make_preload_term(truth.cable, taut), own_key)}

@@ -40,19 +40,19 @@ _HELD = ("input_force", "likely_force", "output_force", "velocity")
 
 
 def is_under_tension(recording: Recording) -> np.ndarray:
-    """Blocks that are readings of a rope under tension."""
+    """Flag blocks that are readings of a rope under tension."""
     blocks = recording.blocks
     return ~blocks.saturated & (blocks.input_force > 0) & (blocks.output_force > 0)
 
 
 def effective_counts(recording: Recording, used: np.ndarray) -> np.ndarray:
-    """What each block is worth: in proportion to its samples, and less where deviations stay alike for long."""
+    """Return how many independent readings each block counts for: by its samples, fewer where deviations persist."""
     samples = recording.blocks.samples[used].astype(float)
     return samples / recording.blocks.samples.mean() / recording.strokes.correlation
 
 
 def output_drift(recording: Recording) -> np.ndarray:
-    """Change of log F_out with time [1/s], by which a delay of its channel shifts it.
+    """Return the change of log F_out with time [1/s], by which a delay of its channel shifts it.
 
     From one block to the next where that is clear of noise, else over as many blocks on both sides as that takes, as far as
     the phase goes: a change that holds noise makes the delay seem smaller than it is, and better known.
@@ -75,20 +75,20 @@ def output_drift(recording: Recording) -> np.ndarray:
 
 
 def smooth_forces(blocks: Blocks) -> tuple[Vector, Vector]:
-    """Input and output force of each block with as little of their noise as can be, above 0 [N]; see `smooth_input`."""
+    """Return input and output force of each block with little of their noise, above 0 [N]; see `smooth_input`."""
     forces = (blocks.input_force, blocks.output_force)
     likely_in, likely_out = (np.maximum(smooth_input(f), LEAST_SHARE * np.max(np.abs(f))) for f in forces)
     return likely_in, likely_out
 
 
 def is_inside_phase(state: np.ndarray) -> np.ndarray:
-    """Blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
+    """Flag blocks whose neighbors are in the same phase: at a corner a block's mean is of two phases."""
     same = np.diff(state) == 0
     return np.append(True, same) & np.append(same, True)
 
 
 def standing_share(state: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """What a block is worth beside others of its phase: all of it while sliding, a share of one while standing still.
+    """Return the weight of each block in its phase: 1 while sliding, a share of one while standing still.
 
     The operator stands where the highest (or lowest) input left it, noise and all: every block of that phase has this one
     error in common, and together they are worth no more than one reading with twice the noise. Where inside its block the
@@ -110,24 +110,24 @@ def standing_share(state: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def _is_at_limit(recording: Recording, force: np.ndarray) -> np.ndarray:
-    """Saturated blocks in which this of the two forces stands at the end of the range, as its saturated samples do."""
+    """Flag saturated blocks in which this force stands at the end of the range, as its saturated samples do."""
     ends = [end for end in recording.account.limits if np.isfinite(end)]
     near = [np.abs(force - end) <= _NEAR_LIMIT * max(np.abs(ends)) for end in ends]
     return recording.blocks.saturated & (np.any(near, axis=0) if near else np.zeros(len(force), dtype=bool))
 
 
 def is_output_saturated(recording: Recording) -> np.ndarray:
-    """Blocks whose output force is at least as large as what was read."""
+    """Flag blocks whose output force is at least as large as what was read."""
     return _is_at_limit(recording, recording.blocks.output_force)
 
 
 def is_input_saturated(recording: Recording) -> np.ndarray:
-    """Blocks whose input force is not known."""
+    """Flag blocks whose input force is not known."""
     return _is_at_limit(recording, recording.blocks.input_force)
 
 
 def find_restarts(lost: np.ndarray) -> np.ndarray:
-    """Blocks after a stretch whose input is not known: where the operator stands there must be read anew."""
+    """Flag blocks after a stretch of unknown input, where the operator's state must be read anew."""
     return ~lost & np.append(False, lost[:-1])
 
 
@@ -154,7 +154,7 @@ class SelectedBlocks:
 
 
 def select_sliding_blocks(recording: Recording, description: Description) -> SelectedBlocks:
-    """Blocks in which the rope slides, with their log ratio.
+    """Select the blocks in which the rope slides, with their log ratio.
 
     Args:
         recording: The recording.
@@ -174,7 +174,7 @@ def select_sliding_blocks(recording: Recording, description: Description) -> Sel
 
 
 def estimate_output_noise(recording: Recording, noise_ratio: float) -> float:
-    """Standard deviation of a block's output force, from block to block, in both cells together [N].
+    """Estimate the standard deviation of a block's output force from block to block, from both cells together [N].
 
     Args:
         recording: The recording.
@@ -197,16 +197,16 @@ class BlockGroups:
     starts: np.ndarray
 
     def mean(self, values: np.ndarray) -> np.ndarray:
-        """Mean of each group, by samples."""
+        """Return the mean of each group, weighted by samples."""
         samples = self.recording.blocks.samples
         return np.add.reduceat(values * samples, self.starts) / np.add.reduceat(samples, self.starts)
 
     def any_of(self, flags: np.ndarray) -> np.ndarray:
-        """Whether a flag is set in each group."""
+        """Return whether a flag is set in each group."""
         return np.maximum.reduceat(flags, self.starts)
 
     def arrays(self, drive: type[RopeDrive | LoopDrive], usable: np.ndarray, censored: bool) -> dict[str, Any]:
-        """What every likelihood of blocks takes of them, but their weight.
+        """Return the arrays that every likelihood of blocks takes, without their weight.
 
         Args:
             drive: What the recording is of.
@@ -234,13 +234,13 @@ class BlockGroups:
         }
 
     def _count_effective(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
-        """What each group is worth: the blocks that count, inside their phases, unless its input is not known."""
+        """Return how many independent readings each group counts for; 0 where its input is not known."""
         contact = self.recording.strokes.contact
         effective = effective_counts(self.recording, np.arange(len(contact))) * (counted & is_inside_phase(contact))
         return np.add.reduceat(effective * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
-        """Which end of the range the output lies beyond, and what that says.
+        """Return which end of the range the output lies beyond, and the weight of that bound.
 
         Args:
             saturated: Blocks whose output is beyond the end of the range, as far as that counts.
@@ -256,14 +256,14 @@ class BlockGroups:
 
 
 def group_blocks(recording: Recording) -> BlockGroups:
-    """The blocks of a recording, in groups where there are more than `MOST_BLOCKS`."""
+    """Group the blocks of a recording where there are more than `MOST_BLOCKS`."""
     return BlockGroups(recording, group_starts(recording.strokes.contact, MOST_BLOCKS))
 
 
 def stack_recordings(
     recordings: Recordings, parts: Sequence[Mapping[str, Any]], angles: Mapping[str, np.ndarray]
 ) -> dict[str, Any]:
-    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
+    """Stack recordings into arrays over time and recordings; the shorter ones stand still at their end, with no weight.
 
     Args:
         recordings: The recordings.
@@ -289,13 +289,13 @@ def stack_recordings(
 
 
 def pad_columns(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"] = "edge") -> np.ndarray:
-    """Columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
+    """Put columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
     longest = max(len(column) for column in columns)
     return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
 
 
 def group_starts(state: np.ndarray, most: int) -> np.ndarray:
-    """First block of each group of blocks that are joined: of one phase only, its first and last block always alone.
+    """Return the first block of each group of joined blocks, which is of one phase; a phase's first and last block stay single.
 
     The operator stands where the end of a stroke left it, so the ends must not be averaged away.
     """

@@ -72,7 +72,7 @@ def _preparation(recording: Recording) -> dict[str, Any]:
 
 
 def describe_preparations(recordings: Recordings) -> list[str]:
-    """What was done to the recordings, line by line."""
+    """Describe the preparation of the recordings, line by line."""
     pages = list_preparations(recordings)
     losses = [(_format_or_dash(r.strokes.drag, ".3g", " N"),) if recordings.loop else () for r in recordings.items]
     rows = [_format_row(page, loss) for page, loss in zip(pages, losses, strict=True)]
@@ -103,12 +103,12 @@ def _format_row(page: dict[str, Any], loss: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _format_or_dash(value: float, digits: str, unit: str = "") -> str:
-    """A number, or a dash where it is not known."""
+    """Format a number; a dash where it is not known."""
     return f"{value:{digits}}{unit}" if np.isfinite(value) else "-"
 
 
 def _describe_delay(pages: list[dict[str, Any]]) -> list[str]:
-    """The delay, once where it is one for all."""
+    """Describe the delay, once where all recordings share it."""
     texts = {}
     for page in pages:
         delay, sd = 1000 * page["delay"], 1000 * (page["delay_sd"] if page["delay_sd"] is not None else np.nan)
@@ -168,7 +168,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def describe_single_file(self, table: Recordings) -> str:
-        """Return how long it is."""
+        """Return the length of the recording in words."""
         length = sum(float(np.ptp(r.blocks.time)) for r in table.items if len(r.blocks.time))
         return f"a recording of {length:.3g} s"
 
@@ -263,7 +263,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def copied_readings(self, table: Recordings) -> list[str]:
-        """Look for recordings of noisy cells whose forces are all the same; files may have other names and clocks."""
+        """Look for recordings of noisy cells with the same forces; their files may have other names and clocks."""
         first_with: dict[bytes, str] = {}
         copied = []
         for recording in table.items:
@@ -277,7 +277,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def why_implausible(self, measured: Recordings, simulated: Recordings) -> str:
-        """Return that recordings hardly slide, are nothing but noise, or of an efficiency that no bench reads."""
+        """Return that recordings hardly slide, are nothing but noise, or have an efficiency that no bench reads."""
         for one, other in zip(measured.items, simulated.items, strict=True):
             for stroke in (PULL, RETURN):
                 before, after = (

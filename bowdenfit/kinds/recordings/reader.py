@@ -39,7 +39,7 @@ _SAME_LENGTH = 0.005  # of the range of the route, by which a length may
 
 
 def parse_file_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
-    """Return what the name of a file says, by the table's pattern."""
+    """Return what the name of a file states, by the table's pattern."""
     if pattern is None:
         return RecordingFile(file=file)
     _check_pattern(description, pattern)
@@ -75,14 +75,14 @@ def _check_pattern(description: Description, pattern: str) -> None:
 
 
 def location_names(description: Description) -> tuple[str, ...]:
-    """Quantities that say where a recording was made."""
+    """Return the names of the quantities that say where a recording was made."""
     return (*description.angle_columns, *([description.route.variable] if description.route else []))
 
 
 def locate_by_channels(
     description: Description, file: ChannelFile, entry: RecordingFile, sources: Mapping[str, ColumnSource]
 ) -> RecordingFile:
-    """A recording's entry with the wrap angles and the length that its channels say, where it does not say them itself.
+    """Complete a recording's entry with wrap angles and length from its channels, where it does not state them itself.
 
     A channel is looked for by its name where a contact has no curve, and is that which the user names in any case.
 
@@ -115,7 +115,7 @@ def locate_by_channels(
 
 
 def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
-    """A wrap angle [rad]."""
+    """Return a wrap angle from its channel [rad]; None without such a channel."""
     steady = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
     if steady is None:
         return None
@@ -131,7 +131,7 @@ def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | No
 
 
 def _read_steady_length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
-    """A value of the route variable, in its unit."""
+    """Return the route value from its channel, in the route's unit; None without such a channel."""
     quantity = Quantity(route.variable, "route", route.unit)
     steady = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
     if steady is None:
@@ -174,7 +174,7 @@ class RecordingsTable(TableSettings):
 
 
 def angles_of_recordings(recordings: Recordings) -> RowConditions:
-    """Route values and own angles, one row a recording."""
+    """Return route values and own wrap angles, one row a recording."""
     shape = (len(recordings.items), len(recordings.columns))
     angle, sd = (np.array([getattr(r, n) for r in recordings.items]).reshape(shape) for n in ("own_angle", "own_sd"))
     return RowConditions(np.array([r.route for r in recordings.items]), OwnAngles(recordings.columns, angle, sd))
@@ -217,7 +217,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
 
 @dataclass(frozen=True)
 class _File:
-    """A recording's file as read, with what is said of it."""
+    """A recording's file as read, with its entry and settings."""
 
     raw: RawRecording
     entry: RecordingFile
@@ -228,7 +228,7 @@ class _File:
 
 
 def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
-    """Every recording prepared with one delay, and the standard error of that delay [s].
+    """Prepare every recording with one delay; return them and the standard error of that delay [s].
 
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
@@ -242,7 +242,7 @@ def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]]
 
 
 def _keep_first_loop_remark(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
-    """What is said of every loop alike, that its delay is not estimated, kept in the first account only."""
+    """Keep the remark that delays of loops are not estimated in the first account only."""
     is_stated = False
     kept = []
     for blocks, account in prepared:
@@ -253,7 +253,7 @@ def _keep_first_loop_remark(prepared: Sequence[tuple[Blocks, Account]]) -> list[
 
 
 def _pool_delays(delays: Vector, sds: Vector) -> tuple[float, float]:
-    """Weighted mean of estimated delays and its standard error [s].
+    """Return the weighted mean of estimated delays and its standard error [s].
 
     What chance did to each estimate averages out, and is at least as large as the estimates differ. What all of them have
     in common, COMMON_ERROR, does not average out.
@@ -266,7 +266,7 @@ def _pool_delays(delays: Vector, sds: Vector) -> tuple[float, float]:
 
 
 def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
-    """Every file with what is said of it; a file named in a [[recording]] is not read twice."""
+    """List every file with its entry; a file named in a [[recording]] is not read twice."""
     description = source.description
     entries = [(source.folder / entry.file, entry) for entry in description.recording]
     named = {path.resolve() for path, _ in entries}
@@ -278,7 +278,7 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
 
 
 def _name_within_run(path: Path, entry: RecordingFile) -> RecordingFile:
-    """One of several recordings of a run that have no names of their own."""
+    """Name one of several recordings of a run that have no names of their own."""
     if entry.name or not entry.run:
         return entry
     return entry.model_copy(update={"name": f"{entry.run}, {path.stem}"})
@@ -330,7 +330,7 @@ def _make_recording(description: Description, file: _File, blocks: Blocks, accou
 
 
 def _check_channel_names(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
-    """Channels of the description, if they are of quantities that a recording has."""
+    """Return the channels of the description; refuse those of quantities that a recording does not have."""
     known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), *location_names(description)]
     for name in channels:
         if name not in known:
@@ -341,7 +341,7 @@ def _check_channel_names(channels: Mapping[str, ColumnSource], description: Desc
 
 
 def _stated_angles(description: Description, entry: RecordingFile) -> tuple[np.ndarray, np.ndarray]:
-    """Wrap angles measured with a recording, and their standard deviations [rad]."""
+    """Return wrap angles stated for a recording, and their standard deviations [rad]."""
     columns = description.angle_columns
     for name in entry.wrap_angles:
         if name not in columns:

@@ -26,7 +26,7 @@ from bowdenfit.recordings.strokes import cable_of, find_strokes
 
 
 def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
-    """Forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
+    """Draw forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
     All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: it stays alike from block
     to block for as long as a block is worth less than an independent reading, and blocks of fewer samples have more.
@@ -63,14 +63,14 @@ def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array
 
 
 def _start_positions(drive: RopeDrive | LoopDrive, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
-    """Where the operator starts: a rope where it was in its band when measured, a loop at the force that was measured."""
+    """Return where the operator starts: a rope where it was in its band when measured, a loop at the measured force."""
     if isinstance(drive, LoopDrive):
         return jnp.array([r.blocks.output_force[0] for r in recordings.items])
     return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start_in_band(r) for r in recordings.items])
 
 
 def _start_in_band(recording: Recording) -> float:
-    """Where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
+    """Return where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
     blocks, strokes = recording.blocks, recording.strokes
     least = LEAST_SHARE * np.max(np.abs(blocks.input_force))
     ratio = np.log(max(blocks.output_force[0], least) / max(blocks.input_force[0], least))
@@ -78,7 +78,7 @@ def _start_in_band(recording: Recording) -> float:
 
 
 def number_shared_errors(blocks: int, correlation: float) -> np.ndarray:
-    """Which error each block has, for means of many blocks to scatter as those of a `correlation`-th as many would.
+    """Return which error each block has, so that means of blocks scatter as those of a `correlation`-th as many would.
 
     With errors shared by blocks in groups, the mean of N scatters by as much as that of N / c independent ones if c is the size
     of the group that a block is in, on average over blocks. So a share c - k of the blocks, with k the whole part of c, is in
@@ -99,7 +99,7 @@ def number_shared_errors(blocks: int, correlation: float) -> np.ndarray:
 
 
 def replace_forces(description: Description, recordings: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
-    """The recordings with forces drawn by `draw_recordings`, their strokes found anew.
+    """Return the recordings with forces drawn by `draw_recordings`, their strokes identified again.
 
     What the likelihood takes a block to be worth is kept: how long deviations stay alike is not found anew.
 

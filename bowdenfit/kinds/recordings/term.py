@@ -50,7 +50,7 @@ from bowdenfit.recordings.recording import Recording, Recordings
 def make_recordings_term(
     cable: Cable, recordings: Recordings, angles: AngleTable | None
 ) -> RunsTerm | WholeRecordingsTerm | LoopRecordingsTerm:
-    """The term of a data set's recordings, as its description wants them used; those of a loop are always whole.
+    """Return the term of a data set's recordings, used as its description says; those of a loop are always whole.
 
     Raises:
         DatasetError: Whole recordings are wanted, and one has no reversal; or in a run no block can be used.
@@ -79,19 +79,19 @@ def make_recordings_term(
 
 
 def _is_censored(settings: RecordingsTable, recordings: Recordings) -> bool:
-    """Whether readings at the end of the range count as ones beyond it, and there are any."""
+    """Return whether readings at the end of the range count as bounds, and there are any."""
     return settings.prepare.saturation == "censored" and any(r.blocks.saturated.any() for r in recordings.items)
 
 
 def _run_label(cable: Cable, recordings: Recordings, run: str) -> str:
-    """Name of a run, with its route value where it has just one and does not say it itself."""
+    """Return the name of a run, with its route value where it has just one and does not state it itself."""
     route, at = cable.description.route, {r.route for r in recordings.items if r.run == run}
     where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
     return f"{run} ({where})" if where and where not in run else run
 
 
 def _require_blocks(recordings: Recordings, parts: list[SelectedBlocks]) -> None:
-    """Every run must have something that the likelihood can use."""
+    """Refuse runs without any block that the likelihood can use."""
     for run in recordings.runs:
         members = [r for r in recordings.items if r.run == run]
         if not any(len(p.used) for r, p in zip(recordings.items, parts, strict=True) if r.run == run):
@@ -125,7 +125,7 @@ _NO_SLIDING = (
 
 
 def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBlocks:
-    r"""Every block after the rope first slid, as the log ratio it would show had it gone on sliding.
+    r"""Select every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
     Between contacts the output stands still where the last stroke left it, :math:`y = y(\hat\Lambda) - s (\Lambda -
     \hat\Lambda)`; so every block reads the friction exponent of the stroke before it.
@@ -151,7 +151,7 @@ def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBloc
 def _follow_in_parts(
     recording: Recording, kept: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The operator over the kept blocks, and the last contact up to each, started anew where the input was not known."""
+    """Return the operator over the kept blocks, and the last contact up to each, restarted where the input was not known."""
     starts = np.flatnonzero(np.append(True, find_restarts(is_input_saturated(recording))[kept][1:])[: len(x)])
     strokes, followed, state = recording.strokes, np.zeros(len(x)), np.zeros(len(x), dtype=int)
     last = np.zeros(len(x), dtype=int)
@@ -163,7 +163,7 @@ def _follow_in_parts(
 
 
 def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angles: Mapping[str, np.ndarray]) -> SlidingRows:
-    """Blocks of all recordings as rows of runs."""
+    """Return the blocks of all recordings as rows of runs."""
     of_recording = np.repeat(np.arange(len(parts)), [len(p.used) for p in parts])
     runs = recordings.runs
 
@@ -197,7 +197,7 @@ class RecordingTerms(TermKind[Recordings]):
 
     @override
     def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
-        """Return scatter of mountings and blocks, what the load cells add, and of a loop its preload."""
+        """Return scatter of mountings, noise of blocks, errors of the load cells, and the preload of a loop."""
         late = table.delay_sd
         block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
         delay = Parameter(

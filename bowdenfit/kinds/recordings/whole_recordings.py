@@ -53,7 +53,7 @@ _LOOP_REACH = 0.5  # of the friction exponent, that its first guess is corrected
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class MountingEffects:
-    """What blocks say with the mounting effects integrated out.
+    """Blocks with the mounting effects of their runs integrated out.
 
     Args:
         within: Deviations of the blocks from their run's own mounting effect.
@@ -91,11 +91,11 @@ class BlocksTerm(ABC):
 
     @abstractmethod
     def _first_guess(self, drive: Any, data: Data) -> tuple[PerRecording, PerRecording]:
-        """Mounting effect of each recording by its own hysteresis, and how far from it a better one is looked for [1]."""
+        """Return each recording's mounting effect by its own hysteresis, and how far from it a better one is looked for [1]."""
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
-        """Runs scatter by their mounting; the blocks of a run about it by the load cells."""
+        """Runs, which scatter by their mounting, and blocks, which scatter about their run by the load cells."""
         runs, blocks = len(self.labels), int(np.sum(self.data["n"]))
         return ((runs, runs), (self.data["weight"].size, max(blocks - runs, 1)))
 
@@ -112,18 +112,18 @@ class BlocksTerm(ABC):
         return self.data | long
 
     def _per_run(self, data: Data, blocks: PerTime) -> Float[Array, " runs"]:
-        """Sum over the blocks of each run."""
+        """Return the sum over the blocks of each run."""
         return jnp.zeros_like(data["n"]).at[data["run"]].add(jnp.sum(blocks, axis=0))
 
     def _drive(self, values: Values, data: Data) -> tuple[Any, Array, Array]:
-        """The cable as it lies in each recording, its wrap angles and their variances."""
+        """Return the cable at each recording's conditions, its wrap angles and their variances."""
         angles, variance = resolve_angles(self.cable, values, data)
         return make_drive(self.cable, values, angles, data["velocity"]), angles, variance
 
     def _follow(
         self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
     ) -> tuple[PerTime, PerTime]:
-        """Deviation of the readings from the operator's output, and the output's derivative by the exponent."""
+        """Return deviations of the readings from the operator's output, and the output's derivative by the exponent."""
         stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
         force = cells.true_input(data["likely_force"], drive.least_force)
         anew = jnp.where(data["restart"], stands, jnp.nan)
@@ -132,7 +132,7 @@ class BlocksTerm(ABC):
         return data["reading"] + cells.late(data["drift"]) - expected, loading
 
     def _deviations(self, values: Values, data: Data, weights: Values) -> MountingEffects:
-        """What the blocks say with the mounting integrated out."""
+        """Return the mounting effects, and the deviations of the blocks from them."""
         (drive, angles, variance), cells = self._drive(values, data), LoadCells.of(values)
         guess, reach = self._first_guess(drive, data)
         deviation, loading = self._follow(drive, cells, data, guess)
@@ -146,7 +146,7 @@ class BlocksTerm(ABC):
     def _integrate_mountings(
         self, data: Data, weights: Values, deviation: PerTime, loading: PerTime, of_angles: PerRecording
     ) -> MountingEffects:
-        """The mounting effect of each run in closed form.
+        """Return the mounting effect of each run in closed form.
 
         Args:
             data: Arrays of the term.
@@ -163,7 +163,7 @@ class BlocksTerm(ABC):
         return MountingEffects(deviation - loading * effect[data["run"]], effect, sd, total)
 
     def _excess_over_limit(self, data: Data, effects: MountingEffects, noise: Array) -> PerTime:
-        """How far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
+        """Return how far beyond the end of the range a saturated output is expected, in standard deviations of a block."""
         return data["censored"] * -effects.within * data["newtons"] / noise
 
     def log_likelihood(self, values: Values, data: Data) -> Float[Array, " runs"]:
@@ -210,7 +210,7 @@ class WholeRecordingsTerm(BlocksTerm):
         return guess, _ROPE_REACH * jnp.asarray(data["exponent"])
 
     def _typical_exponent(self, drive: RopeDrive, data: Data) -> PerRecording:
-        """Friction exponent of each recording at its mean speed [1]."""
+        """Return the friction exponent of each recording at its mean speed [1]."""
         return drive.exponent * drive.friction.rate(drive.values, data["speed"])
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:
@@ -224,7 +224,7 @@ class WholeRecordingsTerm(BlocksTerm):
         return transmission_efficiency(of_run + sd * scatter(key, sd.shape, self.cable.description))
 
     def _average_by_run(self, of_recording: Array) -> Array:
-        """Mean over the recordings of each run."""
+        """Return the mean over the recordings of each run."""
         run, runs = jnp.asarray(self.data["run"]), len(self.labels)
         counts = jnp.zeros(runs).at[run].add(1.0)
         return jnp.zeros(runs).at[run].add(of_recording) / counts
@@ -238,7 +238,7 @@ class WholeRecordingsTerm(BlocksTerm):
 def stack_rope_recordings(
     recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
 ) -> dict[str, Any]:
-    """Arrays over time and recordings; the shorter ones stand still at their end, with no weight.
+    """Stack recordings of a rope into arrays over time and recordings; shorter ones stand still at their end, without weight.
 
     The noise ratio is that of the input over that of the output.
     """
@@ -253,7 +253,7 @@ def stack_rope_recordings(
 
 
 def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
-    """Blocks of one recording; while the rope stands still the input's noise is not in the output."""
+    """Return the blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
     arrays = groups.arrays(RopeDrive, is_under_tension(recording), censored)
     likely_in, likely_out = (groups.mean(force) for force in smooth_forces(recording.blocks))
@@ -288,7 +288,7 @@ class LoopRecordingsTerm(BlocksTerm):
     def _mean_lost_force(
         self, values: Values, data: Data, drive: LoopDrive, more: PerRecording | float = 0.0
     ) -> Float[Array, " runs"]:
-        """Mean force lost in the blocks that move [N], with more friction exponent than the cable's."""
+        """Return the mean force lost in moving blocks [N], with `more` friction exponent than the cable's."""
         cells, force = LoadCells.of(values), data["input_force"]
         stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
         exponent = (drive.exponent + more)[None, :]
@@ -319,7 +319,7 @@ class LoopRecordingsTerm(BlocksTerm):
 def make_loop_recordings_term(
     cable: Cable, recordings: Recordings, angles: Mapping[str, np.ndarray], labels: tuple[str, ...], censored: bool
 ) -> LoopRecordingsTerm:
-    """The term of a loop's recordings.
+    """Return the term of a loop's recordings.
 
     Args:
         cable: The cable.
@@ -351,7 +351,7 @@ def make_loop_recordings_term(
 
 
 def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
-    """Blocks of one recording, joined inside their phases where there are many.
+    """Return the blocks of one recording, joined inside their phases where there are many.
 
     `moving` is the number of samples that show the loss, with the sign of the motion.
     """
@@ -366,7 +366,7 @@ def _loop_blocks(recording: Recording, censored: bool, noise_ratio: float) -> di
 
 
 def _input_share(recording: Recording, force: np.ndarray, stroke: np.ndarray) -> np.ndarray:
-    """How much of the input's noise each block's output has in it: what the recording's own loop passes on while it moves."""
+    """Return the share of the input's noise in each block's output: what the recording's own loop transmits while it moves."""
     loss, exponent = (float(np.nan_to_num(value)) for value in (recording.strokes.drag, recording.strokes.exponent))
     taut = np.where(stroke > 0, loop_limits(force, loss, 0.0)[0], loop_limits(force, loss, 0.0)[1])
     moving = np.where(stroke > 0, loop_limits(force, loss, exponent)[0], loop_limits(force, loss, exponent)[1])

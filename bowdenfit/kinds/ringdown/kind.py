@@ -36,7 +36,7 @@ class RingDownSettings(Table):
 
 @dataclass(frozen=True, repr=False)
 class RingDownTable(Part):
-    """What was read of a bar that swings against the rope, the motor held.
+    """Ring-downs of a bar that swings against the rope, the motor held.
 
     Args:
         time: Since the first row of the run [s].
@@ -59,7 +59,7 @@ class RingDownTable(Part):
     origin: RowOrigin
 
     def measure_half_swings(self, run: int) -> tuple[int, float]:
-        """How many half swings of a run are seen, and how long one takes [s]."""
+        """Return the number of half swings of a run, and how long one takes [s]."""
         rows = self.run == run
         time, reading = self.time[rows], self.reading[rows]
         away = reading - np.median(reading[-max(len(reading) // 10, 3) :])
@@ -122,7 +122,7 @@ def _read_runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str
 
 
 def _find_release(clock: Column, file: str, name: str, in_run: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:
-    """Time of the release and added inertia of a run."""
+    """Return the time of the release [s] and the added inertia of a run [kg m^2]."""
     called, rows = (f"{file}, run {name!r}" if name else file), np.flatnonzero(in_run)
     back = np.flatnonzero(np.diff(time[rows]) <= 0)
     if len(back):
@@ -141,7 +141,7 @@ def _find_release(clock: Column, file: str, name: str, in_run: np.ndarray, time:
 
 
 def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> None:
-    """Refuse a run of which too little is seen to tell damping from friction."""
+    """Refuse a run that shows too little to separate damping from friction."""
     called, rows = (f"{table.file}, run {name!r}" if name else table.file), int(np.sum(made.run == run))
     reading = made.reading[made.run == run]
     if rows < _FEWEST_ROWS or np.ptp(reading) == 0:
@@ -216,7 +216,7 @@ class RingDownKind(Kind[RingDownTable]):
 
     @override
     def check(self, table: RingDownTable, description: Description, measurements: Measurements) -> None:
-        """Refuse ring-downs that tell no inertia, and so neither stiffness nor damping.
+        """Refuse ring-downs that leave the inertia unknown, and with it stiffness and damping.
 
         Raises:
             DatasetError: The inertia is not stated, and not found by adding a known one.

@@ -39,7 +39,7 @@ _MORE_SWINGS = 3  # times those that are seen
 
 
 def run_parameter_name(name: str, run: int) -> str:
-    """Name of a run's own parameter."""
+    """Return the name of a run's own parameter."""
     return f"ring_{name}_{run + 1}"
 
 
@@ -55,7 +55,7 @@ class RingDownTerm(IndependentReadings):
 
     @property
     def unit(self) -> str:
-        """Of angles or of torques."""
+        """Unit of the readings: of angles or of torques."""
         return "N m" if np.any(self.data["torque"] > 0) else "rad"
 
     @override
@@ -73,7 +73,7 @@ class RingDownTerm(IndependentReadings):
 
 
 def make_ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
-    """The term of a table of ring-downs."""
+    """Return the term of a table of ring-downs."""
     swings = _sampling(table)[1]
     data = {
         "reading": table.reading, "time": table.time, "run": table.run, "added": table.added,
@@ -84,13 +84,13 @@ def make_ring_down_term(cable: Cable, table: RingDownTable) -> RingDownTerm:
 
 
 def _sampling(table: RingDownTable) -> tuple[float, int]:
-    """Interval between rows [s], and how many half swings are followed."""
+    """Return the interval between rows [s], and the number of half swings that are followed."""
     seen = max(table.measure_half_swings(run)[0] for run in range(len(table.added)))
     return float(np.median(np.diff(table.time[table.run == 0]))), _MORE_SWINGS * seen + 5
 
 
 def _first_estimates(table: RingDownTable, run: int, product: float, stiffness: float) -> tuple[float, float]:
-    """Damping [N m s/rad] and friction [N m] by the turns of a run.
+    """Estimate damping [N m s/rad] and friction [N m] from the turns of a run.
 
     Args:
         table: The table.
@@ -105,7 +105,7 @@ def _first_estimates(table: RingDownTable, run: int, product: float, stiffness: 
 
 
 def _inertia_parameter(table: RingDownTable, size: float) -> Parameter:
-    """Inertia of what swings: as stated, or found by adding a known one."""
+    """Return the inertia of what swings, as stated or to be determined by adding a known one."""
     free = Parameter(
         INERTIA, "$J$", "inertia of the released joint", "elastic", LogNormal(size, 2 * _LOG_SD), "kg*m^2",
         scaled_by=f"the largest added inertia, {size:.3g} kg m^2",
@@ -118,7 +118,7 @@ def _inertia_parameter(table: RingDownTable, size: float) -> Parameter:
 
 
 def _release_parameters(run: int, amplitude: Normal, at_rest: Normal, unit: str, step: float) -> list[Parameter]:
-    """How one run was released and read.
+    """Return the parameters of how one run was released and read.
 
     Args:
         run: Number of the run.
@@ -142,7 +142,7 @@ def _release_parameters(run: int, amplitude: Normal, at_rest: Normal, unit: str,
 
 
 def estimate_decay(table: RingDownTable, run: int) -> tuple[float, float]:
-    r"""Return the decay rho of a half swing by damping, and how far f friction can hold the bar, in units of the reading.
+    r"""Return the decay rho of a half swing by damping, and the offset f at which friction can hold the bar, as a reading.
 
     From the way D from one turn to the next, which needs no place of rest:
 

@@ -80,7 +80,7 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
 
 
 def _branch_remarks(table: RawTable, made: StretchTable, stated: bool) -> list[str]:
-    """What had to be assumed of loading and unloading."""
+    """Return remarks on what had to be assumed of loading and unloading."""
     cycles = [np.flatnonzero(made.cycle == c) for c in range(len(made.cycle_names))]
     if stated:
         down = [made.cycle_names[c] for c, rows in enumerate(cycles) if made.unloading[rows].all()]
@@ -114,7 +114,7 @@ def _read_branch(cell: Cell) -> bool:
 
 
 def _assign_cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:
-    """Cycle of each row: as named, at one wrap angle."""
+    """Return the cycle of each row and the names of cycles: one name at one wrap angle."""
     names = [cell.text.strip() or "(no cycle)" for cell in column.cells] if column else [""] * len(wrap_angle)
     shown = [
         f"{name + ', ' if name else ''}{np.rad2deg(angle):.4g} deg"
@@ -125,7 +125,7 @@ def _assign_cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, t
 
 
 def _check_rising(column: Column, made: StretchTable) -> None:
-    """Stretch that falls while load grows has its sign turned round: in one branch of a cycle, or in all together."""
+    """Refuse stretch that falls while the load grows: in one branch of a cycle, or in all together."""
     groups = [
         np.flatnonzero((made.cycle == cycle) & (made.unloading == unloading))
         for cycle, unloading in product(range(len(made.cycle_names)), (False, True))
@@ -146,7 +146,7 @@ def _check_rising(column: Column, made: StretchTable) -> None:
 
 
 def _subtract_group_means(values: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
-    """Values of all groups, each less the mean of its group."""
+    """Return the values of all groups, each less the mean of its group."""
     return np.concatenate([values[rows] - values[rows].mean() for rows in groups]) if groups else np.zeros(0)
 
 

@@ -48,7 +48,7 @@ class StretchTerm(IndependentReadings):
 
 
 def make_stretch_term(cable: Cable, table: StretchTable) -> StretchTerm:
-    """The term of a table of stretch."""
+    """Return the term of a table of stretch."""
     angles, at = np.unique(table.wrap_angle, return_inverse=True)
     data = {
         "reading": table.stretch,
@@ -109,7 +109,7 @@ class StretchTerms(TermKind[StretchTable]):
 
     @override
     def parameters(self, table: StretchTable, at: Circumstances) -> list[Parameter]:
-        """Return the rope, what the reading calls zero, how readings scatter, and friction if it is not a contact's."""
+        """Return the rope, the zero and noise of a reading, and friction where it is not a contact's."""
         zero, noise, prior = at.defaults.stretch_zero_share, at.defaults.stretch_noise_share, at.defaults.friction
         usual = at.defaults.stretch_mm_without_data
         largest = Scale(float(np.max(np.abs(table.stretch))) or usual, "largest stretch", "mm")

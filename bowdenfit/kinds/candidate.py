@@ -13,8 +13,8 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
 
 UNKNOWN_SCATTER = "the fit does not know how such readings scatter, because it has no table of them"
-GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # lengths without choices; wrap angles and loads of default candidates
-USUAL_LOAD = 20.0  # N, of examples
+GRID, MOST_ANGLES, MOST_LOADS = 11, 9, 5  # default candidates: lengths without choices, wrap angles, loads; judgements
+USUAL_LOAD = 20.0  # load of examples [N]
 STROKE_WORDS = {1: "pulling", -1: "returning"}
 Simulate = Callable[[Mapping[str, Array], Any, Array], Array]
 

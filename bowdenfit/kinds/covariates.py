@@ -15,7 +15,7 @@ from bowdenfit.kinds.term import WRAP_ANGLE, Term
 from bowdenfit.kinds.terms import find_term_kind
 
 RUN = "Run"
-_ONE_PLACE = 0.02  # of all route values or wrap angles, within which those of a run are one
+_ONE_PLACE = 0.02  # range within a run over that of all readings, up to which the run has one value; a judgement
 
 
 @dataclass(frozen=True, repr=False)

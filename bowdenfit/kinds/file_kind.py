@@ -23,7 +23,7 @@ from bowdenfit.kinds.forces.table import count_loads
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
 
-_FIRST_BYTES = 1 << 15
+_FIRST_BYTES = 1 << 15  # bytes in which a file may state its wrap angle
 _UNIT = r"(?P<{}>degrees|degree|deg|°|º|grad|rad)"
 _NUMBER = r"(?P<{}>\d+(?:[.,]\d+)?)"
 _WORD = r"(?:wrap\w*|bend\w*|umschling\w*|umlenk\w*|biegewinkel|winkel|enroulement|abraz\w*|avvolgimento|ang[lou]\w*)"
@@ -36,11 +36,12 @@ _IN_TEXT = re.compile(
 _IN_NAME = re.compile(rf"(?<![\d.]){_NUMBER.format('a')}[\s_-]?{_UNIT.format('b')}(?![a-z])", re.IGNORECASE)
 
 
-HEAD = 400  # rows by which it is decided
-_FEW, _LONG = 50, 200  # rows of a table with a slow clock, and rows beyond which one without may be a recording
+# Limits by which a file is guessed to be a table or a recording: judgements. Where they leave it open, the refusal asks which.
+HEAD = 400  # rows that are looked at
+_FEW, _LONG = 50, 200  # least rows of a recording with a slow clock, and most rows of a table without one
 _SLOW = 1.0  # seconds between rows beyond which a person may have written them
 _UNEVEN = 3.0  # largest step of a clock over its smallest
-_SMOOTH = 0.02  # mean square of the steps of a force over twice its variance: white noise has 1
+_SMOOTH = 0.02  # von Neumann's ratio: mean square of a force's steps over twice its variance; white noise has 1
 FORCES = (Quantity("input_force", "force"), Quantity("output_force", "force"))
 BESIDE_FORCES = (
     *(Quantity(name, "text") for name in ("run", "stroke", "group")),

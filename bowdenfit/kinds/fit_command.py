@@ -34,7 +34,7 @@ _SPREAD = re.compile(
 
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
-_MOST_RADIANS = 13.0  # two turns
+_MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
 
 
 @dataclass(frozen=True)

@@ -23,22 +23,24 @@ from bowdenfit.kinds.rows import ForceRows, RowOrigin
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import few, listed
 
-GAIN_ERROR = 0.01  # of a reading, that load cells may gain against each other where nothing is stated
-LOWEST, HIGHEST = 0.2, 0.99  # efficiency
+GAIN_ERROR = 0.01  # relative gain error between load cells where none is stated; a judgement
+LOWEST, HIGHEST = 0.2, 0.99  # efficiencies of a plausible bench; a judgement
 _LEAST_LOSS, _LARGEST_LOSS = -np.log(HIGHEST), -np.log(LOWEST)
-FACTOR = 10.0  # between what is simulated and what was measured, at most
-SCATTER = 0.1  # of log ratios of forces about their stroke's mean, at most
+FACTOR = 10.0  # largest ratio of what is simulated to what was measured, either way; a judgement
+SCATTER = 0.1  # largest scatter of log ratios of forces about their stroke's mean; a judgement
 
 
-FALSE_ALARM = 1e-6  # that readings agree which are no copies, below which they are said to be
-_LEAST_FREEDOM = 3  # of the scatter that is compared with the last digit
-_FINE = 3.0  # last digits in the scatter, below which readings are alike because they are rounded alike
-NO_NOISE = 1e-5  # scatter as part of the readings, below which they were computed and not measured
-_DEGREE = 3  # of the polynomial that readings follow
+# Copies are called so where independent readings would agree with a probability below FALSE_ALARM: of 5000 healthy benches none
+# is, and of pasted tables and copied runs 96 and 99 in 100 (docs/evidence/experiments.md, tests/kinds/test_copies.py).
+FALSE_ALARM = 1e-6
+_LEAST_FREEDOM = 3  # degrees of freedom of the scatter that is compared with the last digit
+_FINE = 3.0  # least scatter in last digits: below it readings agree because they are rounded alike
+NO_NOISE = 1e-5  # least scatter over the readings of a bench; with less they were computed. A judgement
+_DEGREE = 3  # degree of the smooth curve that readings follow; a judgement
 _MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
-_LEAST_AGAIN = 3  # readings of something that was read before, all alike, from which on the display is said to do that
-_POWERS = range(6, -10, -1)  # of ten, that a last digit may be
-_WHOLE = 1e-9  # as part of a multiple of a last digit, by which it may be off
+_LEAST_AGAIN = 3  # repeated readings, all alike, from which a display is called coarse; a judgement
+_POWERS = range(6, -10, -1)  # powers of ten that a last digit may be
+_WHOLE = 1e-9  # relative rounding error of a multiple of the last digit, in double precision with room
 
 
 def explain_impossible_loss(loss: np.ndarray, what: str) -> str:

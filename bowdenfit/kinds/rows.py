@@ -20,8 +20,8 @@ from bowdenfit.files.spellings import without_accents
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown, significant
 
-LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)
-_ALIKE = 0.75  # likeness from which an unknown heading is taken for a misspelled one
+LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)  # five and a half turns; more is a mistaken unit. A judgement
+_ALIKE = 0.75  # difflib's likeness from which an unknown heading is taken for a misspelled one; a judgement
 _STROKE_WORDS = {
     1: "pull pulling pulled +1 1 +1.0 1.0 loading ziehen zug hub belasten belastung tirer traction charge tirar traccion carga "
     "tirare trazione carico",
@@ -35,7 +35,7 @@ _STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in 
 ENDS = tuple(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque"))
 FileRows = tuple[list[str], list[list[str]]]
 """Headings and rows."""
-_DIGITS = 5
+_DIGITS = 5  # significant digits of the largest value of a written column; a judgement
 STROKE_NAMES = {1: "pull", -1: "return"}
 Stroke = Literal["pull", "return"]
 _SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}

@@ -18,8 +18,8 @@ from bowdenfit.types import Labels
 from bowdenfit.words import significant
 
 LeaveOut = Literal["run", "load", "reading"]
-_MOST_LOADS = 8  # of a stroke of a run, into which its readings are parted
-_MOST_PARTS = 400
+_MOST_LOADS = 8  # load levels of a stroke of a run that can be left out; a judgement
+_MOST_PARTS = 400  # parts that are left out one by one: time and memory grow with them. A judgement
 
 
 @dataclass(frozen=True)

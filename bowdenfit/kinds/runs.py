@@ -21,10 +21,12 @@ from bowdenfit.types import Labels, Vector
 
 _WEIGHTS = ("weight", "load_squares", "load_products", "drift_squares", "drift_products", "drift_loads")
 _OF_RUNS = ("n", "run_weight", "run_mean", "scatter", "log_weights")
-_LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8  # of each stroke of a run, where load, speed or a delay matters
-_FEWEST = 6  # runs of a single reading, from which their scatter is parted
-_LEAST_SHARE = 1e-3  # of the variance of a mounting, that of the noise of a reading in the middle of the loads
-_ALIKE = 0.05  # speeds that differ by less than this fraction are one
+# Cells of each stroke of a run where load, speed or a delay matters. Judgements: few suffice, because what varies inside a cell
+# enters to first order (`RunsTerm._deviations`).
+_LOAD_BINS, _SPEED_BINS, _DELAY_BINS = 24, 24, 8
+_ALIKE = 0.05  # relative difference of speeds that count as one; a judgement
+_FEWEST = 6  # single-reading runs from which their scatter is split: two parameters and some freedom. A judgement
+_LEAST_SHARE = 1e-3  # end of the grid of noise variance over that of mountings, at which one of them is as good as 0
 
 
 @dataclass(frozen=True)

@@ -24,14 +24,14 @@ from bowdenfit.types import Labels, Vector
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy", "group")
 
 
-_FEWEST_TO_SHIFT = 3  # readings of a group, from which a line that need not go through the origin is told
-_FEWEST_TO_BEND = 6  # readings of a group, from which a bend is looked for
-_FAR_BEYOND = 10.0  # F of the bend, which chance exceeds in a group of a thousand
-_FAR_OFF = 0.2  # of a log ratio from the line, from which few readings are taken as they are
-_LEAST_FREEDOM = 4  # from which distances tell the noise
-_MEDIAN = 0.6745  # of the size of a standard normal deviate
+_FEWEST_TO_SHIFT = 3  # readings of a group from which its line need not go through the origin: one more than coefficients
+_FEWEST_TO_BEND = 6  # readings of a group from which a parabola is looked for; a judgement
+_FAR_BEYOND = 10.0  # F(3, n - 3) of the parabola: noise exceeds it in 1 group of 2000 of n = 20, 1 of 22 of n = 6
+_FAR_OFF = 0.2  # distance of a log ratio from the line beyond which a small group is taken as it was read; a judgement
+_LEAST_FREEDOM = 4  # degrees of freedom from which distances estimate the noise; a judgement
+_MEDIAN = 0.6745  # median size of a standard normal deviate
 STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
-_MOST = 4000  # readings of a table that are looked at one by one; of more, so many neighbors are taken together
+_MOST = 4000  # readings that are tested one by one; neighbors of more are joined, to bound the time. A judgement
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from bowdenfit.kinds.rows import (
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles
 from bowdenfit.kinds.tables import AngleSettings, AngleTable, Measurements
 
-_FEWEST = 3  # detected angles that a plausible table has of each curve
+_FEWEST = 3  # detected angles of each curve in a plausible table: the most coefficients that a curve has
 _NUMBERS = {2: "two", 3: "three"}
 _UNDETECTED = {"censored": "known to be less", "zero": "taken as 0", "dropped": "left out"}
 

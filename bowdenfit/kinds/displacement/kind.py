@@ -32,8 +32,8 @@ from bowdenfit.types import Vector
 from bowdenfit.words import listed
 
 _SPRING, _ROPE = "end_spring", "rope_stiffness"
-_FEW_SHARE = 0.2  # of all displacements, that pull and return must have in common to be a loop
-_NEGATIVE = -0.05  # of the largest force, below which a simulated one is none of a rope's
+_FEW_SHARE = 0.2  # displacements that pull and return share, over all, from which a loop closes; a judgement
+_NEGATIVE = -0.05  # least simulated force over the largest, as the reader allows of noise about 0
 
 
 class _DisplacementRows(Frozen):

@@ -30,15 +30,16 @@ from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import few, listed
 
-_LEAST_SHARE = 0.01  # of the largest force, which a rope's may be taken for none
-_MOST_ROWS = 600  # rows that are used, of longer tables
-_PLACES = 9  # displacements at which pull and return are compared
+_LEAST_SHARE = 0.01  # least force at a turn over the largest, to keep ratios finite; a judgement
+_MOST_ROWS = 600  # rows that are used of longer tables: time grows with rows, information hardly. A judgement
+_N_COMPARED = 9  # displacements at which pull and return are compared; a judgement
 _UNUSED = ("time", "velocity")  # columns that such a table may have and that nothing reads
 _NAMES = {"force": ("force", "input_force"), "displacement": ("displacement", "position")}
-_NEGATIVE = 0.05  # of the largest force, that noise about 0 may be below it
-_FOLLOWS = 0.5  # correlation of the force with the displacement while the motor pulls, below which it does not follow
-_GAINS = 1.1  # return over pull, that noise does not make of a cable without friction
-_FEWEST = 4  # readings from which that can be said
+# Limits of what a rope with a spring shows: judgements, far beyond noise of a percent.
+_NEGATIVE = 0.05  # depth of a force below 0 over the largest force, as noise about 0
+_FOLLOWS = 0.5  # least correlation of the force with the displacement while the motor pulls
+_GAINS = 1.1  # mean force of the return over that of the pull
+_FEWEST = 4  # readings from which a correlation is looked at
 
 
 def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
@@ -268,7 +269,7 @@ def _is_before_full_slip(table: DisplacementTable, rows: np.ndarray, back: np.nd
     first, low, high = x[rows[0]], x[order[0]], x[order[-1]]
     beyond = first < low - 0.05 * (high - low) if way > 0 else first > high + 0.05 * (high - low)
     turned = np.sort(x[rows])
-    shared = np.linspace(max(low, turned[0]), min(high, turned[-1]), _PLACES)[_PLACES // 2 : -1]
+    shared = np.linspace(max(low, turned[0]), min(high, turned[-1]), _N_COMPARED)[_N_COMPARED // 2 : -1]
     there, here = (
         np.interp(shared, x[these], force[these]) for these in (rows[np.argsort(x[rows], kind="stable")], order)
     )

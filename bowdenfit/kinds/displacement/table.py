@@ -11,7 +11,7 @@ from bowdenfit.display import Part
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.types import Flags, Labels, Vector
 
-LEAST_SHARE = 0.01  # of all displacements, that the motor must go back for a turn; less is jitter
+LEAST_SHARE = 0.01  # way back over all displacements from which it is a turn and no jitter; a judgement
 
 
 ZERO = "displacement_zero"  # parameter: where the displacement of a run begins

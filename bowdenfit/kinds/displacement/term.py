@@ -27,8 +27,8 @@ from bowdenfit.physics.tendon import RopeStretch, Tendon, Turn
 
 END_SPRING, ROPE_STIFFNESS, ROPE_GIVE, DISPLACEMENT_NOISE = "end_spring", "rope_stiffness", "rope_give", "sigma_x"
 MOTOR_FORCE, AT, SINCE_TURN = "motor_force", "Displacement (mm)", "Distance from the turn (mm)"
-_LEAST_GIVE = 1e-9  # of the spring's, below which a rope is as good as one that does not give
-LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
+_LEAST_GIVE = 1e-9  # give of the rope over the spring's, to keep its stiffness finite
+LEAST_EXPONENT = 1e-9  # friction exponent with its mounting effect, below which friction would push
 Values = Mapping[str, Array]
 Data = Mapping[str, Any]
 

@@ -35,8 +35,8 @@ from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, W
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent
 
-_FRACTION = 0.01  # as a percentage it is as likely a fraction
-_SDS = 4.5  # stated standard deviations above 1, which one healthy row of 300,000 exceeds
+_FRACTION = 0.01  # efficiency up to which a percentage is as likely a fraction; a judgement
+_SDS = 4.5  # stated standard deviations above 1: one healthy row of 300,000 exceeds it
 
 
 @dataclass(frozen=True, repr=False)

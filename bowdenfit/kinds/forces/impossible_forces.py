@@ -24,29 +24,33 @@ from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent, shown
 
-FALSE_ALARM = 1e-3
-_RARER = 1e-3  # than that, for readings that stand out, whose noise need not be normal
-_FEWEST = 4  # degrees of freedom from which scatter tells the noise
-_USUAL_NOISE, _USUAL_FREEDOM = 0.02 * np.sqrt(2), 6.0  # of a log ratio where nothing tells it, and how well it is known
-_TRUNCATED = 1.8  # standard deviation of a normal over that of either half, 1.66, and some more for estimating it
-_LEAST_FOR_LINE = 3  # readings of a run and stroke, above which a line is put through them
+FALSE_ALARM = 1e-3  # healthy tables that are refused, at most; held by tests/kinds/test_gained_forces.py
+_RARER = 1e-3  # factor on FALSE_ALARM for outliers, whose noise need not be normal; a judgement
+_FEWEST = 4  # degrees of freedom from which scatter estimates the noise, to about a third: 1 / sqrt(2 * 4)
+# Noise of a log ratio where no readings repeat: 2 % in each of two cells, as if known from six readings. A judgement.
+_USUAL_NOISE, _USUAL_FREEDOM = 0.02 * np.sqrt(2), 6.0
+_TRUNCATED = 1.8  # sd of a normal over that of either half: 1 / sqrt(1 - 2 / pi) = 1.66, and 8 % for estimating it
+_LEAST_FOR_LINE = 3  # readings of a cell above which a line with two coefficients leaves some freedom
 
 
-_WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the question is asked
+# An output does not follow the input where its slope is surely below half of a rope's least, and the input explains less than
+# a quarter of its variance. Judgements, by which none of 3000 noisy benches is refused (tests/kinds/test_following.py).
+_WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the slope is looked at
 _SURE = 3.0  # standard errors of the slope
-_SLOPE = 0.5  # of the least that a rope shows, below which the output does not follow
-_EXPLAINED = 0.25  # share of the variance of the output that the input explains, below which it does not follow
-_ZERO_ERROR = 0.005  # of the largest force, that is allowed where nothing is stated
-_SDS = 3.0  # of stated errors of the load cells that are allowed
-_MOSTLY = 0.5  # of the rows of a stroke, from which a mistake is the whole table's
-_MIXED = 0.2, 0.8  # of the rows of a table of one stroke, between which the other stroke is among them
-_ABOUT = 0.3  # of what the rows of one stroke gain, that those of the other lose at least
-_FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # that ends of a cable are confused by
-_LEAST, _MOST = 0.15, 1.02  # efficiencies that such a factor must lead back to
-_NO_SWAP = 2.5  # output over input from which a unit is likelier than swapped columns
-_SLIGHT = 0.1  # log of a gain of force up to which load cells may differ
-# A row by itself is impossible, however few others show the noise, where its forces differ by this factor and by this share of
-# the table's largest force: six standard deviations of cells with a noise of a tenth of the load.
+_SLOPE = 0.5  # share of a rope's least slope
+_EXPLAINED = 0.25  # share of the variance of the output
+_ZERO_ERROR = 0.005  # error of zero over the largest force where none is stated; a judgement
+_SDS = 3.0  # standard deviations of stated errors of the load cells that are allowed: 1 in 370 is beyond
+# What follows chooses the words of a refusal, and under Student noise whether a table is refused: judgements.
+_MOSTLY = 0.5  # share of the rows of a stroke from which a mistake is the whole table's
+_MIXED = 0.2, 0.8  # shares of gaining rows between which a table of one stroke may hold both
+_ABOUT = 0.3  # least median loss of the other rows, over the median gain, where both strokes are in a table
+_FACTORS = {"lbf and N": 4.4482, "kgf and N": 9.80665, "kN and N": 1000.0}  # units that are mistaken for each other
+_LEAST, _MOST = 0.15, 1.02  # efficiencies that a cable may have once the unit is right
+_NO_SWAP = 2.5  # output over input above which a unit is likelier than swapped columns of a cable below 40 %
+_SLIGHT = 0.1  # log gain of force that load cells may differ by
+# A row is impossible by itself, however few others show the noise, where its forces differ by this factor and by this share of
+# the table's largest force. Calculation: log(2.5) is six standard deviations of cells with a noise of a tenth of the load.
 _ANY_GAIN, _LARGE_GAIN = 2.5, 0.1
 _TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}

@@ -41,7 +41,7 @@ from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent, significant
 
-_SEEN_LOSS = 0.01  # mean log ratio above which an error of the gains is said as a share of the coefficients
+_SEEN_LOSS = 0.01  # mean log ratio that a gain error of 1 % equals; below it a share of the coefficients says nothing
 
 
 class ForceDesign(Design):

@@ -14,15 +14,16 @@ from bowdenfit.kinds.rows import OwnAngles
 from bowdenfit.types import Labels, Vector
 from bowdenfit.words import few, listed, shown
 
-SAME_BEND = float(np.deg2rad(1.99))  # wrap angles that follow one another more closely are one bend, read twice
-_SDS = 4.0  # standard deviations of stated ones within which that holds too
-SAME_LENGTH = 0.005  # of the range of the route, within which it holds for lengths
+# Gaps between readings above which one label stands for several mountings: judgements.
+SAME_BEND = float(np.deg2rad(1.99))  # of wrap angles: just under 2 deg
+_SDS = 4.0  # the same in stated standard deviations of a wrap angle: one reading in 16,000 is beyond
+SAME_LENGTH = 0.005  # of lengths, as a share of the range of the route
 _NAMED = 4  # labels that a remark names
 
 
 GROUP = Quantity("group", "text")
 NO_GROUP = "(no group)"  # name of what is of none, where all share their coefficients
-_MOST_GROUPS = 12  # groups; more names than that are remarks, dates or runs
+_MOST_GROUPS = 12  # a judgement: more names than that are remarks, dates or runs
 
 
 class ForceSettings(Table):

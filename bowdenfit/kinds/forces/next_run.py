@@ -32,9 +32,9 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.types import Vector
 from bowdenfit.words import significant
 
-_MOST = 12  # forces of each stroke; more readings of a run are joined, and count for more
-_LOADS = 3  # at which all readings of a run could be taken
-_SPREAD = 1.05  # ratio of the largest to the smallest force or speed from which on their effect is looked for
+_MOST = 12  # forces of each stroke; more readings are joined, since a straight line needs no more points. A judgement
+_LOADS = 3  # loads that are offered for a whole run: lowest, middle, highest
+_SPREAD = 1.05  # ratio of the largest to the smallest force or speed that shows their effect; a judgement
 
 
 @dataclass(frozen=True)

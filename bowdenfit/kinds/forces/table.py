@@ -39,10 +39,11 @@ from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Labels, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
 
+# How readings fall together at loads: judgements, which a sentence and the guess of a file's kind rest on, and no fit.
 _MOST_LOADS = 25  # loads that are counted
 _APART = 3.0  # smallest gap between loads over the largest within one
-_SAME = 0.002  # relative difference of readings that is none
-_ONE_LOAD = 0.03  # relative width of readings that are at one load
+_SAME = 0.002  # relative difference of equal readings, the last digit of a display
+_ONE_LOAD = 0.03  # relative width of readings at one load
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 

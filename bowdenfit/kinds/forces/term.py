@@ -27,7 +27,7 @@ from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Tru
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import Labels, Vector
 
-_ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one
+_ONE_LOAD = 1.05  # highest over lowest load of a run that counts as made at one load; a judgement
 
 
 @dataclass(frozen=True)

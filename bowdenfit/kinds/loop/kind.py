@@ -44,7 +44,7 @@ from bowdenfit.types import Vector
 from bowdenfit.words import counted, shown
 
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
-_FREE = 0.25  # output over input force below which a loop moves all but freely
+_FREE = 0.25  # output over input force below which a loop moves nearly freely; a judgement
 
 
 class _LoopRows(Frozen):

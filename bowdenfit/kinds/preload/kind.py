@@ -25,7 +25,7 @@ from bowdenfit.types import Vector
 from bowdenfit.words import counted
 
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
-_FEWEST_TAUT = 3  # readings above 0 that a plausible table has
+_FEWEST_TAUT = 3  # readings above 0 in a plausible table; a judgement
 
 
 class _PreloadRows(Frozen):

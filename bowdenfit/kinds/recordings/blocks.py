@@ -27,13 +27,13 @@ from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.types import Labels, Vector
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
-_QUIET = 0.1  # share of the drifts' own spread, up to which noise may be in a drift
-_CORNER = 1  # blocks before and after a turn, over which the force changes as it does there
-_LEAST_KNOWN = 1e-9
-_NEAR_LIMIT = 0.005  # of the end of a range, within which a saturated reading is at it
+_QUIET = 0.1  # noise of a drift over the spread of drifts; more makes a delay seem small (tests/kinds/test_block_noise.py)
+_CORNER = 1  # blocks on both sides of a turn that its rate of change is taken from
+_LEAST_KNOWN = 1e-9  # share of a standing phase that is known, to keep weights positive
+_NEAR_LIMIT = 0.005  # distance from the end of a range, over it, at which a saturated reading stands; a judgement
 
 
-MOST_BLOCKS = 600  # of one recording in the play operator; more say no more once noise is averaged
+MOST_BLOCKS = 600  # of one recording in the play operator: time grows with blocks, information hardly. A judgement
 _FREE = ("weight", "n_effective", "censored", "share", "drift", "restart", "input_noise")
 WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
 _HELD = ("input_force", "likely_force", "output_force", "velocity")

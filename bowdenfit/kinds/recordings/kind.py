@@ -37,8 +37,8 @@ _LOOP_NOTE = (
 )
 
 
-_FEWEST_BLOCKS = 10  # of each stroke of a plausible recording
-_UNDER_LOAD = 0.2  # of the largest force of a loop, above which it counts as loaded
+_FEWEST_BLOCKS = 10  # blocks of each stroke of a plausible recording; a judgement
+_UNDER_LOAD = 0.2  # share of a loop's largest force above which it counts as loaded; a judgement
 
 
 def list_preparations(recordings: Recordings) -> list[dict[str, Any]]:

@@ -34,8 +34,8 @@ from bowdenfit.units import (
     speed_dimension,
 )
 
-_SAME_BEND = float(np.deg2rad(2.0))  # by which a wrap angle may change during a recording
-_SAME_LENGTH = 0.005  # of the range of the route, by which a length may
+_SAME_BEND = float(np.deg2rad(2.0))  # change of a wrap angle during a recording of one bend; as `SAME_BEND` of force tables
+_SAME_LENGTH = 0.005  # change of a length over the range of the route; as `SAME_LENGTH` of force tables
 
 
 def parse_file_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:

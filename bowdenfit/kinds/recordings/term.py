@@ -110,9 +110,7 @@ def _require_reversal(recording: Recording) -> None:
         )
 
 
-_MOSTLY = (
-    0.9  # share of the blocks that are readings of a rope under tension, from which tension is not what is missing
-)
+_MOSTLY = 0.9  # share of blocks under tension from which a refusal does not speak of tension; a judgement
 _NO_TENSION = (
     "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
     "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"

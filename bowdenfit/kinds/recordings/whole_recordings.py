@@ -37,17 +37,17 @@ from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.recordings.loop_strokes import loop_limits
 from bowdenfit.recordings.recording import Recording, Recordings
 
-_LEAST_TOTAL = 1e-20
+_LEAST_TOTAL = 1e-20  # information of a run on its mounting effect, to keep 0 / 0 finite
 
 Values = Mapping[str, Array]
 Data = Mapping[str, Any]
 
 
-_ROPE_REACH = 0.5  # of a recording's own friction exponent, that the first guess of its mounting effect is corrected by
+# Largest correction of the first guess of a mounting effect, over the friction exponent; a judgement.
+_ROPE_REACH = _LOOP_REACH = 0.5
 RECORDED_LOSS = "recorded_loss"  # name of the readings of a loop's recordings in results
-_LEAST_PRELOAD = 1e-6  # of the loads
-_LARGEST_EXPONENT = 3.0  # that a recording's own loss is taken to mean, however small the preload
-_LOOP_REACH = 0.5  # of the friction exponent, that its first guess is corrected by
+_LEAST_PRELOAD = 1e-6  # preload over the loads, to keep the exponent by a loop's loss finite
+_LARGEST_EXPONENT = 3.0  # by a recording's own loss, however small the preload: exp(-3) is an efficiency of 5 %
 
 
 @jax.tree_util.register_dataclass

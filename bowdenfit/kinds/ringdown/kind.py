@@ -23,8 +23,10 @@ from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Labels, Vector
 from bowdenfit.words import counted
 
+# Least rows of a run, half swings, and rows a half swing. Three half swings give the two equations that damping and friction
+# need (`estimate_decay`); the numbers of rows are judgements.
 _FEWEST_ROWS, _FEWEST_HALF_SWINGS, _FEWEST_A_HALF_SWING = 20, 3, 4
-_STILL = 0.1  # of the largest deflection, within which a bar is taken to have come to rest
+_STILL = 0.1  # share of the largest deflection below which crossings are taken for noise; a judgement
 _UNUSED = ("position", "velocity")  # columns that such a table may have and that nothing reads
 
 

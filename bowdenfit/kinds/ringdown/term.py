@@ -21,21 +21,17 @@ from bowdenfit.physics.ring_down import ring_down
 
 INERTIA, STIFFNESS, DAMPING, FRICTION = "ring_inertia", "ring_stiffness", "rope_damping", "ring_friction"
 NOISE = "sigma_ringdown"
-_LOG_SD = 0.5  # of inertia and stiffness about what period and added inertia say
-_TIMES = 1.5  # what damping, or friction, would be if it alone stopped the joint
-_NOISE_SHARE, _REST_SHARE = (
-    0.005,
-    0.1,
-)  # of the first deflection: as of an encoder of 2000 counts a turn; zero of a sensor
-_STARTS = (
-    -1.5,
-    0.0,
-    1.5,
-)  # z: how many half swings friction leaves is a whole number, and each has a best fit of its own
-_LEAST = 1e-9  # of a first look, which a positive prior must hold
-_LARGE = 0.15  # of the first swing, above which one counts; smaller ones are more and more noise
-_LEAST_DECAY, _MOST_DECAY = 0.05, 0.999  # decay of a half swing
-_MORE_SWINGS = 3  # times those that are seen
+_LOG_SD = 0.5  # half the prior's log sd of inertia and stiffness about what period and added inertia give; a judgement
+_TIMES = 1.5  # prior sd of damping and of friction over what would stop the joint alone; wide by judgement
+# Shares of the first deflection: noise, as of an encoder of 2000 counts a turn, and the zero of a sensor; judgements.
+_NOISE_SHARE, _REST_SHARE = 0.005, 0.1
+# Starts in z: how many half swings friction leaves is a whole number, and each has a best fit of its own.
+# Three starts pass tests/kinds/test_ring_down_coverage.py.
+_STARTS = (-1.5, 0.0, 1.5)
+_LEAST = 1e-9  # least first estimate, because priors are positive
+_LARGE = 0.15  # share of the first swing above which one counts; smaller ones are mostly noise. A judgement
+_LEAST_DECAY, _MOST_DECAY = 0.05, 0.999  # decays of a half swing between which one is estimated; wide by judgement
+_MORE_SWINGS = 3  # half swings that are followed over those seen: less friction than the best fit's leaves more of them
 
 
 def run_parameter_name(name: str, run: int) -> str:

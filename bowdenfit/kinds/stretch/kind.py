@@ -35,13 +35,13 @@ _BRANCHES = {
     **dict.fromkeys(("unload", "unloading", "down", "-1"), True),
 }
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
-_FEWEST = 2  # readings beyond one a group below which a falling stretch may be noise
-_SURE = 0.9  # how closely the stretch must follow the falling line for its sign to be refused
+_FEWEST = 2  # degrees of freedom from which a falling stretch is refused; a judgement
+_SURE = 0.9  # negative correlation of stretch and load from which the sign is refused; a judgement
 
 
-_LOW = 1 / 3  # share of the highest load above which a lowest load is not low
-_STIFFNESSES = (0.1, 1e5)  # N/mm; a meter of thin cord and of crane rope
-_FEWEST_LOADS = 4  # different loads from which stiffness and bedding-in can be told apart
+_LOW = 1 / 3  # lowest load over the highest above which bedding-in may not show; a judgement
+_STIFFNESSES = (0.1, 1e5)  # N/mm: a meter of thin cord, and of crane rope
+_FEWEST_LOADS = 4  # different loads: as many as stiffness, the two coefficients of bedding-in and the zero
 
 
 def read_stretch(source: Source) -> TableFromFiles[StretchTable]:

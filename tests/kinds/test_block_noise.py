@@ -10,8 +10,7 @@ from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.recordings.blocks import output_drift
-from bowdenfit.kinds.recordings.simulation import replace_forces
-from bowdenfit.kinds.recordings.term import make_recordings_term
+from bowdenfit.kinds.recordings.term import make_recordings_term, replace_forces
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings

@@ -9,8 +9,7 @@ import pytest
 from conftest import ROOT
 
 from bowdenfit.dataset import load_dataset
-from bowdenfit.kinds.recordings.simulation import number_shared_errors, replace_forces
-from bowdenfit.kinds.recordings.term import make_recordings_term
+from bowdenfit.kinds.recordings.term import make_recordings_term, number_shared_errors, replace_forces
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model

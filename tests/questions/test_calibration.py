@@ -27,7 +27,7 @@ from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.kind import Design
-from bowdenfit.kinds.recordings.simulation import refuse_saturated
+from bowdenfit.kinds.recordings.term import refuse_saturated
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model

@@ -1,17 +1,27 @@
-"""Recordings: their sliding blocks as runs, or every block through the play operator.
+"""Recordings in the likelihood, and simulated anew: their sliding blocks as runs, or every block through the play operator.
 
-Both ask for the same coefficients. A run's blocks say how large its friction exponent is; that of the cable is known from
-it only up to what the mounting did to this run.
+Both likelihoods need the same coefficients. A run's blocks show how large its friction exponent is; that of the cable is known
+from it only up to the effect of this run's mounting.
+
+Recordings are simulated at the level of prepared blocks. The input force of every block is kept, smoothed, and stands for the
+true one; the play operator of a cable with known coefficients makes the output force of it, errors of all sensors and the noise
+of blocks are added, and the strokes are identified again as a reader does. What happens before blocks are made (clipping,
+spikes, sampling) is not simulated.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR
+from bowdenfit.cable.conditions import LEAST_SHARE
+from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
+from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import (
@@ -23,12 +33,12 @@ from bowdenfit.kinds.recordings.blocks import (
     is_inside_phase,
     is_under_tension,
     output_drift,
+    pad_columns,
     select_sliding_blocks,
     smooth_forces,
     standing_share,
 )
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings
-from bowdenfit.kinds.recordings.simulation import draw_recordings, refuse_saturated, replace_forces
 from bowdenfit.kinds.recordings.whole_recordings import (
     LoopRecordingsTerm,
     WholeRecordingsTerm,
@@ -43,8 +53,78 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.recordings.preparation.input_smoothing import smooth_input
 from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, play
-from bowdenfit.recordings.recording import Recording, Recordings
+from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
+from bowdenfit.recordings.strokes import cable_of, find_strokes
+
+_MOSTLY = 0.9  # share of blocks under tension from which a refusal does not speak of tension; a judgement
+_NO_TENSION = (
+    "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
+    "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"
+)
+_NO_SLIDING = (
+    "nothing shows that the rope slides: the forces neither make a loop nor rise together at both ends, and no velocity says "
+    "that the motor moves. Record through a reversal, map the velocity, or say where it slides under its [[recording]], "
+    'strokes = [{ start = ..., end = ..., stroke = "pull" }]'
+)
+
+
+class RecordingTerms(TermKind[Recordings]):
+    """Recordings in the likelihood."""
+
+    name = "recordings"
+    shows_mounting_scatter = True
+
+    @override
+    def terms(self, cable: Cable, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
+        return (make_recordings_term(cable, table, angles),)
+
+    @override
+    def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
+        """Return scatter of mountings, noise of blocks, errors of the load cells, and the preload of a loop."""
+        late = table.delay_sd
+        block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
+        delay = Parameter(
+            DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
+            Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
+        )  # fmt: skip
+        of_loop = preload(at) if at.cable.is_loop else []
+        return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
+
+    @override
+    def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:
+        return draw_recordings(table, truth)
+
+    @override
+    def with_readings(self, description: Description, table: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
+        return replace_forces(description, table, readings)
+
+    @override
+    def check_drawable(self, description: Description, table: Recordings) -> None:
+        refuse_saturated(table)
+
+    @override
+    def events(self, term: Term, description: Description) -> np.ndarray:
+        """Return how many blocks each run has and how they were chosen: a run is the likelihood of all its blocks."""
+        if term.name != RECORDED:
+            return super().events(term, description)
+        settings = description.table(RecordingsTable)
+        whole = float(settings is not None and settings.likelihood == "whole")
+        return np.column_stack([term.data["n"], np.full(len(term.labels), whole)])
+
+    @override
+    def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
+        if readings != RECORDED:
+            return super().why_events_differ(readings, descriptions)
+        if len({table.likelihood for d in descriptions.values() if (table := d.table(RecordingsTable))}) > 1:
+            return (
+                "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
+            )
+        return (
+            "the fits do not count the same blocks of them, because they prepare them differently, or because friction that "
+            'depends on load or speed takes another way through whole recordings; likelihood = "runs" counts them alike'
+        )
 
 
 def make_recordings_term(
@@ -110,18 +190,6 @@ def _require_reversal(recording: Recording) -> None:
         )
 
 
-_MOSTLY = 0.9  # share of blocks under tension from which a refusal does not speak of tension; a judgement
-_NO_TENSION = (
-    "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
-    "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"
-)
-_NO_SLIDING = (
-    "nothing shows that the rope slides: the forces neither make a loop nor rise together at both ends, and no velocity says "
-    "that the motor moves. Record through a reversal, map the velocity, or say where it slides under its [[recording]], "
-    'strokes = [{ start = ..., end = ..., stroke = "pull" }]'
-)
-
-
 def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBlocks:
     r"""Select every block after the rope first slid, as the log ratio it would show had it gone on sliding.
 
@@ -183,58 +251,124 @@ def _make_sliding_rows(recordings: Recordings, parts: list[SelectedBlocks], angl
     )
 
 
-class RecordingTerms(TermKind[Recordings]):
-    """Recordings in the likelihood."""
+def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array]:
+    """Draw forces of every block (rows) of every recording (columns), padded to the longest, and the delay's error [s].
 
-    name = "recordings"
-    shows_mounting_scatter = True
+    All recordings of a run share the effect of its mounting. Noise is as the likelihood counts it: it stays alike from block
+    to block for as long as a block is worth less than an independent reading, and blocks of fewer samples have more.
 
-    @override
-    def terms(self, cable: Cable, table: Recordings, angles: AngleTable | None) -> tuple[Term]:
-        return (make_recordings_term(cable, table, angles),)
+    Args:
+        recordings: The recordings as measured.
+        truth: What they are measured with.
+    """
+    cable, values, scale = truth.cable, truth.values, truth.scale
+    of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(truth.key, 4), 4)
+    angles, variance = truth.wrap_angles(angles_of_recordings(recordings))
+    error = jnp.sqrt(variance) * jax.random.normal(of_angles, angles.shape)
+    run = np.array([recordings.runs.index(r.run) for r in recordings.items])
+    mounting = values[RUN_SCATTER] * truth.scatter(of_run, (len(recordings.runs),))[run]
+    exponent = cable.friction_exponent(values, angles + scale * error)
+    force = jnp.asarray(pad_columns([smooth_input(r.blocks.input_force) for r in recordings.items]))
+    velocity = jnp.asarray(pad_columns([r.blocks.velocity for r in recordings.items]))
+    cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent)
+    at_least = jnp.maximum(force, drive.least_force)
+    output, _ = drive.follow(at_least, scale * mounting, _start_positions(drive, recordings, at_least, scale * mounting))
+    error_numbers = pad_columns(
+        [number_shared_errors(len(r.blocks.time), r.strokes.correlation) for r in recordings.items]
+    ).astype(int)
+    fewer = jnp.asarray(pad_columns([np.sqrt(r.blocks.samples.mean() / r.blocks.samples) for r in recordings.items]))
+    shape, noise = (error_numbers.max() + 1, len(recordings.items)), scale * values[BLOCK_NOISE] * fewer
+    noises = ((cable.description.sensors.noise_ratio * noise, of_input), (noise, of_output))
+    errors = [sd * jax.random.normal(k, shape)[error_numbers, np.arange(shape[1])] for sd, k in noises]
+    return {
+        "input_force": cells.shown_input(force) + errors[0],
+        "output_force": cells.shown_output(output),
+        "output_error": errors[1],
+        "delay_error": jnp.asarray(scale * cells.delay_error),
+    }
 
-    @override
-    def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
-        """Return scatter of mountings, noise of blocks, errors of the load cells, and the preload of a loop."""
-        late = table.delay_sd
-        block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
-        delay = Parameter(
-            DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
-            Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
-        )  # fmt: skip
-        of_loop = preload(at) if at.cable.is_loop else []
-        return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
 
-    @override
-    def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:
-        return draw_recordings(table, truth)
+def _start_positions(drive: RopeDrive | LoopDrive, recordings: Recordings, force: jax.Array, mounting: jax.Array) -> jax.Array:
+    """Return where the operator starts: a rope where it was in its band when measured, a loop at the measured force."""
+    if isinstance(drive, LoopDrive):
+        return jnp.array([r.blocks.output_force[0] for r in recordings.items])
+    return drive.scaled(force)[0] + drive.band(mounting)[0] * np.array([_start_in_band(r) for r in recordings.items])
 
-    @override
-    def with_readings(self, description: Description, table: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
-        return replace_forces(description, table, readings)
 
-    @override
-    def check_drawable(self, description: Description, table: Recordings) -> None:
-        refuse_saturated(table)
+def _start_in_band(recording: Recording) -> float:
+    """Return where in its friction band a recording starts, from -1 (pulling) to 1 (returning)."""
+    blocks, strokes = recording.blocks, recording.strokes
+    least = LEAST_SHARE * np.max(np.abs(blocks.input_force))
+    ratio = np.log(max(blocks.output_force[0], least) / max(blocks.input_force[0], least))
+    return float(np.clip((ratio + strokes.center) / strokes.exponent, -1.0, 1.0))
 
-    @override
-    def events(self, term: Term, description: Description) -> np.ndarray:
-        """Return how many blocks each run has and how they were chosen: a run is the likelihood of all its blocks."""
-        if term.name != RECORDED:
-            return super().events(term, description)
-        settings = description.table(RecordingsTable)
-        whole = float(settings is not None and settings.likelihood == "whole")
-        return np.column_stack([term.data["n"], np.full(len(term.labels), whole)])
 
-    @override
-    def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
-        if readings != RECORDED:
-            return super().why_events_differ(readings, descriptions)
-        if len({table.likelihood for d in descriptions.values() if (table := d.table(RecordingsTable))}) > 1:
-            return (
-                "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
+def number_shared_errors(blocks: int, correlation: float) -> np.ndarray:
+    """Return which error each block has, so that means of blocks scatter as those of a `correlation`-th as many would.
+
+    With errors shared by blocks in groups, the mean of N scatters by as much as that of N / c independent ones if c is the size
+    of the group that a block is in, on average over blocks. So a share c - k of the blocks, with k the whole part of c, is in
+    groups of k + 1, and the others in groups of k; squares of errors then scatter as those of N / c readings do, too.
+
+    Args:
+        blocks: How many.
+        correlation: c, at least 1.
+    """
+    least = int(correlation)
+    owed, starts, at = 0.0, [], 0
+    while at < blocks:
+        starts.append(at)
+        more = int(owed + (correlation - least) * (least + 1) >= least + 1)
+        owed += (correlation - least) * (least + more) - more * (least + 1)
+        at += least + more
+    return np.searchsorted(starts, np.arange(blocks), "right") - 1
+
+
+def replace_forces(description: Description, recordings: Recordings, readings: Mapping[str, np.ndarray]) -> Recordings:
+    """Return the recordings with forces drawn by `draw_recordings`, their strokes identified again.
+
+    What the likelihood takes a block to be worth is kept: how long deviations stay alike is not found anew.
+
+    Args:
+        description: The cable.
+        recordings: The recordings as measured.
+        readings: What was drawn.
+
+    Raises:
+        DatasetError: Strokes cannot be found.
+    """
+    items = []
+    for i, recording in enumerate(recordings.items):
+        n, time = len(recording.blocks.time), recording.blocks.time
+        shown, error = readings["output_force"][:n, i], readings["output_error"][:n, i]
+        late = shown - float(readings["delay_error"]) * np.gradient(shown, time)
+        blocks = replace(recording.blocks, input_force=readings["input_force"][:n, i], output_force=late + error)
+        strokes = _find_strokes_again(description, recording, blocks)
+        items.append(replace(recording, blocks=blocks, strokes=strokes))
+    return replace(recordings, items=tuple(items))
+
+
+def _find_strokes_again(description: Description, recording: Recording, blocks: Blocks) -> Strokes:
+    spans = [
+        phase
+        for entry in description.recording
+        if entry.file == recording.file and recording.strokes.by_hand
+        for phase in entry.strokes
+    ]
+    strokes = find_strokes(blocks, recording.file, recording.name, spans, cable_of(description))
+    return replace(strokes, correlation=recording.strokes.correlation)
+
+
+def refuse_saturated(recordings: Recordings) -> None:
+    """Refuse recordings with readings at the end of a load cell's range.
+
+    Raises:
+        DatasetError: There are such; which ones would be with another friction is not known from blocks.
+    """
+    for recording in recordings.items:
+        if recording.blocks.saturated.any():
+            raise DatasetError(
+                f"{recording.file}: {int(recording.blocks.saturated.sum())} blocks of the recording {recording.name!r} are at "
+                "the end of a load cell's range, and what else would be clipped with another friction cannot be told from "
+                "blocks; leave the recording out to calibrate."
             )
-        return (
-            "the fits do not count the same blocks of them, because they prepare them differently, or because friction that "
-            'depends on load or speed takes another way through whole recordings; likelihood = "runs" counts them alike'
-        )

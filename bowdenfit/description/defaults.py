@@ -19,6 +19,9 @@ class Sensors(Frozen):
 
     Both cells have the same noise unless `input_force_noise` says what the input's is: 0 of a weight that hangs there, or
     that of a better cell, beside `force_noise`, which is then the output's.
+
+    A ratio is the force on the rope over the force that its cell reads, where a lever, pulley or drum stands between them.
+    Readings are multiplied by it as they are read; all other forces of the description are those on the rope.
     """
 
     force_noise: QuantityValue | None = None
@@ -26,6 +29,8 @@ class Sensors(Frozen):
     input_gain_error_sd: NonNegative | None = None
     output_gain_error_sd: NonNegative | None = None
     offset_sd: QuantityValue | None = None
+    input_ratio: Positive = 1.0
+    output_ratio: Positive = 1.0
 
     @model_validator(mode="before")
     @classmethod
@@ -59,6 +64,10 @@ class Sensors(Frozen):
                 "write 0 for a hung weight, which has none"
             )
         return self
+
+    def ratio(self, end: str) -> float:
+        """Force on the rope over the reading of the cell at one end, "input" or "output" [1]."""
+        return self.input_ratio if end == "input" else self.output_ratio
 
     @property
     def noise_ratio(self) -> float:

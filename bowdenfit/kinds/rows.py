@@ -10,7 +10,6 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 
 from bowdenfit.description import Description, Route
-from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
@@ -257,19 +256,23 @@ def find_end_column(table: RawTable, columns: Mapping[str, Column], end: str, *,
     return columns[torque] if torque in columns else require_column(table, columns, force, named)
 
 
-def convert_to_forces(values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
-    """Return the forces at one end [N], from its forces or torques.
+def convert_to_forces(
+    values: Vector, table: RawTable, columns: Mapping[str, Column], end: str, description: Description
+) -> Vector:
+    """Return the forces on the rope at one end [N], from what its column holds.
 
     Args:
         values: Numbers of `find_end_column`, in N or N mm.
         table, columns: Where they were read.
         end: "input" or "output".
-        pulleys: Their radii.
+        description: Radii of the pulleys, and the ratio of the force on the rope to the reading of its cell.
 
     Raises:
         DatasetError: They are torques, and the radius of that pulley is not stated.
     """
-    return pulleys.forces(values, end, table.file) if f"{end}_torque" in columns else values
+    is_torque = f"{end}_torque" in columns
+    forces = description.cable.pulleys.forces(values, end, table.file) if is_torque else values
+    return forces * description.sensors.ratio(end)
 
 
 def route_heading(description: Description) -> list[str]:

@@ -1,6 +1,7 @@
 """What a recording of a single rope says of its phases: the capstan's play operator, with drag, that follows it best."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -23,6 +24,7 @@ _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its nois
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
 _COST_OF_NOISE = 1.5  # cost up to which a loop follows its recording as well as noise lets it
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
+_LARGEST_GAIN_ERROR = 0.1  # log ratio that a bad calibration of load cells may add: ten times what their data sheets state
 
 
 def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
@@ -41,6 +43,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     level = float(np.median(few_out))
     noise_in, noise_out = (max(white_noise(force), 1e-6 * level) for force in (few_in, few_out))
     noise = float(np.median(np.hypot(noise_in / few_in, noise_out / few_out)))
+    around_other_ratio = [width, center, 0.0]
     if high - low < _ONE_PHASE * noise or low > 0 or high < 0:  # one phase: all of the ratio is friction
         width, center = max(abs(float(np.median(ratio))), _LEAST_EXPONENT), 0.0
 
@@ -53,14 +56,26 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
         if fits[-1][1] < _COST_OF_NOISE * len(few_in):
             break
     best, cost = min(fits, key=lambda fit: fit[1])
+    if cost >= _COST_OF_NOISE * len(few_in):  # a loop whose two branches both lie on one side of a ratio of 1
+        off_center = robust_minimum(model, np.array(around_other_ratio), *_LIMITS)
+        best, cost = off_center if off_center[1] < _CLEARLY * cost else (best, cost)
     exponent, middle, drag = float(best[0]), float(best[1]), level * float(best[2])
     deviation, followed, state = _follow(force_in, likely, force_out, exponent, middle, drag)
     state = clear_of_turns(state, likely)
     return Hysteresis(force_in, force_out, exponent, middle, drag, deviation, followed, state, cost / len(few_in))
 
 
+@dataclass(frozen=True)
 class RopeStrokes:
-    """The steps of `strokes.find_strokes` that a single rope takes in its own way."""
+    """The steps of `strokes.find_strokes` that a single rope takes in its own way.
+
+    Args:
+        gain_sd: Stated standard deviation of the log ratio of both load cells' gains [1].
+        fits_offsets: Whether the fit tares the load cells: an offset may put a loop anywhere.
+    """
+
+    gain_sd: float = 0.0
+    fits_offsets: bool = False
 
     follow = staticmethod(fit_loop)
     contact = staticmethod(sliding_one_way)
@@ -77,9 +92,10 @@ class RopeStrokes:
         )
 
     def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
-        """Refuse a recording whose channels are the wrong way round, or that holds nothing but the return."""
+        """Refuse a recording whose channels are swapped or read at another ratio, or that holds nothing but the return."""
         if by_hand:
             return
+        self._refuse_other_ratio(loop, file, name)
         refuse_dead(loop.force_in, loop.force_out, file, name, loop)
         swap = (
             "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
@@ -105,6 +121,28 @@ class RopeStrokes:
                 f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
                 f"wrong way round; {swap}."
             )
+
+    def _refuse_other_ratio(self, loop: Hysteresis, file: str, name: str) -> None:
+        """Refuse a hysteresis loop about another ratio of the forces than 1, which no friction makes.
+
+        Friction takes force on the pull and adds force on the return, so that a ratio of 1 lies between the two branches:
+        the middle of the loop is no farther from 1 than half its width, save for errors of the gains.
+
+        Raises:
+            DatasetError: Says the ratio, and how to state it.
+        """
+        error = max(_LARGEST_GAIN_ERROR, 4 * self.gain_sd)
+        if self.fits_offsets or not {PULL, RETURN} <= set(loop.state) or abs(loop.center) <= loop.exponent + error:
+            return
+        ratio, below = float(np.exp(-loop.center)), loop.center > 0
+        what = "below the input force on the return too" if below else "above the input force on the pull too"
+        raise DatasetError(
+            f"{file}: in {name!r} the output force follows a reversing input in a loop about {ratio:.2g} times the input "
+            f"force, and is {what}, which friction cannot do. The usual causes are a lever, a pulley or a drum between rope "
+            "and load cell, a unit that is not the one stated, and a load cell of another range. Correct the unit, or state "
+            f"the force on the rope over the reading of its cell: [sensors] output_ratio = {1 / ratio:.2g} in cable.toml, or "
+            f"--set sensors.output_ratio={1 / ratio:.2g} (input_ratio for the input's)."
+        )
 
     def estimate(
         self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str

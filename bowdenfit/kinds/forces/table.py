@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bowdenfit.description.pulleys import Pulleys
+from bowdenfit.description import Description
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
@@ -149,8 +149,8 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
     columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
-    pulleys, nothing = source.description.cable.pulleys, np.full(len(table.rows), np.nan)
-    read = partial(_read_tensions, table, columns, pulleys)
+    nothing = np.full(len(table.rows), np.nan)
+    read = partial(_read_tensions, table, columns, source.description)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
     own = read_own_angles(table, columns, contacts)
     route_values = read_route(table, columns, route)
@@ -215,10 +215,11 @@ def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
 
 
-def _read_tensions(table: RawTable, columns: Mapping[str, Column], pulleys: Pulleys, end: str) -> Vector:
+def _read_tensions(table: RawTable, columns: Mapping[str, Column], description: Description, end: str) -> Vector:
     """Return the tensions at one end [N], from its forces, or from its torques and the radius of its pulley."""
     column = find_end_column(table, columns, end)
-    return convert_to_forces(np.array(column.read_cells(partial(_read_force, column), np.nan)), table, columns, end, pulleys)
+    values = np.array(column.read_cells(partial(_read_force, column), np.nan))
+    return convert_to_forces(values, table, columns, end, description)
 
 
 def _read_force(column: Column, cell: Cell) -> float:

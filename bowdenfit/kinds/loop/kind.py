@@ -8,7 +8,6 @@ from typing_extensions import override
 
 from bowdenfit.description import Description, Finite, Table
 from bowdenfit.description.elastic import PRELOAD
-from bowdenfit.description.pulleys import Pulleys
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns
@@ -104,13 +103,13 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 is larger than the input while moving forward.
         """
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
-        table, pulleys = read_table(path), source.description.cable.pulleys
+        table = read_table(path)
         others = (Quantity("stroke", "text"), Quantity("preload", "force"))
         columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
         check_spelling(table, columns, others)
         nothing = np.full(len(table.rows), np.nan)
         input_force, output_force = table.faults.read_all(
-            lambda end: _read_end_forces(table, columns, end, pulleys), ("input", "output"), nothing
+            lambda end: _read_end_forces(table, columns, end, source.description), ("input", "output"), nothing
         )
         stroke = read_strokes(columns, len(table.rows), held="")
         preload = nothing
@@ -249,10 +248,10 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)
 
 
-def _read_end_forces(table: RawTable, columns: Mapping[str, Column], end: str, pulleys: Pulleys) -> Vector:
+def _read_end_forces(table: RawTable, columns: Mapping[str, Column], end: str, description: Description) -> Vector:
     """Return the forces at one end [N], from its force column or from its torques and the radius of its pulley."""
     read = np.asarray(find_end_column(table, columns, end, is_loop=True).numbers())
-    return convert_to_forces(read, table, columns, end, pulleys)
+    return convert_to_forces(read, table, columns, end, description)
 
 
 def _is_plain_angle(heading: str) -> bool:

@@ -311,6 +311,10 @@ def _read_file(description: Description, path: Path, entry: RecordingFile, chann
     raw, unit = to_recording(
         rows, _recording_name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
     )
+    sensors = description.sensors
+    if (sensors.input_ratio, sensors.output_ratio) != (1.0, 1.0):
+        forces = raw.input_force * sensors.input_ratio, raw.output_force * sensors.output_ratio
+        raw = replace(raw, input_force=forces[0], output_force=forces[1])
     entry = locate_by_channels(description, rows, entry, sources)
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:

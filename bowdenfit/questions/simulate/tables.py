@@ -81,6 +81,11 @@ def read_bench(path: Path) -> BenchPlan:
     truth = parse_truth(raw, path.name)
     cable = {name: value for name, value in raw.items() if name not in {"design", "fleet", "truth"}}
     description = parse_description(cable, path.name)
+    if (description.sensors.input_ratio, description.sensors.output_ratio) != (1.0, 1.0):
+        raise DescriptionError(
+            f"{path.name}: a simulated bench writes the forces on the rope, so that [sensors] input_ratio and output_ratio "
+            "would be applied to them a second time; leave both out."
+        )
     return BenchPlan(text, description, read_design(raw["design"], description, path.name), truth)
 
 

@@ -11,7 +11,7 @@ Sampler = Literal["emcee", "nuts", "both"]
 FEWEST_WALKERS = 128  # of an ensemble, where nothing is said of it; twice as many cost twice as much and settle no sooner
 WALKERS_PER_PARAMETER = 4  # so that a distribution can be fitted to half of them
 THIN = 10  # steps of a walker from one state that is stored to the next; draws are those of the second half
-_OR_ZERO = BeforeValidator(lambda said: {"value": 0.0, "unit": "N"} if said == 0 else said)  # 0 needs no unit
+_OR_ZERO = BeforeValidator(lambda stated: {"value": 0.0, "unit": "N"} if stated == 0 else stated)  # 0 needs no unit
 
 
 class Sensors(Frozen):

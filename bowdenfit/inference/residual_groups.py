@@ -140,7 +140,7 @@ def _project_out(blocks: list[ResidualGroup]) -> tuple[np.ndarray, np.ndarray]:
 
 def _make_blocks(
     term: Term,
-    places: Covariates | None,
+    covariates: Covariates | None,
     residuals: np.ndarray,
     jacobian: np.ndarray,
     expected: np.ndarray,
@@ -148,7 +148,7 @@ def _make_blocks(
 ) -> Iterator[ResidualGroup]:
     """Yield the groups of a term: labelled readings first, then others, with positions only if they are inside runs."""
     first, *others = term.residual_blocks
-    of_labels = _labelled_block(term, places, residuals[: first[0]], jacobian[: first[0]], expected)
+    of_labels = _labelled_block(term, covariates, residuals[: first[0]], jacobian[: first[0]], expected)
     effect = getattr(term, "friction_effect", None)
     yield of_labels if effect is None else replace(of_labels, effect=np.asarray(effect(values)))
     start = first[0]
@@ -172,13 +172,13 @@ def _bare_block(term: Term, residuals: np.ndarray, jacobian: np.ndarray, count: 
 
 
 def _labelled_block(
-    term: Term, places: Covariates | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
+    term: Term, covariates: Covariates | None, residuals: np.ndarray, jacobian: np.ndarray, expected: np.ndarray
 ) -> ResidualGroup:
     """Return the labelled readings, or whole runs."""
     n = len(residuals)
     bare = _bare_block(term, residuals, jacobian, float(np.count_nonzero(residuals)))
     observed = term.observed()
-    if places is None or len(observed) < n or len(expected) != len(observed):
+    if covariates is None or len(observed) < n or len(expected) != len(observed):
         return bare
     read, predicted = observed[:n], np.asarray(expected)[:n]
     if term.unit == "1":
@@ -188,10 +188,10 @@ def _labelled_block(
     unit = np.where(unit > 0, unit, np.nanmedian(unit[unit > 0]) if np.any(unit > 0) else 1.0)
     sign = np.sign(np.nansum((read - predicted) * residuals))
     reading = np.where(used, read, 0.0)
-    numbers = {label: x[:n] for label, x in places.numbers.items() if label != RUN}  # which is their order
-    back = {STROKE: places.back[:n].astype(float)}
+    numbers = {label: x[:n] for label, x in covariates.numbers.items() if label != RUN}  # which is their order
+    back = {STROKE: covariates.back[:n].astype(float)}
     return replace(
-        bare, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=places.group[:n],
+        bare, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=covariates.group[:n],
         at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()), labels=tuple(term.labels[:n]),
     )  # fmt: skip
 

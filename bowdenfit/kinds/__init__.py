@@ -1,4 +1,4 @@
-"""Kinds of measurement: a folder each, what they share, and what all tables of a data set say together.
+"""Kinds of measurement: a folder each, what they share, and what all tables of a data set give together.
 
 Imports go downward only (a contract of import-linter in pyproject.toml holds that):
 

@@ -53,7 +53,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Situation:
-    """What is known before the next measurement.
+    """The cable and its measurements before the next one.
 
     Args:
         cable: The cable.
@@ -113,7 +113,7 @@ class Simulation:
         simulate: Function of parameter values, data and a random key: all readings.
         data: Its data.
         columns: Which readings belong to each candidate.
-        lowest: Reading below which nothing can be told but that it is below; minus infinity without one.
+        lowest: Detection limit: a lower reading is only known to be below it; minus infinity without one.
     """
 
     simulate: Simulate
@@ -125,7 +125,7 @@ class Simulation:
 class CandidateKind(ABC):
     """A measurement that can be made next; what a subclass must give is abstract here.
 
-    A candidate of the kind is named by its place: a value of the route where the cable has one and `along_route` holds, else
+    A candidate is named by where it is read: at a value of the route where the cable has one and `along_route` holds, else at
     wrap angles; then by a load where it is `loaded`, or by one of the loads and strokes of `designs`.
 
     Attributes:

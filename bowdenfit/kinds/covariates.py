@@ -1,4 +1,4 @@
-"""Where each reading was taken: lengths, loads, wrap angles, strokes and runs, which residuals are looked at against."""
+"""Covariates of readings, which residuals are plotted and tested against: lengths, loads, wrap angles, strokes and runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

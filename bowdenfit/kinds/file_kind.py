@@ -1,4 +1,4 @@
-"""What kind of measurement a file without a description holds, why, whether it could be another, and its wrap angle."""
+"""Guess the kind of measurement that a file without a description holds, say why, and find the wrap angle that it states."""
 
 import math
 import re
@@ -52,7 +52,7 @@ BESIDE_FORCES = (
     Quantity("efficiency_sd", "ratio"),
 )
 COLUMNS = (*FORCES, *BESIDE_FORCES)
-"""What a table without a description may have."""
+"""Columns that a table without a description may have."""
 _ONE_FORCE = (Quantity("force", "force"), *FORCES)
 _POSITION = (Quantity("displacement", "length"), Quantity("position", "length"))
 

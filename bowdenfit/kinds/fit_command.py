@@ -1,4 +1,4 @@
-"""The one command that fits a file without a description, with options that name the columns its headings do not name."""
+"""The one command that fits a file without a description, with options for columns that its headings do not name."""
 
 import re
 import shlex

@@ -1,4 +1,6 @@
-"""What a kind of measurement gives of its tables, in NumPy. Its half in the likelihood is a `TermKind` (`kinds/term.py`).
+"""`Kind`: how tables of one kind of measurement are read, checked, described and written, in NumPy.
+
+Its half in the likelihood is a `TermKind` (`kinds/term.py`).
 
 A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`. It must give five things, and Python and mypy refuse a
 class that lacks one:

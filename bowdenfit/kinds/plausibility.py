@@ -1,4 +1,4 @@
-"""Signs that readings are not what a bench hands in: copied rows, displays too coarse to show noise, impossible values.
+"""Signs that readings do not come from a bench as they are: copied rows, displays too coarse to show noise, impossible values.
 
 Copies count as measurements, and a copied run as another mounting, so that every interval is too narrow and nothing else shows
 it. Two readings often agree to the last digit where a display is coarse, so copies are reported only where *all* rows of a run
@@ -7,7 +7,7 @@ are those of another, or all rows appear equally often, and where noise larger t
 Someone who reads 14 N six times off a display of whole newtons knows the force to half a newton, and no better for the
 repetition: a scatter estimated from differences between such readings is meaningless.
 
-For simulated readings the limits of what a bench hands in are wide, and the same for every kind.
+For simulated readings the limits of what a bench shows are wide, and the same for every kind.
 """
 
 from collections import Counter, defaultdict

@@ -1,4 +1,4 @@
-"""Wrap angles of the rows of a table: what is known before any parameter is, and their values at given parameters."""
+"""Wrap angles of the rows of a table: measured ones and their errors, and values at given parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Parts of runs that can be left out one by one: the readings of one load, or each by itself, the mounting staying the same.
+"""Parts of runs for leave-one-out: the readings of one load, or single readings, the mounting staying the same.
 
-What a run's mounting did is integrated out of the run's likelihood in closed form, with any of its readings as well as with
-all of them; the likelihood of a part, given the rest of its run, is the quotient of the two.
+The effect of a run's mounting is integrated out of the run's likelihood in closed form, with any of its readings as well as
+with all of them; the likelihood of a part, given the rest of its run, is the quotient of the two.
 """
 
 from dataclasses import dataclass, replace

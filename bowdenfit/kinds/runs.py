@@ -1,4 +1,4 @@
-"""Readings of runs: all samples of one mounting share what the mounting did, which integrates out in closed form."""
+"""Likelihood of runs: all readings of one mounting share its effect, which is integrated out in closed form."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -152,7 +152,7 @@ class RunsTerm:
     def scatter_of_single_readings(self, values: Mapping[str, Array]) -> dict[str, float]:
         """Split the scatter of single-reading runs into that of mountings [1] and the noise of the load cells [N].
 
-        By maximum likelihood about given values; empty where runs have more readings, of which the noise is told, or are few.
+        By maximum likelihood about given values; empty where runs have more readings, which show the noise, or are few.
         """
         if np.any(self.data["n"] > 1) or len(self.labels) < _FEWEST or self.cable.description.noise != "normal":
             return {}

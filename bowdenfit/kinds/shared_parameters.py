@@ -1,4 +1,4 @@
-"""Parameters that several kinds of measurement ask for, each declared in one place."""
+"""Parameters that several kinds of measurement need, each declared once."""
 
 from dataclasses import replace
 

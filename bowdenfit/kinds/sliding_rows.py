@@ -1,4 +1,4 @@
-r"""Readings taken while the rope slides: the forces that they are expected to show, their weights, and their place in runs.
+r"""Readings taken while the rope slides: their expected forces, their weights, and their runs.
 
 A weight computed from the very readings that it weighs rises with the output's noise, as the efficiency does, and the mean of
 a run comes out too high by about 1.5 (sd/F)^2, however many rows it has. So the readings of each run, stroke and bend are
@@ -101,7 +101,7 @@ def expected_forces(
         input_force, output_force: Readings [N].
         group: Number of each reading's run, stroke and bend together.
         noise_ratio: rho, noise of the input over that of the output; 0 where a weight hangs there.
-        noise: Standard deviation of an output's reading as stated [N]; None where distances tell it.
+        noise: Standard deviation of an output's reading as stated [N]; None where the distances estimate it.
         offsets: Whether the cells may show a force where there is none, so that the line need not go through the origin.
     """
     slope = _slopes(input_force, output_force, group, noise_ratio)[group]

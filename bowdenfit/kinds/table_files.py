@@ -1,4 +1,4 @@
-"""From files to tables: where a table is read from, what comes of it, and what `bowdenfit init` asks about such files."""
+"""Files of tables: where a table is read from, what reading gives, and what `bowdenfit init` asks about such files."""
 
 import os
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Tables that several kinds of measurement look at, and everything that was measured on one cable.
+"""Tables that several kinds of measurement use, and everything that was measured on one cable.
 
 The table of a kind that nobody else looks at stands with its kind; recordings are `bowdenfit.recordings.recording.Recordings`.
 """

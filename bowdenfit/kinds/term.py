@@ -1,4 +1,4 @@
-"""A kind's half in the likelihood, in JAX: what a `Term` is, and what a kind gives of its terms.
+"""A kind's half in the likelihood, in JAX: `Term`, `TermKind`, and the simplest term.
 
 Beside its `Kind` (`kinds/kind.py`, NumPy) every kind has a `TermKind`, `kinds/<kind>/term.py`, and one line in `TERMS`
 (`kinds/terms.py`). It must give four things:
@@ -107,7 +107,7 @@ class Circumstances:
     Args:
         cable: The cable.
         measurements: Everything measured on it.
-        mountings_scatter: Whether readings of any kind tell how mountings scatter.
+        mountings_scatter: Whether readings of any kind show the scatter of mountings.
         defaults: Priors of what the user says nothing of.
     """
 
@@ -118,12 +118,12 @@ class Circumstances:
 
     @property
     def description(self) -> Description:
-        """What was said about the cable."""
+        """Description of the cable."""
         return self.cable.description
 
     @property
     def noise(self) -> NoiseLaw:
-        """How readings scatter."""
+        """Law by which readings scatter."""
         return noise_law(self.cable.description)
 
 
@@ -166,11 +166,11 @@ class Truth:
 
 
 class TermKind(ABC, Generic[AnyTable]):
-    """What a kind of measurement adds to the likelihood; what a subclass must give is abstract here.
+    """A kind of measurement in the likelihood; what a subclass must give is abstract here.
 
     Attributes:
         candidate: The measurement that could be made next for such a table; None where another kind offers it.
-        shows_mounting_scatter: Whether its readings tell how mountings scatter.
+        shows_mounting_scatter: Whether its readings show the scatter of mountings.
         chooses_rows: Whether descriptions choose which rows are readings.
     """
 

@@ -62,7 +62,7 @@ _ALL: tuple[TermKind[Any], ...] = (
 )
 
 TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in _ALL}
-"""What each kind adds to the likelihood."""
+"""Every kind's half in the likelihood, by name."""
 
 _ORDER = (
     *(STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD, LENGTHENING, STRETCH_ZERO, STRETCH_FRICTION, REFERENCE_PRELOAD),

@@ -1,4 +1,4 @@
-"""Angle tables: each reading against its curve; what was too small to detect enters as exactly that."""
+"""Angle tables in the likelihood: readings about their curve, and angles too small to detect as censored."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

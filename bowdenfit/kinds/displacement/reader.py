@@ -1,4 +1,4 @@
-r"""Reading force against displacement: columns, runs and strokes, which rows are used, and whether a rope has such forces.
+r"""Read force against displacement: columns, runs and strokes; choose the rows that are used, and refuse impossible forces.
 
 Rows that depend on how the rope lay before, and rows before a stop, are not used. Nobody knows how the rope lay before the
 motor first moved. It may have been pulled or let out; from its let-out state, where the force is F_t, all of it slides once the

@@ -1,4 +1,4 @@
-"""Force at the motor against the displacement of the motor, and how the motor moved: its turns and what comes after each."""
+"""Force at the motor against the displacement of the motor, and the history of its strokes and turns."""
 
 from dataclasses import dataclass
 from itertools import pairwise

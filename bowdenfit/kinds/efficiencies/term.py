@@ -1,4 +1,4 @@
-"""Efficiency tables: the logarithm of each measured efficiency against the friction exponent at its length."""
+"""Efficiency tables in the likelihood: the logarithm of each efficiency about the friction exponent at its length."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

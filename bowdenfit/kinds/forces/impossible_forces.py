@@ -64,7 +64,7 @@ class LogGains:
         log_gain: Logarithm of what each gains: output over input while pulling, input over output while returning [1].
         load: A load whose error has nothing to do with that, such as the sum of both forces where friction is small [N].
         weight: One over the variance of the log gain, for a noise of 1 N [N^2].
-        cell: Number of the run, stroke and place of each.
+        cell: Number of each reading's run and stroke.
     """
 
     log_gain: Vector
@@ -79,7 +79,7 @@ def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tupl
     Args:
         excess: What each reading gains beyond what load cells explain [1].
         readings: All sliding readings of a table.
-        stated: Noise of a force reading as stated [N]; None where scatter tells it.
+        stated: Noise of a force reading as stated [N]; None where scatter estimates it.
     """
     log_gain, weight, cell = readings.log_gain, readings.weight, readings.cell
     n, total = len(excess), np.bincount(cell, weight)
@@ -90,7 +90,7 @@ def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tupl
         return single, (_p_value(of_cell / stated, np.full(len(total), np.inf)) < limit)[cell]
     if n - len(total) < _FEWEST:
         return _flag_gains_without_repeats(excess, log_gain, limit)
-    # Where pulling and returning are not told apart, gains and losses of a run are: each half scatters less.
+    # Where strokes are not marked, a run is split into gains and losses: each half scatters less.
     halves = np.unique(2 * cell + (log_gain > 0), return_inverse=True)[1].ravel()
     single, together = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for group, factor in ((cell, 1.0), (halves, _TRUNCATED)):

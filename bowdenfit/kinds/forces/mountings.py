@@ -1,4 +1,4 @@
-"""Which rows of a force table belong together: runs read in one mounting of the cable, and groups such as old and new ropes."""
+"""Assign rows of a force table to mountings of the cable, and to groups such as old and new ropes."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A force run that could be made next: what its readings say once the effect of its mounting is in them."""
+"""A force run that could be made next: its design, and its simulation with the effect of its mounting."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

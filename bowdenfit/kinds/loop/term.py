@@ -1,4 +1,4 @@
-"""Tables of forces at both ends of a pull-pull loop while it moves."""
+"""Loop tables in the likelihood: output force against input force at the preload and friction of a moving loop."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

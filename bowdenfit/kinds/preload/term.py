@@ -1,4 +1,4 @@
-"""Preload tables: the tension between fixed ends, at wrap angles."""
+"""Preload tables in the likelihood: the tension between fixed ends, at wrap angles."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-r"""Blocks of recordings as the likelihood takes them: usable ones, their weights, and arrays of many recordings side by side.
+r"""Blocks of recordings for the likelihood: usable ones, their weights, and arrays of many recordings side by side.
 
 A weight computed from a block's own forces rises with their noise, and with it the log ratio falls or rises, so that the mean
 of a recording would be off by about 1.5 (sd/F)^2 however many blocks it has; see `expected_forces`, which makes the weights
@@ -141,7 +141,7 @@ class SelectedBlocks:
         input_force, output_force: Forces [N].
         log_ratio: s log(F_in/F_out), without what noise adds to it [1].
         n_effective: How many independent readings each counts for [1].
-        information: How much one reading as each tells of its log ratio at unit noise of the output cell [N^2].
+        information: Information of one such reading on its log ratio at unit noise of the output cell [N^2].
     """
 
     used: Labels

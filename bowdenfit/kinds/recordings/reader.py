@@ -1,4 +1,4 @@
-"""Read the recordings of a data set: prepare them, find their strokes, and find where each was made on the route."""
+"""Read the recordings of a data set: prepare them, identify their strokes, and locate each on the route."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -59,7 +59,7 @@ class MountingEffects:
         within: Deviations of the blocks from their run's own mounting effect.
         effect: That effect, of each run [1].
         sd: Its standard deviation, of each run [1].
-        total: What the blocks of each run tell of it.
+        total: Information of each run's blocks on it, at unit noise.
     """
 
     within: Array
@@ -155,7 +155,7 @@ class BlocksTerm(ABC):
             loading: Change of the operator's output with the friction exponent.
             of_angles: Variance of each recording's friction exponent by its wrap angles.
         """
-        # Blocks that no friction of this size can explain tell nothing of the effect: the limit, instead of 0 / 0.
+        # Blocks that no friction of this size can explain have no information on the effect: the limit, instead of 0 / 0.
         total = jnp.maximum(self._per_run(data, data["weight"] * loading**2), _LEAST_TOTAL)
         effect = self._per_run(data, data["weight"] * loading * deviation) / total
         from_angles = self._per_run(data, data["weight"] * loading**2 * of_angles) / total

@@ -1,4 +1,4 @@
-"""Stretch tables: how far the rope gives at its loaded end, under loads and at wrap angles."""
+"""Stretch tables in the likelihood: how far the rope gives at its loaded end, under loads and at wrap angles."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -187,14 +187,14 @@ def test_a_reading_worth_three_is_three_readings():
         ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "n_effective")),
         {name: array[copied] for name, array in rows.angles.items()})  # fmt: skip
     at = _cable(sensors=GAIN)
-    found = _of_term(_runs_term(at, replace(rows, worth=worth)), "log_likelihood", values)
+    found = _of_term(_runs_term(at, replace(rows, n_effective=worth)), "log_likelihood", values)
     np.testing.assert_allclose(found, _of_term(_runs_term(at, several), "log_likelihood", values), rtol=0, atol=1e-8)
 
 
 def test_up_to_a_constant_of_the_data_a_reading_s_worth_is_its_power_in_the_likelihood():
     """Also fractions of a reading, as blocks have whose deviations stay alike; and whatever the parameters."""
     rows = _rows(5, 15, VALUES)
-    rows = replace(rows, worth=np.random.default_rng(6).uniform(0.1, 2.5, 15))
+    rows = replace(rows, n_effective=np.random.default_rng(6).uniform(0.1, 2.5, 15))
     term, apart = _runs_term(_cable(), rows), []
     for values in (VALUES, VALUES | {"mu": 0.13}, VALUES | {"tau": 0.1}, VALUES | {"sigma_F": 1.0}):
         found = _of_term(term, "log_likelihood", values)[0]

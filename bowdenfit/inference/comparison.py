@@ -144,9 +144,9 @@ def stacking_weights(predictions: Mapping[str, LooPrediction]) -> dict[str, floa
         mixed = np.maximum(density @ weights, 1e-300)
         return -float(np.mean(np.log(mixed))), -np.mean(density / mixed[:, None], axis=0)
 
-    whole = {"type": "eq", "fun": lambda w: np.sum(w) - 1, "jac": np.ones_like}
+    sum_to_one = {"type": "eq", "fun": lambda w: np.sum(w) - 1, "jac": np.ones_like}
     optimum = minimize(
-        loss, np.full(n, 1 / n), jac=True, method="SLSQP", bounds=[(0, 1)] * n, constraints=[whole], tol=1e-10
+        loss, np.full(n, 1 / n), jac=True, method="SLSQP", bounds=[(0, 1)] * n, constraints=[sum_to_one], tol=1e-10
     )
     weights = np.clip(optimum.x, 0.0, 1.0)
     return {name: float(w) for name, w in zip(predictions, weights / weights.sum(), strict=True)}

@@ -36,12 +36,12 @@ def compile_program(
     lowered = jax.jit(function).lower(*shapes)
     options = (_RUN_ONCE if run_once else _RUN_OFTEN if run_often else _OPTIONS) if jax.default_backend() == "cpu" else {}
     if beside is None:
-        return _compiled(lowered, options)
-    compiled = beside.submit(_compiled, lowered, options)
+        return _compile_lowered(lowered, options)
+    compiled = beside.submit(_compile_lowered, lowered, options)
     return lambda *arguments: compiled.result()(*arguments)
 
 
-def _compiled(lowered: Any, options: dict[str, Any]) -> Callable[..., Any]:
+def _compile_lowered(lowered: Any, options: dict[str, Any]) -> Callable[..., Any]:
     try:
         return lowered.compile(compiler_options=options)
     except jax.errors.JaxRuntimeError:  # options come and go from one version of XLA to the next

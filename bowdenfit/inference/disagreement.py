@@ -92,9 +92,9 @@ class _WeighedTable:
 def _weigh_by_scatter(term: Term, residuals: np.ndarray, jacobian: np.ndarray, together: np.ndarray) -> _WeighedTable:
     u, s, _ = np.linalg.svd(jacobian, full_matrices=False)
     u = u[:, s > 1e-8 * max(s.max(initial=0.0), 1e-30)]
-    of_itself, of_all = np.sum(u**2, axis=1), np.sum((jacobian @ together) * jacobian, axis=1)
-    many = len(residuals) - of_itself.sum() >= _MANY
-    about, leverage = (residuals - u @ (u.T @ residuals), of_itself) if many else (residuals, of_all)
+    own_leverage, common_leverage = np.sum(u**2, axis=1), np.sum((jacobian @ together) * jacobian, axis=1)
+    has_own_scatter = len(residuals) - own_leverage.sum() >= _MANY
+    about, leverage = (residuals - u @ (u.T @ residuals), own_leverage) if has_own_scatter else (residuals, common_leverage)
     scale, spread = estimate_scatter([term], {term.name: about}, leverage)
     scale, known = np.maximum(scale, _LEAST_SCATTER), np.isfinite(spread[term.name])
     freedom = float(term.residual_blocks[0][1] - leverage.sum()) if known else np.inf
@@ -116,8 +116,8 @@ def _assess_move(
     # In units of what the rest leaves open, directions that the table says nothing of have no variance.
     root = np.linalg.cholesky(information_of_others)
     shares, directions = np.linalg.eigh(np.eye(len(move)) - root.T @ covariance @ root)
-    of_priors = np.sum(np.linalg.solve(root.T, directions) ** 2, axis=0)
-    informed = (shares > _LEAST_MOVE) & (of_priors < _LITTLE)
+    prior_share = np.sum(np.linalg.solve(root.T, directions) ** 2, axis=0)
+    informed = (shares > _LEAST_MOVE) & (prior_share < _LITTLE)
     along = directions[:, informed].T @ (root.T @ move)
     moved = np.flatnonzero((allowed > _LEAST_MOVE * np.diag(covariance_of_others)) & (np.diag(covariance_of_others) < _LITTLE))
     if not informed.any() or not len(moved):
@@ -128,9 +128,9 @@ def _assess_move(
     farthest = moved[np.argmax(np.abs(move[moved]) / np.sqrt(allowed[moved]))]
     p = parameters[farthest]
 
-    def shown(at: float) -> float:
+    def to_shown_unit(at: float) -> float:
         return value_at(p.prior, at) * p.shown_scale
 
     z_of_others, sd = best[farthest] - move[farthest], np.sqrt(covariance_of_others[farthest, farthest])
-    spread = abs(shown(z_of_others + sd) - shown(z_of_others - sd)) / 2
-    return Disagreement(table, min(sds, 37.0), total, p.name, shown(z_of_others), spread, shown(best[farthest]))
+    spread = abs(to_shown_unit(z_of_others + sd) - to_shown_unit(z_of_others - sd)) / 2
+    return Disagreement(table, min(sds, 37.0), total, p.name, to_shown_unit(z_of_others), spread, to_shown_unit(best[farthest]))

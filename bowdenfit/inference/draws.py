@@ -74,7 +74,7 @@ def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
 
 
-def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> DrawFunction:
+def compile_replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> DrawFunction:
     """Compile the posterior predictive distribution of draws (rows).
 
     The function returns, by group ("values", "log_likelihood", "expected", "replicated") and name, arrays over draws and
@@ -83,7 +83,7 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
     model = posterior.model
     key = jax.random.key(seed)  # an argument, so that the program is the same for every seed
 
-    def implied(z_and_number: Float[Array, " free_and_one"], data: Any, key: Array) -> dict[str, Mapping[str, Array]]:
+    def predict(z_and_number: Float[Array, " free_and_one"], data: Any, key: Array) -> dict[str, Mapping[str, Array]]:
         number = z_and_number[-1].astype(jnp.uint32)
         keys = jax.random.split(jax.random.fold_in(key, number), max(len(model.terms), 1))
         values = model.space.constrain(z_and_number[:-1])
@@ -96,7 +96,7 @@ def replicator(posterior: LogDensity, seed: int, beside: Executor | None = None)
         }
 
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
-    program = for_each_draw(implied, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
+    program = for_each_draw(predict, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
 
 

@@ -329,7 +329,7 @@ def _library_missing_error(library: str) -> UsageError:
 
 
 @cache
-def versions() -> dict[str, str]:
+def installed_versions() -> dict[str, str]:
     """Return versions of bowdenfit, Python and the libraries that compute."""
     def version_of(package: str) -> str:
         try:
@@ -353,11 +353,11 @@ def refuse_other_versions(of_client: dict[str, str]) -> None:
     Raises:
         UsageError: Some differ.
     """
-    here = versions()
+    installed = installed_versions()
     differing = [
-        f"{name} {here.get(name, '(not installed)')} (here {version})"
+        f"{name} {installed.get(name, '(not installed)')} (here {version})"
         for name, version in of_client.items()
-        if here.get(name) != version
+        if installed.get(name) != version
     ]
     if differing:
         raise UsageError(

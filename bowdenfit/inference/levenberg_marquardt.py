@@ -55,28 +55,28 @@ class ScaledDescent(optx.AbstractDescent):
         """Compute singular values at an accepted point; a step of any radius is then a division."""
         jacobian = f_info.jac.as_matrix()
         size = _largest_norms(jacobian, state.size)
-        left, singular, directions = jnp.linalg.svd(_scaled(jacobian, size), full_matrices=False)
-        kept = singular > _SINGULAR * singular[0]
+        left, singular, directions = jnp.linalg.svd(_divide_by_norms(jacobian, size), full_matrices=False)
+        informed = singular > _SINGULAR * singular[0]
         return _Tangent(
-            size, jnp.where(kept, singular, 1.0), directions, jnp.where(kept, left.T @ f_info.residual, 0.0)
+            size, jnp.where(informed, singular, 1.0), directions, jnp.where(informed, left.T @ f_info.residual, 0.0)
         )
 
     def step(self, step_size: Array, state: _Tangent) -> tuple[Array, Any]:
         """Return the undamped step, or where it is too long the step that is damped to the radius."""
         slope = state.singular * state.along
 
-        def damped(by: Array | float) -> Array:
+        def damp(by: Array | float) -> Array:
             return slope / (state.singular**2 + by)
 
-        def halved(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        def bisect(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
             middle = jnp.sqrt(ends[0] * ends[1])
-            longer = _norm(damped(middle)) > step_size
+            longer = _norm(damp(middle)) > step_size
             return jnp.where(longer, middle, ends[0]), jnp.where(longer, ends[1], middle)
 
-        most = _norm(slope) / step_size
-        _, damping = jax.lax.fori_loop(0, _BISECTIONS, halved, (1e-12 * most, most))
-        step = damped(jnp.where(_norm(damped(0.0)) <= _LONGER * step_size, 0.0, damping))
-        return -_scaled(state.directions.T @ step, state.size), _SUCCESS
+        largest_damping = _norm(slope) / step_size
+        _, damping = jax.lax.fori_loop(0, _BISECTIONS, bisect, (1e-12 * largest_damping, largest_damping))
+        step = damp(jnp.where(_norm(damp(0.0)) <= _LONGER * step_size, 0.0, damping))
+        return -_divide_by_norms(state.directions.T @ step, state.size), _SUCCESS
 
 
 class _Radius(eqx.Module):
@@ -141,7 +141,7 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
     verbose: Callable[..., None]
 
     def __init__(self, change: Array, gradient: Array, radius: Array) -> None:
-        self.rtol, self.atol, self.norm, self.verbose = change, gradient, optx.two_norm, _silent
+        self.rtol, self.atol, self.norm, self.verbose = change, gradient, optx.two_norm, _print_nothing
         self.descent, self.search = ScaledDescent(), RadiusSearch(radius)
 
     def terminate(self, fn: Any, y: Array, args: Any, options: Any, state: Any, tags: Any) -> tuple[Array, Any]:  # noqa: ARG002
@@ -186,8 +186,8 @@ def _step(
     """Take one step of the solver."""
     solver, linear, state = _initialize(settings, y, residuals, jacobian)
     tree, static = jax.tree.structure(eqx.filter(state, eqx.is_array)), eqx.filter(state, eqx.is_array, inverse=True)
-    held = [jnp.where(first, *pair) for pair in zip(_array_leaves(state), leaves, strict=True)]
-    state = eqx.combine(jax.tree.unflatten(tree, held), static)
+    state_leaves = [jnp.where(first, *pair) for pair in zip(_array_leaves(state), leaves, strict=True)]
+    state = eqx.combine(jax.tree.unflatten(tree, state_leaves), static)
     y, state, _ = solver.step(linear, y, state.y_eval, {}, state, frozenset())
     done, _ = solver.terminate(linear, y, y, {}, state, frozenset())
     return y, _array_leaves(state), state.y_eval, done
@@ -215,7 +215,7 @@ def _largest_norms(jacobian: Array, before: Array) -> Array:
     return jnp.maximum(before, jnp.sqrt(jnp.sum(jacobian**2, axis=0)))
 
 
-def _scaled(x: Array, size: Array) -> Array:
+def _divide_by_norms(x: Array, size: Array) -> Array:
     """Divide by the norms of columns; zero where a column has always been zero."""
     return x / jnp.where(size > 0, size, jnp.inf)
 
@@ -224,5 +224,5 @@ def _norm(x: Array) -> Array:
     return jnp.sqrt(jnp.sum(x**2))
 
 
-def _silent(**_: Any) -> None:
+def _print_nothing(**_: Any) -> None:
     """Print nothing."""

@@ -104,9 +104,9 @@ def compile_block(
         result = dict(zip(("z", *_STATISTICS), steps, strict=True))
         return result | {"tuning": jnp.stack(tuned), "inverse_mass": inverse_mass}
 
-    whole, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
+    integer, flag = jax.ShapeDtypeStruct((), jnp.uint32), jax.ShapeDtypeStruct((), jnp.bool_)
     shapes = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((chains, mass[0]), (5, chains), mass)]
-    return compile_program(block, whole, whole, shapes[0], shapes[1], flag, shapes[2], data)
+    return compile_program(block, integer, integer, shapes[0], shapes[1], flag, shapes[2], data)
 
 
 def _is_fine(steps: int) -> np.ndarray:

@@ -69,7 +69,7 @@ def _evaluation_program(posterior: LogDensity) -> Callable[..., Solution]:
     """Return a function of z that gives values, residuals, Jacobian and expected readings."""
     space = posterior.model.space
 
-    def evaluated(z: Array, weight: Array, data: Any) -> Solution:
+    def evaluate(z: Array, weight: Array, data: Any) -> Solution:
         # A value depends on its own z alone. So priors are differentiated once, and not again along every z.
         values, slope = jax.jvp(space.vector, (z,), (jnp.ones_like(z),))
 
@@ -77,17 +77,17 @@ def _evaluation_program(posterior: LogDensity) -> Callable[..., Solution]:
             by_term = posterior.residuals_at(space.named(values), data)
             return jnp.concatenate(list(by_term.values())), by_term
 
-        def along(direction: Array) -> tuple[Array, Array, dict[str, Array]]:
+        def differentiate(direction: Array) -> tuple[Array, Array, dict[str, Array]]:
             return jax.jvp(residuals, (values,), (direction,), has_aux=True)
 
-        read, by_z, by_term = jax.vmap(along, out_axes=(None, 1, None))(jnp.diag(slope))
-        jacobian = jnp.concatenate([by_z, jnp.diag(weight)])
+        read, columns, by_term = jax.vmap(differentiate, out_axes=(None, 1, None))(jnp.diag(slope))
+        jacobian = jnp.concatenate([columns, jnp.diag(weight)])
         named, terms = space.named(values), zip(posterior.model.terms, data, strict=True)
         readings = {term.name: term.expected(named, d) for term, d in terms}
         outputs = {"z": z, "values": values, "slope": slope, "readings": readings, "jacobian": jacobian}
         return outputs | {"stacked": jnp.concatenate([read, weight * z]), "residuals": by_term}
 
-    return evaluated
+    return evaluate
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,7 @@ def compute_sensitivities(
                 float(np.std(flat)),
                 float(_quantiles(flat, order, weighted[most].doubled)[1]),
                 _z_unless_at_end(priors[most].allowed_ends, float(np.mean(z[most]))),
-                tuple(w.width(parameter, flat, order, plain) for parameter, w in weighted.items()),
+                tuple(w.measure_width(parameter, flat, order, plain) for parameter, w in weighted.items()),
             )
         )
     return tuple(results)
@@ -220,11 +220,11 @@ class _ScaleWeights:
         (doubled, k_doubled), (halved, k_halved) = (_reliable_weights(ratio) for ratio in (prior.doubled, prior.halved))
         return cls(doubled, halved, k_doubled, k_halved)
 
-    def width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> WidthSensitivity:
+    def measure_width(self, parameter: str, values: np.ndarray, order: np.ndarray, plain: np.ndarray) -> WidthSensitivity:
         """Return the effect on the width of a quantity's interval."""
         wide, narrow = (_quantiles(values, order, weights) for weights in (self.doubled, self.halved))
-        whole = plain[2] - plain[0]  # none of an optimum that nine of ten draws have at the end of the range
-        doubled, halved = (float((q[2] - q[0]) / whole) if whole > 0 else float("nan") for q in (wide, narrow))
+        width = plain[2] - plain[0]  # none of an optimum that nine of ten draws have at the end of the range
+        doubled, halved = (float((q[2] - q[0]) / width) if width > 0 else float("nan") for q in (wide, narrow))
         return WidthSensitivity(parameter, doubled, halved, self.k_doubled, self.k_halved)
 
 
@@ -247,7 +247,7 @@ def _make_power_scaling(part: np.ndarray) -> Callable[[np.ndarray], float]:
     """Return a function that gives a quantity's sensitivity to one part of the log density."""
     lower, upper = (power_weights(part, alpha) for alpha in _POWERS)
 
-    def sense(draws: np.ndarray) -> float:
+    def measure_sensitivity(draws: np.ndarray) -> float:
         return float(array_stats().power_scale_sense(draws, lower, upper, *_POWERS))
 
-    return sense
+    return measure_sensitivity

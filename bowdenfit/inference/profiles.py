@@ -154,8 +154,8 @@ class Rise:
     def __call__(self, z: float) -> float:
         """Return the increase at z."""
         if z not in self._known:
-            way = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._is_known(at)]
-            self._known[z] = self._basin.solve_pinned(self._index, z, self._known[min(way, key=lambda at: abs(at - z))])
+            visited = [at for at in self._known if abs(at - self._center) <= abs(z - self._center) and self._is_known(at)]
+            self._known[z] = self._basin.solve_pinned(self._index, z, self._known[min(visited, key=lambda at: abs(at - z))])
         return total_squares(self._known[z]) - self._least if self._is_known(z) else float("nan")
 
     def _is_known(self, z: float) -> bool:
@@ -290,34 +290,34 @@ def find_interval_ends(
     """
     far = student_quantile(freedom)
 
-    def above(z: float) -> float:
+    def excess(z: float) -> float:
         risen = rise(z)
         return np.sqrt(max(risen, 0.0) / ratio) - far if np.isfinite(risen) else float("nan")
 
     step = float(np.clip(far * error, _LEAST_STEP, _MOST_STEP))
-    return _find_limit(above, center, -step), _find_limit(above, center, step)
+    return _find_limit(excess, center, -step), _find_limit(excess, center, step)
 
 
-def _find_limit(above: Callable[[float], float], center: float, step: float) -> float:
+def _find_limit(excess: Callable[[float], float], center: float, step: float) -> float:
     """Return where a function that is negative at the center first becomes positive, stepping outward by growing steps.
 
     About a regular minimum it is nearly linear, so the second step goes a little beyond the linear extrapolation, but no
     farther than a usual step. Where it is NaN before the limit, the interval is the wider one.
     """
 
-    def known(z: float) -> float:
-        return float(np.nan_to_num(above(z), nan=-1.0))
+    def excess_or_below(z: float) -> float:
+        return float(np.nan_to_num(excess(z), nan=-1.0))
 
     inside, ahead, end = center, step, np.copysign(FARTHEST, step)
-    least = above(center)
+    least = excess(center)
     close = _PRECISION * abs(least)
     for _ in range(_MOST_STEPS):
         outside = float(np.clip(inside + ahead, -FARTHEST, FARTHEST))
-        reached = above(outside)
+        reached = excess(outside)
         if abs(reached) <= close:
             return outside
         if reached > 0:
-            return find_crossing(known, inside, outside, _PRECISION * abs(ahead), close)
+            return find_crossing(excess_or_below, inside, outside, _PRECISION * abs(ahead), close)
         if np.isnan(reached):
             step = ahead = ahead / 4
         else:

@@ -113,7 +113,7 @@ class Affine:
         """Return the draws moved, one a row."""
         return (draws - self.center) @ self.matrix.T + self.center + self.shift
 
-    def back(self, draws: np.ndarray) -> np.ndarray:
+    def move_back(self, draws: np.ndarray) -> np.ndarray:
         """Return the draws moved back."""
         return np.linalg.solve(self.matrix, (draws - self.center - self.shift).T).T + self.center
 
@@ -140,7 +140,7 @@ def match_moments(draws: np.ndarray, evaluate: Evaluate, share: float) -> tuple[
     # Every other draw is moved, and all are weighted against the mixture of where both kinds come from.
     mixed = np.where(np.arange(len(draws))[:, None] % 2 == 0, best(draws), draws)
     density, likelihood = evaluate(mixed)
-    from_moved = evaluate(best.back(mixed))[0] - best.log_volume
+    from_moved = evaluate(best.move_back(mixed))[0] - best.log_volume
     return weighted_elpd(density - likelihood - np.logaddexp(density, from_moved), likelihood, share)
 
 
@@ -149,16 +149,16 @@ def find_best_map(draws: np.ndarray, log_density: np.ndarray, evaluate: Evaluate
     size, center = draws.shape[1], draws.mean(axis=0)
     best = Affine(np.eye(size), np.zeros(size), center)
 
-    def weighed(candidate: Affine) -> tuple[np.ndarray, float]:
+    def smooth_at(candidate: Affine) -> tuple[np.ndarray, float]:
         density, likelihood = evaluate(candidate(draws))
         return smooth_weights(density - likelihood - log_density, share)
 
-    log_weights, k = weighed(best)
+    log_weights, k = smooth_at(best)
     for _ in range(_MOST_STEPS):
         if k <= _GOOD_ENOUGH:
             break
         for candidate in _propose_maps(best, draws, np.exp(log_weights)):
-            candidate_weights, candidate_k = weighed(candidate)
+            candidate_weights, candidate_k = smooth_at(candidate)
             if candidate_k < k:
                 best, log_weights, k = candidate, candidate_weights, candidate_k
                 break
@@ -173,11 +173,11 @@ def _propose_maps(current: Affine, draws: np.ndarray, weights: np.ndarray) -> It
     mean = weights @ moved
     shift = mean - current.center
     yield Affine(current.matrix, shift, current.center)
-    wanted, present = _covariance(moved, weights), _covariance(moved)
-    ratio = np.sqrt(np.maximum(np.diag(wanted), _FLOOR) / np.maximum(np.diag(present), _FLOOR))
+    target, present = _covariance(moved, weights), _covariance(moved)
+    ratio = np.sqrt(np.maximum(np.diag(target), _FLOOR) / np.maximum(np.diag(present), _FLOOR))
     yield Affine(ratio[:, None] * current.matrix, shift, current.center)
-    if np.linalg.eigvalsh(wanted)[0] > _FLOOR < np.linalg.eigvalsh(present)[0]:
-        stretch = np.linalg.solve(np.linalg.cholesky(present).T, np.linalg.cholesky(wanted).T).T
+    if np.linalg.eigvalsh(target)[0] > _FLOOR < np.linalg.eigvalsh(present)[0]:
+        stretch = np.linalg.solve(np.linalg.cholesky(present).T, np.linalg.cholesky(target).T).T
         yield Affine(stretch @ current.matrix, shift, current.center)
 
 

@@ -168,18 +168,18 @@ def compile_walkers(
         beside: See `compile_program`.
     """
     space = posterior.model.space
-    of_what = posterior.log_density, posterior.data, space.size, settings
+    arguments = posterior.log_density, posterior.data, space.size, settings
     if moves is not None:
-        return compile_density_walkers(*of_what, ((z_map, 1.0),), moves, beside)
+        return compile_density_walkers(*arguments, ((z_map, 1.0),), moves, beside)
     if Conditional(posterior).is_narrow:
-        return compile_density_walkers(*of_what, coordinate_maps(posterior), beside=beside)
+        return compile_density_walkers(*arguments, coordinate_maps(posterior), beside=beside)
     plain = maps_without_ridge(space)
-    first = compile_density_walkers(*of_what, plain, beside=beside)
+    first = compile_density_walkers(*arguments, plain, beside=beside)
 
     @cache
     def later() -> WalkerPrograms:
         frames = coordinate_maps(posterior)
-        return compile_density_walkers(*of_what, frames) if len(frames) > len(plain) else first
+        return compile_density_walkers(*arguments, frames) if len(frames) > len(plain) else first
 
     return first._replace(later=later)
 

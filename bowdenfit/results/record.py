@@ -125,7 +125,7 @@ class DrawPrograms:
 
     Args:
         values: Named values in shown units.
-        quantities: What z implies for every reading; see `replicator`.
+        quantities: What z implies for every reading; see `compile_replicator`.
         along_route: See `compile_along_route`; None without a route.
     """
 

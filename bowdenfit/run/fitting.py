@@ -16,8 +16,8 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.chain import Chain, SamplingRequest
-from bowdenfit.inference.draws import for_each_draw, replicator
-from bowdenfit.inference.engines import versions
+from bowdenfit.inference.draws import compile_replicator, for_each_draw
+from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
@@ -132,7 +132,7 @@ def _with_memory(report: Callable[..., None] | None) -> Callable[..., None]:
 
 def provenance(seed: int, watch: Stopwatch) -> Provenance:
     """Return seed, versions and times of a fit that ends now."""
-    return Provenance(seed, dict(versions()), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
+    return Provenance(seed, dict(installed_versions()), watch.seconds, datetime.now(UTC).isoformat(timespec="seconds"))
 
 
 def samplers_of(method: str) -> tuple[str, ...]:
@@ -170,7 +170,7 @@ def compile_programs(density: LogDensity, seed: int, beside: Executor) -> Progra
         else:
             programs[name] = import_module(_MODULES[name]).compile_nuts(density, settings)
     optimum = for_each_draw(make_optimizer(model), model.space.size, beside=beside) if model.description.route else None
-    implied = replicator(density, seed, beside)
+    implied = compile_replicator(density, seed, beside)
     along_route = compile_along_route(model, beside) if model.description.route is not None else None
     return Programs(programs, optimum, DrawPrograms(lambda z: implied(z)["values"], implied, along_route))
 

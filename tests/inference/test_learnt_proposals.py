@@ -45,7 +45,7 @@ def test_draws_of_student_ts_are_of_their_density():
 def test_student_ts_move_to_where_draws_are():
     rows = TWO.draw(np.random.default_rng(4), 8000)
     begun = start_mixture(rows, 2)
-    moved = begun.refined(rows).refined(rows).refined(rows)
+    moved = begun.refine(rows).refine(rows).refine(rows)
     gains = [np.mean(each.log_density(rows)) for each in (begun, moved, TWO)]
     assert gains[0] < gains[1]
     assert abs(gains[1] - gains[2]) < 0.02

@@ -168,7 +168,7 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
     assert plain.pareto_k[0] > 0.7
     assert abs(plain.elpd[0] - truth) > 0.3
     found = find_best_map(draws, density, evaluate, 1.0)
-    np.testing.assert_allclose(found.back(found(draws)), draws, atol=1e-9)
+    np.testing.assert_allclose(found.move_back(found(draws)), draws, atol=1e-9)
 
 
 def test_an_affine_map_knows_its_volume():

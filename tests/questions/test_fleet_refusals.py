@@ -9,7 +9,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference import engines
-from bowdenfit.inference.engines import Engine, EngineError, versions
+from bowdenfit.inference.engines import Engine, EngineError, installed_versions
 from bowdenfit.questions.fleet.inspections import read_cases, read_inspections
 from bowdenfit.questions.fleet.store import PIECES_FOLDER, FleetStore
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
@@ -159,7 +159,7 @@ def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
 
 def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
     """The work says with which versions it was made."""
-    here = versions()
+    here = installed_versions()
     monkeypatch.setattr("bowdenfit.questions.fleet.fitting.versions", lambda: here | {"jax": "0.0.1"})
     with pytest.raises(bf.UsageError, match=r"a worker has other versions: jax .* \(here 0\.0\.1\)"):
         bf.fleet(fleet(ROWS[0]), seed=1)
@@ -189,10 +189,10 @@ def test_a_full_disk_is_a_sentence_and_what_was_kept_goes_on(run, fleet, tmp_pat
 
 def test_a_fleet_begun_with_other_versions_is_not_gone_on_with(run, fleet, tmp_path, monkeypatch):
     folder, results = fleet(ROWS[0]), tmp_path / "results"
-    FleetStore(results, {"seed": 7, "versions": versions() | {"jax": "0.0.1"}}).open(False, False)
+    FleetStore(results, {"seed": 7, "versions": installed_versions() | {"jax": "0.0.1"}}).open(False, False)
     code, _, error = run("fleet", folder, "-o", results, "--resume")
-    said = f"a version of bowdenfit or of a library changed since (jax from '0.0.1' to {versions()['jax']!r})"
+    said = f"a version of bowdenfit or of a library changed since (jax from '0.0.1' to {installed_versions()['jax']!r})"
     assert code == 2 and said in " ".join(error.split())
-    FleetStore(results, {"seed": 7, "versions": versions()}).open(False, True)
+    FleetStore(results, {"seed": 7, "versions": installed_versions()}).open(False, True)
     code, _, error = run("fleet", folder, "-o", results, "--resume", "--seed", 8)
     assert code == 2 and "because the seed changed since from 7 to 8; undo the change" in " ".join(error.split())

@@ -11,7 +11,7 @@ from scipy import stats
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference import draws
-from bowdenfit.inference.draws import efficiency_at, for_each_draw, for_each_value, replicator, value_function
+from bowdenfit.inference.draws import compile_replicator, efficiency_at, for_each_draw, for_each_value, value_function
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.along_route import make_optimizer, route_grid
@@ -225,7 +225,7 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
     model = build_model(measured(cable(2, tables), seed=1)[0])
     posterior = LogDensity(model)
     z = np.repeat(0.3 * np.ones((1, model.space.size)), 4000, axis=0)
-    drawn = replicator(posterior, seed=3)(z)
+    drawn = compile_replicator(posterior, seed=3)(z)
     values = {name: v[0] for name, v in drawn["values"].items()}
     assert not np.any(drawn["replicated"]["efficiency"][0] == drawn["replicated"]["efficiency"][1])
     runs = model.terms[2]
@@ -252,6 +252,6 @@ def test_readings_by_another_seed_need_no_other_program(on_body_model, monkeypat
 
     monkeypatch.setattr(draws, "compile_program", program)
     posterior, z = LogDensity(on_body_model), _draws(on_body_model, 2, 1)
-    drawn = [replicator(posterior, seed)(z)["replicated"]["efficiency"] for seed in (3, 4)]
+    drawn = [compile_replicator(posterior, seed)(z)["replicated"]["efficiency"] for seed in (3, 4)]
     assert compiled[0].as_text() == compiled[1].as_text()
     assert not np.any(drawn[0] == drawn[1])

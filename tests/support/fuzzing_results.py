@@ -20,7 +20,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append_record, read_records
-from bowdenfit.inference.engines import versions
+from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.ensemble import CheckpointedBackend
 from bowdenfit.questions.calibrate.replications import (
     RankedTruth,
@@ -185,19 +185,19 @@ def resume_calibration(folder: Path) -> None:
 def begun_fleet(place: Path) -> Path:
     """The folder of a fleet that was finished once, and then ended while cables were added."""
     place.mkdir()
-    store = FleetStore(place, {"seed": 3, "versions": versions()})
+    store = FleetStore(place, {"seed": 3, "versions": installed_versions()})
     store.open(resume=False, force=False)
     chance, labels = np.random.default_rng(1), ("a", "b after 5 cycles", "c")
     values = {"mu": chance.normal(size=(3, 8)), "tau": chance.normal(size=(3, 8))}
     texts = {"engine": ["laplace"] * 3, "reasons": ["", SEPARATOR.join("xy"), ""], "shape": ["k"] * 3, "input": list("abc")}
     stats = {name: np.array(column, dtype=object) for name, column in texts.items()}
     stats |= {"pareto_k": np.zeros(3), "n_effective": np.ones(3), "trusted": np.ones(3, dtype=bool)}
-    about = {"name": "x", "seed": 3, "versions": versions(), "quantities": {"k": ["mu", "tau"]}}
+    about = {"name": "x", "seed": 3, "versions": installed_versions(), "quantities": {"k": ["mu", "tau"]}}
     nothing = np.full(3, np.nan)
     attributes = {"mu": {"units": "1"}}
     drawn = FleetDraws(labels, ("a", "b", "c"), nothing, nothing, nothing, values, stats, attributes, about)
     write_fleet_draws(place / FLEET_DRAWS, drawn)
-    page = {"seed": 3, "versions": versions(), "fitted": [], CHECKSUM: file_checksum(place / FLEET_DRAWS)}
+    page = {"seed": 3, "versions": installed_versions(), "fitted": [], CHECKSUM: file_checksum(place / FLEET_DRAWS)}
     (place / FLEET_PAGE).write_text(json.dumps(page) + "\n")
     store.keep([PieceFit(name, np.ones((2, 8)), "laplace", 0.1, 400.0, ("why",)) for name in "de"])
     return place
@@ -206,7 +206,7 @@ def begun_fleet(place: Path) -> Path:
 def resume_fleet(folder: Path) -> None:
     """What `fleet --resume` reads."""
     before = read_start(folder)
-    found = FleetStore(folder, {"seed": int(before["seed"]), "versions": versions()}).open(resume=True, force=False)
+    found = FleetStore(folder, {"seed": int(before["seed"]), "versions": installed_versions()}).open(resume=True, force=False)
     assert all(isinstance(fit, PieceFit) and fit.values.ndim == 2 for fit in found.values())
 
 

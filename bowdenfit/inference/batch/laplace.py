@@ -63,8 +63,8 @@ class StudentMixture:
         rows = generator.standard_normal((count, self.center.shape[1]))
         wide = np.sqrt(_DEGREES_OF_FREEDOM / generator.chisquare(_DEGREES_OF_FREEDOM, count))
         for i in range(len(self.share)):
-            here = part == i
-            rows[here] = self.center[i] + wide[here, None] * (rows[here] @ self.root[i].T)
+            members = part == i
+            rows[members] = self.center[i] + wide[members, None] * (rows[members] @ self.root[i].T)
         return rows
 
     def log_density(self, rows: np.ndarray) -> np.ndarray:
@@ -75,8 +75,8 @@ class StudentMixture:
         """Return squared Mahalanobis distances from every component, (row, component)."""
         count, size = self.center.shape
         flat = self._inverse.reshape(-1, size)
-        apart = (rows @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(-1, count, size)
-        return np.einsum("nki,nki->nk", apart, apart)
+        scaled = (rows @ flat.T - np.einsum("kij,kj->ki", self._inverse, self.center).ravel()).reshape(-1, count, size)
+        return np.einsum("nki,nki->nk", scaled, scaled)
 
     def _log_components(self, squares: np.ndarray) -> np.ndarray:
         """Return the log of weight times density of every component, (row, component)."""
@@ -86,32 +86,32 @@ class StudentMixture:
             - lgamma(_DEGREES_OF_FREEDOM / 2)
             - size / 2 * np.log(_DEGREES_OF_FREEDOM * np.pi)
         )
-        of_part = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
-        return of_part - (_DEGREES_OF_FREEDOM + size) / 2 * np.log1p(squares / _DEGREES_OF_FREEDOM)
+        log_factor = np.log(self.share) + constant - np.linalg.slogdet(self.root)[1]
+        return log_factor - (_DEGREES_OF_FREEDOM + size) / 2 * np.log1p(squares / _DEGREES_OF_FREEDOM)
 
-    def refined(self, rows: np.ndarray) -> "StudentMixture":
+    def refine(self, rows: np.ndarray) -> "StudentMixture":
         """Return the mixture after some steps of expectation and maximization toward draws.
 
         Args:
             rows: Draws, one a row.
         """
-        mixture, of_all, (count, size) = self, regularized_covariance(rows), rows.shape
+        mixture, overall_covariance, (count, size) = self, regularized_covariance(rows), rows.shape
         for _ in range(_EM_STEPS):
             squares = mixture._squared_distances(rows)
             logs = mixture._log_components(squares)
-            of_part = np.exp(logs - _log_sum(logs)[:, None]) / count
-            pulled = of_part * (_DEGREES_OF_FREEDOM + size) / (_DEGREES_OF_FREEDOM + squares)
-            share = np.maximum(of_part.sum(axis=0), np.finfo(float).tiny)
+            membership = np.exp(logs - _log_sum(logs)[:, None]) / count
+            pulled = membership * (_DEGREES_OF_FREEDOM + size) / (_DEGREES_OF_FREEDOM + squares)
+            share = np.maximum(membership.sum(axis=0), np.finfo(float).tiny)
             near = share > _LEAST_PART_SHARE
             middle = pulled.T @ rows / np.maximum(pulled.sum(axis=0), np.finfo(float).tiny)[:, None]
             center = np.where(near[:, None], middle, mixture.center)
-            few = size / (share**2 / np.maximum(np.sum(of_part**2, axis=0), np.finfo(float).tiny) + size)
+            few = size / (share**2 / np.maximum(np.sum(membership**2, axis=0), np.finfo(float).tiny) + size)
             few = np.where(near, few, 1.0)[:, None, None]
-            apart = [rows - at for at in center]
+            deviations = [rows - at for at in center]
             scale = np.stack(
-                [(deviation * pull[:, None]).T @ deviation for deviation, pull in zip(apart, pulled.T, strict=True)]
+                [(deviation * pull[:, None]).T @ deviation for deviation, pull in zip(deviations, pulled.T, strict=True)]
             )
-            scale = (1 - few) * scale / share[:, None, None] + few * _SHRINKAGE * of_all
+            scale = (1 - few) * scale / share[:, None, None] + few * _SHRINKAGE * overall_covariance
             share = np.maximum(share, _LEAST_PART_SHARE)
             mixture = StudentMixture(center, np.linalg.cholesky(scale), share / share.sum())
         return mixture

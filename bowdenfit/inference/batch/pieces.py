@@ -246,20 +246,20 @@ def _compile(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, 
     posterior = shape_dataset(example.dataset).posterior
     model = posterior.model
 
-    def shown(z: Array, data: Any) -> Array:
+    def stack_shown_values(z: Array, data: Any) -> Array:
         values = shown_values(model, posterior.values(z, data))
         names = [*(p.name for p in model.space.free), *derived_units(model)]
         return jnp.stack([values[name] for name in names])
 
     rows = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
-    return BatchPrograms(posterior, settings), compile_program(jax.vmap(shown, (0, None), 1), rows, posterior.data)
+    return BatchPrograms(posterior, settings), compile_program(jax.vmap(stack_shown_values, (0, None), 1), rows, posterior.data)
 
 
 def _make_piece_fit(name: str, data: Any, seed: int, fit: BatchFit, values_of: Callable[..., Any]) -> PieceFit:
     """Return a fit as named values of a fixed number of draws."""
-    known = min((min(d.ess_bulk, d.ess_tail) for d in fit.diagnostics.values()), default=0.0)
+    n_effective = min((min(d.ess_bulk, d.ess_tail) for d in fit.diagnostics.values()), default=0.0)
     if not len(fit.z):
-        return PieceFit(name, np.zeros((0, 0)), fit.engine, fit.pareto_k, known, fit.reasons)
+        return PieceFit(name, np.zeros((0, 0)), fit.engine, fit.pareto_k, n_effective, fit.reasons)
     order = np.random.default_rng([seed, _SHUFFLE_STREAM]).permutation(len(fit.z))
     z = fit.z[np.resize(order, DRAWS)]
-    return PieceFit(name, np.asarray(values_of(z, data)), fit.engine, fit.pareto_k, float(known), fit.reasons)
+    return PieceFit(name, np.asarray(values_of(z, data)), fit.engine, fit.pareto_k, float(n_effective), fit.reasons)

@@ -64,9 +64,9 @@ class MaximaProposal:
 
     def draw(self, generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Draw points; return them and whether each is a z (True) or a w."""
-        of_prior = round(_PRIOR_SHARE * count)
-        prior = generator.standard_normal((of_prior, self.students.center.shape[1]))
-        z = np.concatenate([prior, self.students.draw(generator, count - of_prior)])
+        n_prior = round(_PRIOR_SHARE * count)
+        prior = generator.standard_normal((n_prior, self.students.center.shape[1]))
+        z = np.concatenate([prior, self.students.draw(generator, count - n_prior)])
         return z, np.ones(count, dtype=bool)
 
     def log_density(self, at: ProposedPoints) -> np.ndarray:
@@ -122,7 +122,7 @@ def learn_proposal(previous: Proposal, w: np.ndarray, friction: np.ndarray) -> L
         if len(which):
             rows = w[:, which]
             groups.append(
-                (which, start_mixture(rows, parts).refined(rows).with_wide_component(rows, _WIDE, _WIDE_SHARE))
+                (which, start_mixture(rows, parts).refine(rows).with_wide_component(rows, _WIDE, _WIDE_SHARE))
             )
     return LearntProposal(first, tuple(groups))
 
@@ -163,7 +163,7 @@ class WeightedDraws:
 
     def joined_with(self, other: "WeightedDraws") -> "WeightedDraws":
         """Return these draws and more of the same proposal."""
-        both = zip(*map(_fields, (self, other)), strict=True)
+        both = zip(*map(_list_fields, (self, other)), strict=True)
         return WeightedDraws(*(np.concatenate([own, more]) for own, more in both))
 
     def diagnose(self, names: tuple[str, ...]) -> dict[str, Diagnostics]:
@@ -204,8 +204,8 @@ class WeightedDraws:
         return tuple(reasons)
 
 
-def _fields(of: WeightedDraws) -> tuple[np.ndarray, ...]:
-    return of.w, of.z, of.log_density, of.log_proposed
+def _list_fields(draws: WeightedDraws) -> tuple[np.ndarray, ...]:
+    return draws.w, draws.z, draws.log_density, draws.log_proposed
 
 
 @dataclass(frozen=True)

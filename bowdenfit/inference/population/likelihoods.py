@@ -133,14 +133,14 @@ class JointReadings:
         """Number of sampled parameters of all of them, beside their coefficients."""
         return len(self.rows) * len(self.others)
 
-    def stack(self, where: np.ndarray) -> dict[str, Any]:
+    def stack(self, positions: np.ndarray) -> dict[str, Any]:
         """Return their data, stacked.
 
         Args:
-            where: Number of the cable, and position among its inspections, of every inspection.
+            positions: Number of the cable, and position among its inspections, of every inspection.
         """
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *self.data)
-        return {"where": where[list(self.rows)], "counts": np.ones(len(self.rows)), "readings": stacked}
+        return {"where": positions[list(self.rows)], "counts": np.ones(len(self.rows)), "readings": stacked}
 
     def log_density(
         self,

@@ -149,16 +149,17 @@ def _locate_population(density: PopulationDensity, data: dict[str, Any]) -> tupl
     """
     size, slopes_of = len(density.names), _compile_gradient(density, *_tree_and_shapes(data))
 
-    def minus(inner: np.ndarray) -> tuple[float, np.ndarray]:
+    def negative_density(inner: np.ndarray) -> tuple[float, np.ndarray]:
         value, slopes = slopes_of(np.append(inner, np.zeros(density.size - size)), data)
         negated = -float(value), -np.asarray(slopes)[:size]
         return (
             negated if np.isfinite(np.append(*negated)).all() else (_UNCOMPUTABLE, np.zeros(size))
         )  # a spread that is none
 
-    center = minimize(minus, np.zeros(size), jac=True, method="BFGS").x
+    center = minimize(negative_density, np.zeros(size), jac=True, method="BFGS").x
     steps = _STEP * np.eye(size)
-    precision = np.array([minus(center + step)[1] - minus(center - step)[1] for step in steps]) / (2 * _STEP)
+    slopes = [negative_density(center + step)[1] - negative_density(center - step)[1] for step in steps]
+    precision = np.array(slopes) / (2 * _STEP)
     sizes, ways = np.linalg.eigh((precision + precision.T) / 2)
     return center, ways / np.sqrt(np.maximum(sizes, 1.0))  # the prior alone has precision 1
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.inference.engines import JOBS_FOLDER, open_engine, refuse_other_versions, versions
+from bowdenfit.inference.engines import JOBS_FOLDER, installed_versions, open_engine, refuse_other_versions
 from bowdenfit.questions.calibrate.answer import Calibration, QuantityLabel
 from bowdenfit.questions.calibrate.plan import CalibrationPlan
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
@@ -83,7 +83,7 @@ def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int)
         if workers == 1
         else min(max(-(-len(numbers) // (_PIECES_PER_WORKER * workers)), _MIN_PIECE), BATCH_SIZE)
     )
-    return [ReplicationPiece(job, tuple(numbers[i : i + size]), versions()) for i in range(0, len(numbers), size)]
+    return [ReplicationPiece(job, tuple(numbers[i : i + size]), installed_versions()) for i in range(0, len(numbers), size)]
 
 
 def run_piece(piece: ReplicationPiece) -> list[Replication]:
@@ -96,11 +96,11 @@ def run_piece(piece: ReplicationPiece) -> list[Replication]:
         UsageError: The work comes from a program of other versions, or hardly any tables look like ones from a bench.
     """
     refuse_other_versions(piece.versions)
-    return list(_replicator(piece.job).replicate(piece.numbers))
+    return list(_make_replicator(piece.job).replicate(piece.numbers))
 
 
 @lru_cache(maxsize=1)
-def _replicator(job: CalibrationJob) -> Replicator:
+def _make_replicator(job: CalibrationJob) -> Replicator:
     """Return what serves all pieces of one plan, with what it has compiled."""
     return Replicator(job.plan, BatchFitter(replace(RANK_SETTINGS, threads=job.threads)))
 
@@ -122,10 +122,10 @@ def open_calibration(
         StoreError: The folder holds something else, or what it holds was made of something else.
     """
     with reserve_folder(folder):
-        yield {} if folder is None else open_replications(folder, _fingerprint(plan, assumptions), resume, force)
+        yield {} if folder is None else open_replications(folder, _make_fingerprint(plan, assumptions), resume, force)
 
 
-def _fingerprint(plan: CalibrationPlan, assumptions: Sequence[str]) -> dict[str, Any]:
+def _make_fingerprint(plan: CalibrationPlan, assumptions: Sequence[str]) -> dict[str, Any]:
     """Return what must not change between an interrupted calibration and its continuation."""
     page = {
         "description": plan.stated.description.to_json(),

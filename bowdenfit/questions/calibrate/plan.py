@@ -117,7 +117,7 @@ def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
     stated, assumed = plan.stated.description, plan.assumed.description
     for kind, table in iterate_term_kinds(plan.stated.measurements):
         kind.check_drawable(stated, table)
-    if stated.angle_columns != assumed.angle_columns or _kinds(plan.stated) != _kinds(plan.assumed):
+    if stated.angle_columns != assumed.angle_columns or _list_kinds(plan.stated) != _list_kinds(plan.assumed):
         raise DescriptionError(
             "--assume changes which tables or columns the data set has; the fits must read what is simulated, so change "
             "only how it is modeled."
@@ -135,7 +135,7 @@ def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
     }
 
 
-def _kinds(dataset: Dataset) -> list[str]:
+def _list_kinds(dataset: Dataset) -> list[str]:
     return [kind.name for kind, _ in iterate_tables(dataset.measurements)]
 
 

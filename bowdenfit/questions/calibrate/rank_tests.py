@@ -59,8 +59,8 @@ def summarize_replications(
     judged_by = {q: criterion if label.is_answer or not truths else "" for q, label in descriptions.items()}
     n_judged = sum(map(bool, judged_by.values()))
     checked = _check_all(descriptions, judged_by, converged)
-    with_draws = [r for r in replications if r.ranked]
-    with_all = checked if len(with_draws) == len(converged) else _check_all(descriptions, judged_by, with_draws)
+    sampled = [r for r in replications if r.ranked]
+    checked_with_all = checked if len(sampled) == len(converged) else _check_all(descriptions, judged_by, sampled)
     redrawn: Counter[str] = Counter()
     for replication in replications:
         redrawn.update(replication.redrawn)
@@ -70,7 +70,7 @@ def summarize_replications(
     bands = {claimed: _chance_band(len(converged), claimed, n_judged) for claimed in INTERVALS} if checked else {}
     power = estimate_power(len(converged), LEVEL / n_judged, bands, not truths) if checked else ()
     summary = len(replications), checked, unconverged, dict(redrawn), seconds
-    wrong_with_all = {q.name: q.fault for q in with_all if not q.is_calibrated}
+    wrong_with_all = {q.name: q.fault for q in checked_with_all if not q.is_calibrated}
     return Calibration(name, assumed, seed, *summary, truths, dict(engines.most_common()), power, wrong_with_all)
 
 

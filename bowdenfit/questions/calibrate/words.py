@@ -54,14 +54,14 @@ def calibration_page(calibration: Calibration) -> HtmlPage:
         prose_section(
             "Quantity by quantity", [quantity_note(calibration)] if table else [], table,
             folded=[("What the names stand for", names), ("What the verdict on each rests on", evidence)],
-            pictures=_pictures(calibration),
+            pictures=_make_pictures(calibration),
         ),
         prose_section("What was left out", omission_sentences(calibration)),
     )  # fmt: skip
     return HtmlPage(calibration.name, "Calibration by bowdenfit", sections)
 
 
-def _pictures(calibration: Calibration) -> tuple[Picture, ...]:
+def _make_pictures(calibration: Calibration) -> tuple[Picture, ...]:
     """Return the figures with their captions, those for statisticians folded."""
     figures = select_figures(calibration).items()
     return tuple(

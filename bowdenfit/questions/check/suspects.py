@@ -10,7 +10,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 
-from bowdenfit.inference.draws import DrawFunction, replicator
+from bowdenfit.inference.draws import DrawFunction, compile_replicator
 from bowdenfit.inference.leave_one_out import LooDensity, LooRefits
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.predictive_checks import replace_by_refit
@@ -49,7 +49,7 @@ def refit_influential_outliers(fit: Record, tables: Sequence[TableChecks]) -> tu
 @cached_per_fit
 def replicate_program(fit: Record) -> DrawFunction:
     """Return the compiled function from many z to replicated readings; a fit that samples has it already."""
-    return fit.programs.quantities if fit.programs else replicator(LogDensity(fit.model), fit.provenance.seed)
+    return fit.programs.quantities if fit.programs else compile_replicator(LogDensity(fit.model), fit.provenance.seed)
 
 
 def find_influential_outliers(tables: Sequence[TableChecks]) -> list[tuple[int, int]]:

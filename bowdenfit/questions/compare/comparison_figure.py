@@ -81,10 +81,10 @@ def _label_room(comparison: Comparison) -> float:
     """Return the room below the panel of readings [in]."""
     if len(comparison.readings) > MAX_LABELED:
         return _BELOW + 0.1
-    return 0.25 + 0.045 * max(len(_plain(label)) for _, label in comparison.readings)
+    return 0.25 + 0.045 * max(len(_format_plainly(label)) for _, label in comparison.readings)
 
 
-def _plain(label: str) -> str:
+def _format_plainly(label: str) -> str:
     return label.replace("_", " ")
 
 
@@ -139,7 +139,7 @@ def _draw_by_reading(axes: Axes, comparison: Comparison, names: list[str]) -> No
     _mark_tables(axes, comparison)
     axes.grid(axis="x", visible=False)
     if len(x) <= MAX_LABELED:
-        axes.set_xticks(x, [_plain(label) for _, label in comparison.readings], rotation=90, fontsize=SMALL - 1)
+        axes.set_xticks(x, [_format_plainly(label) for _, label in comparison.readings], rotation=90, fontsize=SMALL - 1)
     else:
         axes.set_xlabel("Reading, in the order of the tables")
     page, box = axes.figure.get_size_inches(), axes.get_position()  # type: ignore[union-attr]
@@ -154,7 +154,7 @@ def _mark_tables(axes: Axes, comparison: Comparison) -> None:
         if number % 2:
             axes.axvspan(start - 0.5, start + n - 0.5, color=LIGHT, linewidth=0, zorder=0)
         room = n / (np.ptp(axes.get_xlim()) or 1.0) * axes.get_position().width * WIDE - _APART
-        name = wrap_words(_plain(table), room, most=1) if room > MIN_LABEL_WIDTH else ""
+        name = wrap_words(_format_plainly(table), room, most=1) if room > MIN_LABEL_WIDTH else ""
         axes.annotate(
             name, (start - 0.4, 1.0), xycoords=("data", "axes fraction"), xytext=(0, -8),
             textcoords="offset points", fontsize=SMALL, color=GRAY,

@@ -19,7 +19,7 @@ from bowdenfit.errors import StoreError, UsageError
 from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit, fit_piece
 from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
 from bowdenfit.inference.draws import derived_units
-from bowdenfit.inference.engines import JOBS_FOLDER, Engine, open_engine, versions
+from bowdenfit.inference.engines import JOBS_FOLDER, Engine, installed_versions, open_engine
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.resources import keep_compiled_programs
 from bowdenfit.model import Model, build_model
@@ -61,7 +61,7 @@ def divide_into_pieces(
         example = Example(key, members[0].dataset)
         for part in (members[i : i + size] for i in range(0, len(members), size)):
             names, data = tuple(case.hash for case in part), tuple(case.shaped.data for case in part)
-            pieces.append(Piece(example, settings, names, data, tuple(case.seed(seed) for case in part), versions()))
+            pieces.append(Piece(example, settings, names, data, tuple(case.seed(seed) for case in part), installed_versions()))
     return pieces
 
 
@@ -139,7 +139,7 @@ def gather_results(
     words = tuple(
         _describe_shape(number, members) for number, members in zip(numbers.values(), shapes.values(), strict=True)
     )
-    answer = Fleet(name, fitted, (*broken, *failed), units, words, seed, dict(versions()))
+    answer = Fleet(name, fitted, (*broken, *failed), units, words, seed, dict(installed_versions()))
     meanings = {key: _describe_coefficients(model) for key, model in models.items()}
     return answer, _collect_draws(
         answer, fitted_cases, fits, quantities, all_quantities, meanings
@@ -262,7 +262,7 @@ def _open_store(place: Path | None, seed: int | None, resume: bool) -> tuple[Fle
         raise UsageError("--resume needs the results folder of a fleet; name it with --output.")
     if seed is None:
         seed = int(read_start(place)["seed"]) if resume and place is not None else secrets.randbelow(LARGEST_SEED)
-    return (None if place is None else FleetStore(place, {"seed": seed, "versions": versions()})), seed
+    return (None if place is None else FleetStore(place, {"seed": seed, "versions": installed_versions()})), seed
 
 
 def _fit_pieces(

@@ -87,13 +87,13 @@ def _list_inspections(folder: Path) -> list[Inspection]:
             inspections.append(Inspection(cable.name, UNKNOWN, UNKNOWN, UNKNOWN, cable))
             continue
         paths = sorted(path for path in cable.iterdir() if (path / DESCRIPTION_FILE).is_file())
-        inspections += [Inspection(cable.name, _parse_folder_name(each), UNKNOWN, UNKNOWN, each) for each in paths]
+        inspections += [Inspection(cable.name, _parse_folder_name(path), UNKNOWN, UNKNOWN, path) for path in paths]
     if not inspections:
         raise DatasetError(
             f"{folder} holds no fleet: write {FLEET_TABLE} with the columns {', '.join(COLUMNS)}, or a folder with "
             f"{DESCRIPTION_FILE} and tables for each cable."
         )
-    _refuse_duplicates([(each, str(each.path)) for each in inspections])
+    _refuse_duplicates([(inspection, str(inspection.path)) for inspection in inspections])
     return inspections
 
 

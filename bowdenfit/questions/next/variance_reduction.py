@@ -66,11 +66,11 @@ def explained_share(
         answer: The answer of each draw.
         groups: Number of groups.
     """
-    polynomials = _polynomials(reading)
+    polynomials = _build_polynomials(reading)
     left, total = _residual_squares(polynomials, answer, groups)
-    all_left, all_of_it = float(np.sum(left)), float(np.sum(total))
-    without = 1 - (all_left - left) / (all_of_it - total) if all_of_it > 0 else np.zeros(len(left))
-    share = 1 - all_left / all_of_it if all_of_it > 0 else 0.0
+    sum_left, sum_total = float(np.sum(left)), float(np.sum(total))
+    without = 1 - (sum_left - left) / (sum_total - total) if sum_total > 0 else np.zeros(len(left))
+    share = 1 - sum_left / sum_total if sum_total > 0 else 0.0
     return Explained(float(np.clip(share, 0.0, 1.0)), _jackknife_error(without), without)
 
 
@@ -108,10 +108,10 @@ def _cross_validated_squares(products: np.ndarray, with_answer: np.ndarray, squa
     return squares_left
 
 
-def _polynomials(reading: np.ndarray) -> np.ndarray:
+def _build_polynomials(reading: np.ndarray) -> np.ndarray:
     """Return products of powers of the columns, the constant first; columns that say nothing are left out."""
     columns = [
-        _normal_scores(column) for column in reading.T if np.ptp(column) > _NEGLIGIBLE_SPREAD * np.abs(column).max()
+        _compute_normal_scores(column) for column in reading.T if np.ptp(column) > _NEGLIGIBLE_SPREAD * np.abs(column).max()
     ]
     degree = _DEGREES.get(len(columns), _DEFAULT_DEGREE)
     terms = [np.ones(len(reading))]
@@ -121,7 +121,7 @@ def _polynomials(reading: np.ndarray) -> np.ndarray:
     return np.column_stack(terms)
 
 
-def _normal_scores(column: np.ndarray) -> np.ndarray:
+def _compute_normal_scores(column: np.ndarray) -> np.ndarray:
     """Return the column brought to a normal distribution by its ranks, so that no far value rules a polynomial."""
     return np.asarray(ndtri((rankdata(column) - 0.5) / len(column)))
 

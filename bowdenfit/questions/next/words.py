@@ -59,10 +59,10 @@ def ranking_sentences(ranking: NextMeasurement) -> list[str]:
 def _format_sd(ranking: NextMeasurement, sd: float) -> str:
     """Return a standard deviation with the answer's unit."""
     unit = f" {ranking.answer.unit}" if ranking.answer.unit else ""
-    return f"± {sd:.{_digits(ranking)}f}{unit}"
+    return f"± {sd:.{_count_decimals(ranking)}f}{unit}"
 
 
-def _digits(ranking: NextMeasurement) -> int:
+def _count_decimals(ranking: NextMeasurement) -> int:
     """Return the decimals of standard deviations: two significant digits, or three where the best candidate changes little."""
     usual, change = decimals(ranking.answer.sd), ranking.answer.sd - ranking.ranked[0].sd
     return min(max(usual, decimals(change) - 1), usual + 1) if change > 0 else usual
@@ -162,7 +162,7 @@ def ranking_table(ranking: NextMeasurement, top: int) -> tuple[list[str], list[l
     """Return heads and rows of so many of the best candidates."""
     best = ranking.ranked[:top]
     unit = f" ({ranking.answer.unit})" if ranking.answer.unit else ""
-    digits = _digits(ranking)
+    digits = _count_decimals(ranking)
     heads = ["measurement", f"then known to{unit}", "uncertainty lower by"]
     rows = [[r.name, f"± {r.sd:z.{digits}f}", percent(1 - r.sd / ranking.answer.sd)] for r in best]
     if any(r.cost is not None for r in best):

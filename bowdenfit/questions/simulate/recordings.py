@@ -107,7 +107,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Reco
     model = build_model(Dataset(plan.description, tables, {}))
     truth = {p.name: values[p.name] * p.shown_scale for p in model.space.parameters} | {FORCE_NOISE: float(force_noise)}
     named = {name: jnp.asarray(value, dtype=float) for name, value in values.items()}
-    angles = _true_angles(plan, model.cable, named, lengths)
+    angles = _compute_true_angles(plan, model.cable, named, lengths)
     exponents = np.asarray(model.cable.friction_exponent(named, jnp.asarray(angles)), dtype=float)
     scatter = values[RUN_SCATTER] * noise
     effects = {
@@ -130,11 +130,11 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Reco
         () if table is None else (_add_measured_angles(table, plan, values[ANGLE_NOISE] * noise, angle_generator),)
     )
     return RecordingSet(
-        plan, seed, {**truth, **_common_truth(recordings)}, Measurements(angle_tables), tuple(recordings)
+        plan, seed, {**truth, **_collect_common_truth(recordings)}, Measurements(angle_tables), tuple(recordings)
     )
 
 
-def _common_truth(recordings: Sequence[RecordingWithTruth]) -> dict[str, float]:
+def _collect_common_truth(recordings: Sequence[RecordingWithTruth]) -> dict[str, float]:
     """Return what all recordings share of friction's dependences and of the sensors, by the names of a fit's parameters."""
     motor = recordings[0].planned.friction.speed == "motor"
     unit_factors = {"stribeck_speed": 1 / RPM, "viscous": RPM} if motor else {}
@@ -151,7 +151,7 @@ def _common_truth(recordings: Sequence[RecordingWithTruth]) -> dict[str, float]:
     return common
 
 
-def _true_angles(
+def _compute_true_angles(
     plan: RecordingsPlan, cable: Cable, values: Mapping[str, jax.Array], lengths: np.ndarray
 ) -> np.ndarray:
     """Return the wrap angle of each recording and contact [rad]: the curve's, or the stated one outside the range."""

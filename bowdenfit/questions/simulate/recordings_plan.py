@@ -177,13 +177,13 @@ def _read_measured_angles(page: RecordingsPage, description: Description, file: 
         for name in ["at", *columns]:
             if name not in row:
                 raise DescriptionError(f"{where}: the key {name!r} is missing; angles are in deg.")
-        if _inside(description, row["at"]):
+        if _is_inside_range(description, row["at"]):
             raise DescriptionError(f"{where}: {row['at']:g} lies inside the range of the route, where the curves hold.")
         angles[row["at"]] = {name: row[name] for name in columns}
     return angles
 
 
-def _inside(description: Description, length: float) -> bool:
+def _is_inside_range(description: Description, length: float) -> bool:
     return description.route is None or description.route.range[0] <= length <= description.route.range[1]
 
 
@@ -194,7 +194,7 @@ def _check_lengths(
     run_lengths: dict[str, float] = {}
     for recording in recordings:
         length = recording.length
-        if description.curved and not _inside(description, length) and length not in measured:
+        if description.curved and not _is_inside_range(description, length) and length not in measured:
             raise DescriptionError(
                 f"{file}, recordings: {length:g} lies outside the range of the route, where the curves do not hold; "
                 f"give its wrap angles in [[recordings.measured_angles]] with at = {length:g}."
@@ -249,13 +249,13 @@ def _plan_recording(
         )
         check_settings(planned.profile, planned.faults)
     except ValidationError as error:
-        raise DescriptionError(f"{where}, {_explain(error)}") from None
+        raise DescriptionError(f"{where}, {_describe_first_fault(error)}") from None
     except UsageError as error:
         raise DescriptionError(f"{where}: {error}") from None
     return planned
 
 
-def _explain(error: ValidationError) -> str:
+def _describe_first_fault(error: ValidationError) -> str:
     """Say the first thing that is wrong with the sections of a recording."""
     first = next((e for e in error.errors() if e["type"] == "unexpected_keyword_argument"), error.errors()[0])
     section, *where = map(str, first["loc"])

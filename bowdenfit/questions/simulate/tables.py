@@ -181,7 +181,7 @@ def resimulate(
         def draw(named: Mapping[str, jax.Array], key: jax.Array) -> dict[str, jax.Array]:
             return draw_angles(table, Truth(cable, table, named, key, scale), everywhere=True)
 
-        beyond = {"angles": _evaluate(draw, named, key, run_once=run_once)}
+        beyond = {"angles": _evaluate_program(draw, named, key, run_once=run_once)}
         angle, limit = (np.asarray(beyond["angles"][name]) for name in ("angle", "limit"))
         measured = dataset.measurements.with_tables(replace(angles, angle=angle, limit=limit))
         dataset = replace(dataset, measurements=measured)
@@ -190,7 +190,7 @@ def resimulate(
     def readings(named: Mapping[str, jax.Array], key: jax.Array) -> Readings:
         return draw_readings(cable, tables, named, key, scale)
 
-    return replace_readings(dataset, _evaluate(readings, named, key, run_once=run_once) | beyond)
+    return replace_readings(dataset, _evaluate_program(readings, named, key, run_once=run_once) | beyond)
 
 
 def draw_true_values(
@@ -218,7 +218,7 @@ def draw_true_values(
         return space.vector(jax.random.normal(key, (space.size,)))
 
     needs_draw = any(p.name not in truth for p in space.free)
-    prior_draw = np.asarray(_evaluate(draw, key, run_once=run_once)) if needs_draw else np.zeros(space.size)
+    prior_draw = np.asarray(_evaluate_program(draw, key, run_once=run_once)) if needs_draw else np.zeros(space.size)
     values = {p.name: float(v) for p, v in zip(space.free, prior_draw, strict=True)}
     values |= {p.name: float(p.fixed or 0.0) for p in space.fixed}
     return values | {p.name: truth[p.name] / p.shown_scale for p in space.parameters if p.name in truth}
@@ -245,7 +245,7 @@ def replace_readings(dataset: Dataset, readings: Mapping[str, Mapping[str, jax.A
     return Dataset(dataset.description, replace_table_readings(dataset.description, dataset.measurements, readings), {})
 
 
-def _evaluate(function: Callable[..., Any], *arguments: Any, run_once: bool) -> Any:
+def _evaluate_program(function: Callable[..., Any], *arguments: Any, run_once: bool) -> Any:
     """Return what a function of arrays gives, as one program where it is asked for once."""
     return (compile_program(function, *arguments, run_once=True) if run_once else function)(*arguments)
 
@@ -282,11 +282,11 @@ def table_texts(description: Description, measured: Measurements) -> dict[str, s
         settings = description.tables.stated.get(kind.name)
         if settings and (page := kind.file_rows(table, description)):
             heads, rows = page
-            texts[kind.file_name(settings)] = "\n".join(",".join(map(_cell, row)) for row in [heads, *rows]) + "\n"
+            texts[kind.file_name(settings)] = "\n".join(",".join(map(_format_cell, row)) for row in [heads, *rows]) + "\n"
     return texts
 
 
-def _cell(text: str) -> str:
+def _format_cell(text: str) -> str:
     """Return a cell as CSV has it; a heading that holds a comma is one all the same."""
     return '"{}"'.format(text.replace('"', '""')) if set(text) & set(',"\r\n') else text
 

@@ -199,8 +199,8 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
     }
     wall = stated["wall.stiffness"].value
     schemes = tuple(
-        _assess_scheme(name, each, draws, stiffness, delay, frictions, wall, probability)
-        for name, each in gains_by_name.items()
+        _assess_scheme(name, scheme_gains, draws, stiffness, delay, frictions, wall, probability)
+        for name, scheme_gains in gains_by_name.items()
     )
     stable_at_wall = float(
         np.mean(is_stable(spectral_radius_in_contact(_build_master_and_slave(draws, stiffness, wall), gains, delay)))

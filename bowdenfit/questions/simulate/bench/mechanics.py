@@ -67,7 +67,7 @@ def plan_motion(profile: MotorProfile) -> MotorMotion:
     """Return all moves of the profile, one after the other."""
     clock, where = profile.lead_in, 0.0
     rows, turns, reversals, heading = [(0.0, 0.0, 0.0, 0.0)], [], [], 0.0
-    for ends_of_stroke in (_waypoints(profile, cycle) for cycle in range(2 * profile.cycles)):
+    for ends_of_stroke in (_list_waypoints(profile, cycle) for cycle in range(2 * profile.cycles)):
         for target in ends_of_stroke:
             direction = float(np.sign(target - where))
             if direction == 0:
@@ -75,7 +75,7 @@ def plan_motion(profile: MotorProfile) -> MotorMotion:
             if direction == -heading:
                 reversals.append(clock)
             heading = direction
-            rows += _move(profile, clock, where, target)
+            rows += _make_move(profile, clock, where, target)
             clock, where = rows[-1][0], target
             turns.append(clock)
         clock += profile.pause
@@ -83,14 +83,14 @@ def plan_motion(profile: MotorProfile) -> MotorMotion:
     return MotorMotion(start, position, velocity, acceleration, np.array(turns), tuple(reversals))
 
 
-def _waypoints(profile: MotorProfile, number: int) -> list[float]:
+def _list_waypoints(profile: MotorProfile, number: int) -> list[float]:
     """Return where the motor turns within one stroke [mm]; even strokes pull, odd ones return."""
     along = [point for where, back in profile.partial_reversals for point in (where, where - back)]
     along.append(profile.stroke)
     return along if number % 2 == 0 else [profile.stroke - point for point in along]
 
 
-def _move(profile: MotorProfile, clock: float, start: float, end: float) -> list[tuple[float, float, float, float]]:
+def _make_move(profile: MotorProfile, clock: float, start: float, end: float) -> list[tuple[float, float, float, float]]:
     """Return one trapezoidal move, or a triangular one where the way is too short for the full speed, and the rest after it."""
     distance, speed, ramp = abs(end - start), profile.speed * profile.drum_radius, profile.acceleration_time
     if speed * ramp > distance:
@@ -187,8 +187,8 @@ class Mechanics:
         clock = np.union1d(np.maximum(time, 0.0), self.motion.turns)
         sampled = np.searchsorted(clock, np.maximum(time, 0.0))
         position, velocity = self.motion.state_at(clock)
-        exponent = self._exponent(velocity)
-        x, _ = play_between(self._boundary(position, exponent), self._boundary(position, -exponent), 0.0)
+        exponent = self._compute_exponent(velocity)
+        x, _ = play_between(self._find_boundary(position, exponent), self._find_boundary(position, -exponent), 0.0)
         stroke = np.sign(np.diff(x, prepend=0.0)).astype(int)
         bench, loaded = self.bench, np.maximum(time, 0.0) >= self.profile.unloaded
         input_force = bench.rope_stiffness * (position - x) + bench.preload
@@ -199,7 +199,7 @@ class Mechanics:
             np.where(loaded, output_force[sampled], 0.0),
         )
 
-    def _exponent(self, velocity: Vector) -> Vector:
+    def _compute_exponent(self, velocity: Vector) -> Vector:
         """Return Lambda(v) + m."""
         speed = velocity if self.friction.speed == "rope" else velocity / self.profile.drum_radius
         exponent = self.exponent * self.friction.rate_factor(speed) + self.run_effect
@@ -210,7 +210,7 @@ class Mechanics:
             )
         return exponent
 
-    def _boundary(self, position: Vector, shift: Vector) -> Vector:
+    def _find_boundary(self, position: Vector, shift: Vector) -> Vector:
         """Return the displacement x >= 0 of the load at which `g(F_in) = g(F_out) + shift`, for each motor position [mm].
 
         Newton's method from the side on which the curve bends away from zero, so that it cannot overshoot.

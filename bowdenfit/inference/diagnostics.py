@@ -11,8 +11,8 @@ from bowdenfit.types import ChainDraws
 from bowdenfit.words import percent
 
 MAXIMUM_DRIFT = 0.08  # 2.5 times the Monte Carlo error of 3 % at 1000 effective draws
-MOST_FINE_DIVERGED = 0.001  # share of the trajectories with fine steps; if more diverge, a narrow region is out of reach
-MOST_DIVERGED = 0.01  # share of all trajectories; those of ordinary steps may diverge where the fine ones do not
+MOST_FINE_DIVERGED = 0.001  # share of the trajectories with fine steps, a judgement; if more diverge, a narrow region is missed
+MOST_DIVERGED = 0.01  # share of all trajectories, a judgement; ordinary steps may diverge where the fine ones do not
 LEAST_ENERGY_MIXING = 0.3  # lower limit of the E-BFMI (Betancourt 2016)
 
 

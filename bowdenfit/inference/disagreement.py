@@ -28,9 +28,9 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.space import Parameter
 
 NOTICEABLE_SDS = 3.0  # standard deviations; a table that agrees exceeds this in three of a thousand fits (two-sided normal)
-_MANY = 8  # spare degrees of freedom from which a table's own scatter is known well enough
+_MANY = 8  # spare degrees of freedom from which a table's own scatter is known well enough, to 25 %; a judgement
 _LEAST_SCATTER = 1e-4  # in units of the noise prior; readings that scatter less were not measured
-_LITTLE = 0.1  # most share of the priors in the information of the other tables along a direction that counts
+_LITTLE = 0.1  # most share of the priors in the information of the other tables along a direction that counts; a judgement
 _LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table carries no information about it
 
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from bowdenfit.words import significant
 
-# share of the prior variance below which a parameter may be identified by itself: half the prior's standard deviation
+# All are judgements. Share of the prior variance below which a parameter may be identified by itself: half the prior's
+# standard deviation.
 IDENTIFIABLE = 0.25
 PRIOR_DOMINATED = 0.8  # share of the prior variance above which the estimate is the prior's
 UNINFORMED = 0.9  # share of the prior variance above which the measurements carry no information about a combination

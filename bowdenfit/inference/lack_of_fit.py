@@ -33,6 +33,7 @@ NOTICEABLE_SIZE = 0.02  # relative size of the departure below which it is not r
 # Judgement: shift of a coefficient by a drifting zero, over half of its 90 % interval, above which the drift is reported.
 NOTICEABLE_SHIFT = 0.5
 _FRICTION = ("friction", "friction_model")  # roles of the parameters that a drifting zero could move
+# Judgements below; `scripts/check_benches.py` counts the false alarms that they give together.
 _MANY = 30  # readings from which the heteroskedasticity-consistent test is used too
 _MOST_LEVELS = 24  # loads up to which each has a column of its own
 _CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials tested for curves, and for other readings

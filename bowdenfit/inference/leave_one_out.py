@@ -30,7 +30,7 @@ from bowdenfit.kinds.run_parts import RunParts
 REFIT = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=4000, target_r_hat=1.02, target_ess=400)
 _RATIO = "likelihood"
 _ROWS = 128  # draws that a compiled program takes at a time
-_LARGEST_ERROR = 0.3  # Monte Carlo error of an elpd beyond which it is called rough
+_LARGEST_ERROR = 0.3  # Monte Carlo error of an elpd beyond which it is called rough; a judgement
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,12 @@ if TYPE_CHECKING:  # another process works this out, without JAX
     from bowdenfit.parameters.space import Parameter
 
 SENSITIVE = 0.05  # sensitivity above which a quantity counts as sensitive (Kallioinen and others 2024)
-FOLLOWS = 1.15  # factor on a width, by a doubled or halved scale of a prior, above which the width is said to follow the prior
-# Prior standard deviations from the prior's median beyond which a prior that counts conflicts with the readings.
+# Factor on a width, by a doubled or halved scale of a prior, above which the width is said to follow the prior; a judgement.
+FOLLOWS = 1.15
+# Prior standard deviations from the prior's median beyond which a prior that counts conflicts with the readings: 5 % of a
+# normal prior lies beyond.
 _CONFLICT_SDS = 2.0
-FAR_SDS = 3.0  # such standard deviations beyond which any prior conflicts
+FAR_SDS = 3.0  # such standard deviations beyond which any prior conflicts: 0.3 % of a normal prior lies beyond
 _POWERS = (0.99, 1.01)  # priorsense's default
 _TAILS = (0.05, 0.5, 0.95)
 

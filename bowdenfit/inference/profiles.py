@@ -42,11 +42,11 @@ _AT_END = 6.0  # z so near to the end of a range that other parameters, fitted a
 _INSIDE = 2.0  # z a little inside the range, for a parameter that is at an end of it
 _FAR = 1.0  # largest extrapolated step of another parameter [z]
 _LOWER = 0.01  # relative decrease, on the same level, from which another minimum is a lower one
-PROBABILITY = 0.9
+PROBABILITY = 0.9  # of every interval that is shown
 FARTHEST = -LOWER_END
 _PRECISION = 3e-4  # precision of a limit, relative to the step that leads to it
 _BEYOND = 1.5  # length of the second step, relative to the linear extrapolation
-_MOST_STEPS = 50
+_MOST_STEPS = 50  # outward; a guard
 # limits of the first step from the minimum, and the longest of the others [z]
 _LEAST_STEP, _MOST_STEP, _LONGEST_STEP = 1e-6, 1.0, 8.0
 

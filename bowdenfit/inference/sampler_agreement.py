@@ -11,9 +11,9 @@ from bowdenfit.inference.diagnostics import array_stats
 
 FALSE_ALARM = 0.001  # probability that two correct samplers are reported to disagree
 SUMMARIES = ("mean", "sd", "5 % quantile", "95 % quantile")
-NOTICEABLE = 0.1  # standard deviations; smaller differences do not change an answer
+NOTICEABLE = 0.1  # standard deviations; smaller differences do not change an answer; a judgement
 SAMPLER_NAMES = {"emcee": "emcee", "nuts": "NUTS"}
-MANY_PARAMETERS = 25  # parameters above which ensembles of walkers mix slowly
+MANY_PARAMETERS = 25  # parameters above which ensembles of walkers mix slowly; a judgement
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.parameters.priors import Prior
 
-_FARTHEST = 6.0  # z
+_FARTHEST = 6.0  # z where a solve may start: two in a thousand million draws of a prior lie beyond
 
 
 def value_at(prior: Prior, z: float) -> float:

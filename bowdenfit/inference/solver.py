@@ -21,7 +21,7 @@ from bowdenfit.inference.levenberg_marquardt import compile_stepper
 
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-_MOST_POLISHING = 30
+_MOST_POLISHING = 30  # steps; a guard
 # Deviation of residuals from their tangent plane, relative to a step's effect, up to which it is polished; larger at a kink.
 _STRAIGHT = 0.3
 _SMOOTH = 1e-3  # share of the residuals along the tangent plane above which a point is not a smooth minimum

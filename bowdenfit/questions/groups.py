@@ -42,10 +42,10 @@ class Contrast(Display):
         value, low, high = (
             f"{v:z.{decimals(difference.sd)}f}" for v in (difference.median, difference.q05, difference.q95)
         )
-        sure = f"above {_SURE}" if self.probability > _SURE else f"{self.probability:.3g}"
+        certainty = f"above {_SURE}" if self.probability > _SURE else f"{self.probability:.3g}"
         return (
             f"{self.group} minus {self.less}: {value}, 90 % interval {low} to {high}, different ({direction}) with "
-            f"probability {sure}"
+            f"probability {certainty}"
         )
 
     def __str__(self) -> str:

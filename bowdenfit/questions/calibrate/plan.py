@@ -57,8 +57,8 @@ class StatedTruth:
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
         if self.low == self.high:
             return f"{self.parameter.name} {self.low:g}{unit}"
-        way = "log-uniform" if self.log_uniform else "uniform"
-        return f"{self.parameter.name} {way} from {self.low:g} to {self.high:g}{unit}"
+        distribution = "log-uniform" if self.log_uniform else "uniform"
+        return f"{self.parameter.name} {distribution} from {self.low:g} to {self.high:g}{unit}"
 
     def draw_z(self, generator: np.random.Generator) -> float:
         """Draw a true value, where the parameter's prior is a standard normal."""
@@ -165,34 +165,34 @@ def parse_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> t
     Raises:
         UsageError: A name is no free parameter, or what is said of it can be no true value.
     """
-    known = {p.name: p for p in space.parameters}
+    parameters = {p.name: p for p in space.parameters}
     for name in page:
-        if name not in known:
-            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{suggest_name(name, list(known))}")
-        if known[name].fixed is not None:
+        if name not in parameters:
+            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{suggest_name(name, list(parameters))}")
+        if parameters[name].fixed is not None:
             raise UsageError(f"{file}: {name} is fixed in cable.toml, so there is no truth to look for; leave it out.")
-    return tuple(_parse_truth(known[name], value, f"{file}, {name}") for name, value in page.items())
+    return tuple(_parse_truth(parameters[name], value, f"{file}, {name}") for name, value in page.items())
 
 
-def _parse_truth(parameter: Parameter, value: Any, where: str) -> StatedTruth:
+def _parse_truth(parameter: Parameter, value: Any, location: str) -> StatedTruth:
     numbers = value if isinstance(value, list) else [value, value]
     if len(numbers) != 2 or not all(_is_number(number) for number in numbers):
-        raise UsageError(f"{where}: {shown(value)} is neither a number nor a range; write 0.1 or [0.05, 0.2].")
+        raise UsageError(f"{location}: {shown(value)} is neither a number nor a range; write 0.1 or [0.05, 0.2].")
     low, high = (float(number) for number in numbers)
     if isinstance(value, list) and not low < high:
-        raise UsageError(f"{where}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
+        raise UsageError(f"{location}: the range [{low:g}, {high:g}] is upside down or empty; write its lower end first.")
     ends = (value_at(parameter.prior, z) * parameter.shown_scale for z in (-np.inf, np.inf))
     smallest, largest = (math.inf if end > _UNBOUNDED else end for end in ends)
     if low < smallest or high > largest:
         outside = low if low < smallest else high
         raise UsageError(
-            f"{where}: {outside:g} is outside what the parameter can be, {smallest:g} to {largest:g}"
+            f"{location}: {outside:g} is outside what the parameter can be, {smallest:g} to {largest:g}"
             f"{'' if parameter.unit == '1' else f' {parameter.unit}'}; truths are stated in that unit."
         )
-    by_factors = smallest == 0 and largest == math.inf and low < high
-    if by_factors and low == 0:
-        raise UsageError(f"{where}: a range of factors cannot start at 0; write the smallest value that matters.")
-    return StatedTruth(parameter, low, high, by_factors)
+    is_positive_range = smallest == 0 and largest == math.inf and low < high
+    if is_positive_range and low == 0:
+        raise UsageError(f"{location}: a range of factors cannot start at 0; write the smallest value that matters.")
+    return StatedTruth(parameter, low, high, is_positive_range)
 
 
 def _is_number(value: object) -> bool:

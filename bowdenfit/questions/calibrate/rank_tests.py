@@ -101,7 +101,7 @@ def _check_quantity(
 ) -> CheckedQuantity:
     ranked_truths = [r.ranked[name] for r in replications]
     truth, mean, sd = (
-        np.array([getattr(ranked_truth, what) for ranked_truth in ranked_truths]) for what in ("truth", "mean", "sd")
+        np.array([getattr(ranked_truth, moment) for ranked_truth in ranked_truths]) for moment in ("truth", "mean", "sd")
     )
     usable = (sd > 0) & np.isfinite(truth)  # an optimum at the same end in every draw has no spread
     deviation = (mean - truth)[usable] / sd[usable]
@@ -109,15 +109,15 @@ def _check_quantity(
     bias, error = (float(deviation.mean()), float(deviation.std() / np.sqrt(n))) if usable.any() else (np.nan, np.nan)
     # The prior of z is the standard normal; that of the optimum is what was drawn.
     prior = float(np.var(truth)) if name.startswith("optimal_") else 1.0
-    of_prior = prior > 0 and judged_by == CheckedQuantity.judged_by
-    shrinkage = 1 - float(np.mean(sd**2)) / prior if of_prior else float("nan")
+    has_prior_variance = prior > 0 and judged_by == CheckedQuantity.judged_by
+    shrinkage = 1 - float(np.mean(sd**2)) / prior if has_prior_variance else float("nan")
     coverage = tuple(_measure_coverage(ranks, probability, n_judged) for probability in INTERVALS)
     return CheckedQuantity(name, symbol, tuple(ranks.tolist()), *p, coverage, bias, error, shrinkage, judged_by)
 
 
 def _measure_coverage(ranks: np.ndarray, probability: float, n_judged: int) -> Coverage:
-    held = np.abs(ranks - 0.5) < probability / 2
-    return Coverage(probability, float(held.mean()), *_chance_band(len(ranks), probability, n_judged))
+    contains_truth = np.abs(ranks - 0.5) < probability / 2
+    return Coverage(probability, float(contains_truth.mean()), *_chance_band(len(ranks), probability, n_judged))
 
 
 def _chance_band(n: int, probability: float, n_judged: int) -> tuple[float, float]:

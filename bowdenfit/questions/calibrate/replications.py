@@ -186,9 +186,9 @@ def _read_lines(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         raise StoreError(f"{path.parent} holds no calibration to resume; leave --resume out.")
     text = read_text(path)
-    whole = text[: text.rfind("\n") + 1].splitlines()
+    complete = text[: text.rfind("\n") + 1].splitlines()
     try:
-        lines = [json.loads(line) for line in whole]
+        lines = [json.loads(line) for line in complete]
         return [dict(lines[0]), *({"engine": "", **page, "redrawn": page["redrawn"]} for page in lines[1:])]
     except (ValueError, IndexError, KeyError, TypeError, RecursionError):
         raise _damaged_error(path) from None

@@ -182,8 +182,8 @@ class Replicator:
         """
         for start in range(0, len(numbers), BATCH_SIZE):
             with jax.enable_x64(True):
-                done = self._replicate_batch(numbers[start : start + BATCH_SIZE])
-            yield from done
+                replications = self._replicate_batch(numbers[start : start + BATCH_SIZE])
+            yield from replications
 
     def _replicate_batch(self, numbers: Sequence[int]) -> list[Replication]:
         start = time.perf_counter()

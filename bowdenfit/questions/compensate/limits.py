@@ -230,16 +230,16 @@ def _summarize_feed_forward(
 ) -> FeedForward:
     """Summarize a feed-forward torque by bend."""
     median = np.median(friction, axis=0)
-    most = int(np.argmax(median))
+    largest = int(np.argmax(median))
     risk = float(np.mean(np.any(moves_by_itself(torque, margin, 0.0, 0.0), axis=1)))
     limits = np.bincount(np.argmin(safe_shares(margin, torque), axis=1)).argmax()
-    share = float(torque[most] / max(median[most], 1e-300))
+    share = float(torque[largest] / max(median[largest], 1e-300))
     return FeedForward(
-        share, float(torque[most]), risk, float(median[most] - torque[most]), float(np.rad2deg(bends[limits]))
+        share, float(torque[largest]), risk, float(median[largest] - torque[largest]), float(np.rad2deg(bends[limits]))
     )
 
 
 def _summarize_bend(angle: float, friction: np.ndarray, scheduled: float, fixed: float) -> BendCompensation:
     interval = Interval.of(friction)
-    left = interval.median - scheduled, interval.median - fixed
-    return BendCompensation(float(np.rad2deg(angle)), interval, float(scheduled), *map(float, left))
+    remaining = interval.median - scheduled, interval.median - fixed
+    return BendCompensation(float(np.rad2deg(angle)), interval, float(scheduled), *map(float, remaining))

@@ -31,14 +31,14 @@ def compensation_text(answer: Compensation) -> str:
 
 def sentences(answer: Compensation) -> list[str]:
     """Say what to do, what is left, what it rests on, and what would be needed to say more."""
-    every = [
+    parts = [
         *_feed_forward_sentences(answer),
         *_feedback_sentences(answer),
         *_caution_sentences(answer),
         _preload_sentence(answer),
         *_missing_sentences(answer),
     ]
-    return [sentence for sentence in every if sentence]
+    return [sentence for sentence in parts if sentence]
 
 
 def format_torque(value: float) -> str:

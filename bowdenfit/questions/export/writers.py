@@ -221,8 +221,8 @@ def _write_c(request: ExportRequest) -> FileContent:
 
 
 def _write_csv(request: ExportRequest) -> FileContent:
-    with_draws = len(request.tables.levels) > len(LEVELS)
-    text = draws_table(request.tables) if with_draws else lookup_table(request.fit, request.tables)
+    has_draws = len(request.tables.levels) > len(LEVELS)
+    text = draws_table(request.tables) if has_draws else lookup_table(request.fit, request.tables)
     return FileContent(text.encode())
 
 

@@ -252,7 +252,7 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
         DescriptionError: The description that holds for all tables of fleet.csv is missing or wrong.
     """
     descriptions: dict[Path, Description] = {}
-    seen: dict[str, str] = {}
+    first_labels: dict[str, str] = {}
     for inspection in inspections:
         try:
             refuse_special(inspection.path)
@@ -270,10 +270,10 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
         except (DatasetError, DescriptionError, StoreError) as error:
             yield FailedInspection(inspection.label, str(error))
             continue
-        if case.hash in seen:
-            yield FailedInspection(inspection.label, _describe_duplicate(inspection.label, seen[case.hash]))
+        if case.hash in first_labels:
+            yield FailedInspection(inspection.label, _describe_duplicate(inspection.label, first_labels[case.hash]))
             continue
-        seen[case.hash] = inspection.label
+        first_labels[case.hash] = inspection.label
         yield case
 
 

@@ -145,13 +145,13 @@ class FleetStore:
                 shutil.rmtree(self.folder / name, ignore_errors=True)
 
 
-def _describe_changes(before: Any, now: Any) -> str:
+def _describe_changes(before: Any, current: Any) -> str:
     """Describe a change in words; empty if its former value is unknown."""
-    if not (isinstance(before, Mapping) and isinstance(now, Mapping)):
-        return f" from {shown(before)} to {shown(now)}" if isinstance(before, int) else ""
-    names = [name for name in (*now, *before) if before.get(name) != now.get(name)]
+    if not (isinstance(before, Mapping) and isinstance(current, Mapping)):
+        return f" from {shown(before)} to {shown(current)}" if isinstance(before, int) else ""
+    names = [name for name in (*current, *before) if before.get(name) != current.get(name)]
     changes = [
-        f"{name} from {_format_version(before.get(name))} to {_format_version(now.get(name))}"
+        f"{name} from {_format_version(before.get(name))} to {_format_version(current.get(name))}"
         for name in dict.fromkeys(names)
     ]
     return f" ({few(changes)})"

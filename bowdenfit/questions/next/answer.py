@@ -58,11 +58,11 @@ def choose_target(fit: Record, name: str | None) -> TargetQuantity:
     if name is None:
         coefficients = [p.name for p in fit.model.space.free if p.role == "friction"]
         name = "optimal-length" if route else coefficients[0] if len(coefficients) == 1 else "efficiency"
-    what, _, where = name.partition("@")
+    kind, _, place = name.partition("@")
     if name in draws.values:
         return _make_parameter_target(fit, name)
-    if what == "efficiency":
-        return _make_efficiency_target(fit, name, where)
+    if kind == "efficiency":
+        return _make_efficiency_target(fit, name, place)
     if name in ("optimal-length", "optimal-efficiency"):
         best = fit.optimal_length()  # refuses cables without a route
         variable = best.variable.replace("_", " ")

@@ -63,9 +63,9 @@ def _set_title(axes: Axes, ranking: NextMeasurement, start: float = 0.0) -> None
 
 def _limits(ranking: NextMeasurement) -> tuple[float, float]:
     """Return limits of an axis that shows what the candidates change, and does not make it look like more than it is."""
-    now, least = ranking.answer.sd, min(r.sd for r in ranking.ranked)
-    change = max(now - least, 0.05 * now)
-    return max(0.0, least - 1.5 * change), now + 0.3 * change
+    now, smallest = ranking.answer.sd, min(r.sd for r in ranking.ranked)
+    change = max(now - smallest, 0.05 * now)
+    return max(0.0, smallest - 1.5 * change), now + 0.3 * change
 
 
 def _draw_along_route(ranking: NextMeasurement) -> Figure:

@@ -175,9 +175,9 @@ def _plan_measurements(
     chosen: list[RankedCandidate] = [ranked[0]]
     steps = [PlannedMeasurement(ranked[0].words, ranked[0].name, ranked[0].sd)]
     while len(steps) < PLAN_LENGTH:
-        known = [readings[r.candidate][:, chosen[:i].count(r)] for i, r in enumerate(chosen)]
+        previous = [readings[r.candidate][:, chosen[:i].count(r)] for i, r in enumerate(chosen)]
         shares = [
-            explained_share(np.column_stack([*known, readings[r.candidate][:, chosen.count(r)]]), target.draws).share
+            explained_share(np.column_stack([*previous, readings[r.candidate][:, chosen.count(r)]]), target.draws).share
             for r in noticeable
         ]
         before = 1 - (steps[-1].sd / target.sd) ** 2

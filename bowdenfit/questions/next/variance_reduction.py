@@ -67,16 +67,16 @@ def explained_share(
         groups: Number of groups.
     """
     polynomials = _build_polynomials(reading)
-    left, total = _residual_squares(polynomials, answer, groups)
-    sum_left, sum_total = float(np.sum(left)), float(np.sum(total))
-    without = 1 - (sum_left - left) / (sum_total - total) if sum_total > 0 else np.zeros(len(left))
+    residual, total = _residual_squares(polynomials, answer, groups)
+    sum_left, sum_total = float(np.sum(residual)), float(np.sum(total))
+    without = 1 - (sum_left - residual) / (sum_total - total) if sum_total > 0 else np.zeros(len(residual))
     share = 1 - sum_left / sum_total if sum_total > 0 else 0.0
     return Explained(float(np.clip(share, 0.0, 1.0)), _jackknife_error(without), without)
 
 
-def error_of_difference(one: Explained, other: Explained) -> float:
+def error_of_difference(first: Explained, second: Explained) -> float:
     """Return the standard error of the difference of two shares from the same draws, which err together."""
-    return _jackknife_error(one.without - other.without)
+    return _jackknife_error(first.without - second.without)
 
 
 def _jackknife_error(without: np.ndarray) -> float:
@@ -160,7 +160,7 @@ def simulate_readings(
     for candidate in candidates:
         by_kind.setdefault(candidate.kind, []).append(candidate)
     situation, kinds = build_situation(model, measurements), candidate_kinds()
-    parts = {name: kinds[name].simulation(situation, of_kind) for name, of_kind in by_kind.items()}
+    parts = {name: kinds[name].simulation(situation, candidates_of_kind) for name, candidates_of_kind in by_kind.items()}
     data, key = {name: part.data for name, part in parts.items()}, jax.random.key(seed)
 
     def readings(z_and_number: Array, data: Any, key: Array) -> dict[str, Array]:

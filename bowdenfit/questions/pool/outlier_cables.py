@@ -55,8 +55,8 @@ def find_distant_cables(inspected: Inspections, draws: PopulationDraws) -> tuple
     away = np.abs(values - np.median(values, axis=0))
     typical = np.median(away, axis=0) / _NORMAL_DEVIATION
     worst = (away / np.maximum(typical, np.finfo(float).tiny)).max(axis=1)
-    most = np.argsort(-worst)[: inspected.cables // 3]
-    return tuple(int(i) for i in sorted(most) if worst[i] > _DISTANT)
+    largest = np.argsort(-worst)[: inspected.cables // 3]
+    return tuple(int(i) for i in sorted(largest) if worst[i] > _DISTANT)
 
 
 def separate_outliers(

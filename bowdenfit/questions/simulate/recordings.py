@@ -167,8 +167,8 @@ def _add_true_faults(
     planned: PlannedRecording, cell_noise: tuple[float, float], gain_error: float, noise: bool
 ) -> PlannedRecording:
     """Return the recording with what the truth says of noise and gain where the plan says nothing."""
-    true: dict[str, Any] = {"input_noise": cell_noise[0], "output_noise": cell_noise[1], "gain_error": gain_error}
-    faults = dataclasses.replace(planned.faults, **{k: v for k, v in true.items() if k not in planned.stated_faults})
+    true_faults: dict[str, Any] = {"input_noise": cell_noise[0], "output_noise": cell_noise[1], "gain_error": gain_error}
+    faults = dataclasses.replace(planned.faults, **{k: v for k, v in true_faults.items() if k not in planned.stated_faults})
     if not noise:
         faults = dataclasses.replace(faults, input_noise=0.0, output_noise=0.0, spikes=0.0, dropouts=0.0)
     return planned.model_copy(update={"faults": faults})

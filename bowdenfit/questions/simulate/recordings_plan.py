@@ -212,11 +212,11 @@ def plan_recordings(page: RecordingsPage, description: Description, file: str) -
     rows = [(ExtraRecording(length=length, speed=speed), "recordings") for length in lengths for speed in page.speeds]
     rows += [(also, f"recordings.also.{i}") for i, also in enumerate(page.also)]
     planned: list[PlannedRecording] = []
-    for also, where in rows:
+    for also, location in rows:
         if (also.length is None) != (description.route is None):
-            wanted = "needs a length" if also.length is None else "has a length, but the plan has no [route]"
-            raise DescriptionError(f"{file}, {where}: the recording {wanted}.")
-        planned.append(_plan_recording(also, page, description, f"{file}, {where}", planned))
+            expected = "needs a length" if also.length is None else "has a length, but the plan has no [route]"
+            raise DescriptionError(f"{file}, {location}: the recording {expected}.")
+        planned.append(_plan_recording(also, page, description, f"{file}, {location}", planned))
     if not planned:
         raise DescriptionError(f"{file}, recordings: nothing to record; name lengths, such as lengths = [440, 470].")
     return tuple(planned)
@@ -234,8 +234,8 @@ def _plan_recording(
         f"{also.length:g} {description.route.unit}, {speed}" if also.length is not None and description.route else speed
     )
     stem = _make_file_stem(name)
-    taken = sum(re.sub(r"_\d+$", "", Path(p.file).stem) == stem for p in earlier)
-    run, number = (f"{name} ({taken + 1})", f"_{taken + 1}") if taken else (name, "")
+    n_same_stem = sum(re.sub(r"_\d+$", "", Path(p.file).stem) == stem for p in earlier)
+    run, number = (f"{name} ({n_same_stem + 1})", f"_{n_same_stem + 1}") if n_same_stem else (name, "")
     try:
         planned = PlannedRecording.model_validate(
             {

@@ -296,12 +296,12 @@ def description_lines(text: str, command: str, *designs: str) -> list[str]:
     lines = text.splitlines()
     while lines and lines[0].lstrip().startswith("#"):
         lines = lines[1:]
-    kept, skipping = [f"# Written by `{command}`; the truth is in truth.json."], False
+    kept_lines, skipping = [f"# Written by `{command}`; the truth is in truth.json."], False
     for line in lines:
         if heading := _HEADING.fullmatch(line):
             skipping = heading[1].split(".")[0].strip("\"' ") in {"truth", *designs}
         if not skipping:
-            kept.append(line)
-    while not kept[-1].strip():
-        kept.pop()
-    return kept
+            kept_lines.append(line)
+    while not kept_lines[-1].strip():
+        kept_lines.pop()
+    return kept_lines

@@ -54,7 +54,7 @@ class LooPrediction:
 
 @dataclass(frozen=True)
 class ElpdDifference:
-    """How much worse a model predicts than the best one.
+    """Difference in expected log predictive density between a model and the best one.
 
     Args:
         elpd: elpd of the best model minus that of this one; 0 for the best itself.

@@ -1,4 +1,4 @@
-r"""Do the tables of a cable agree with each other?
+r"""Agreement of the tables of a cable with each other.
 
 For each table: how far it moves the parameters from the estimate by all other tables, compared with what is expected. If the
 model is correct, the move :math:`\delta` that a table makes has covariance :math:`V = H_{-t}^{-1} - H^{-1}`, with H the
@@ -36,7 +36,7 @@ _LEAST_MOVE = 1e-6  # share of a parameter's variance below which a table carrie
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How well one table agrees with everything else.
+    """Disagreement of one table with everything else.
 
     Args:
         table: Name of the table.

@@ -33,7 +33,7 @@ _SHARPER = 0.5  # a combination is named if its relative error is below this sha
 
 @dataclass(frozen=True)
 class ParameterContraction:
-    """How much the measurements narrow the prior of one parameter, in its shown unit.
+    """Contraction of one parameter from prior to posterior, in its shown unit.
 
     Args:
         name: Its name.
@@ -99,7 +99,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class CovarianceAnalysis:
-    """What the posterior covariance says of several parameters together.
+    """Parameters and combinations that a posterior covariance determines.
 
     Args:
         parameters: Contraction of each parameter.

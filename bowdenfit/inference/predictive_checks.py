@@ -147,7 +147,7 @@ def draw_randomized_pit(predictions: LooPredictive, generator: np.random.Generat
 
 @dataclass(frozen=True)
 class Uniformity:
-    """Whether numbers are uniform between 0 and 1, by their empirical distribution function.
+    """Test that numbers are uniform between 0 and 1, by their empirical distribution function.
 
     Args:
         at: Positions at which it is evaluated.

@@ -38,7 +38,7 @@ _TAILS = (0.05, 0.5, 0.95)
 
 @dataclass(frozen=True)
 class WidthSensitivity:
-    """How the width of a quantity's 90 % interval follows the scale of one prior.
+    """Change of the width of a quantity's 90 % interval with the scale of one prior.
 
     Args:
         parameter: The parameter whose prior it is.
@@ -62,7 +62,7 @@ class WidthSensitivity:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How much a quantity depends on the priors and on the readings.
+    """Sensitivity of a quantity to the priors and to the readings.
 
     Args:
         quantity: Name of the quantity.

@@ -1,4 +1,4 @@
-"""Do two samplers of one density agree? Differences of their summaries, compared with Monte Carlo errors."""
+"""Agreement of two samplers of one density: differences of their summaries, compared with Monte Carlo errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -118,7 +118,7 @@ def to_uniform(bits: Array | np.ndarray) -> Array:
 
 
 class MoveShares(NamedTuple):
-    """How often each move and each coordinate system is used.
+    """Shares of the moves and of the coordinate systems.
 
     Args:
         moves: Share of each.

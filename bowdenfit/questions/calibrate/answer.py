@@ -114,7 +114,7 @@ class CheckedQuantity:
 
 @dataclass(frozen=True)
 class Power:
-    """How often a calibration rejects one quantity whose intervals are too narrow, all others being right.
+    """Probability that a calibration rejects one quantity whose intervals are too narrow, all others being right.
 
     Args:
         too_small: Share by which its posterior standard deviation is too small.

@@ -37,74 +37,6 @@ Report = Callable[[int, int], None]
 _MIN_PIECE, _PIECES_PER_WORKER = 16, 4
 
 
-@dataclass(frozen=True)
-class CalibrationJob:
-    """A plan as work for other processes; two with the same plan are equal.
-
-    Args:
-        plan: What is replicated.
-        threads: In each process; 0 for one a core.
-        key: Made from the plan.
-    """
-
-    plan: CalibrationPlan = field(compare=False)
-    threads: int = 0
-    key: str = field(default="", init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "key", hashlib.sha256(pickle.dumps(self.plan)).hexdigest())
-
-
-@dataclass(frozen=True)
-class ReplicationPiece:
-    """Replications of a plan.
-
-    Args:
-        job: The plan.
-        numbers: Which; each is the same whatever else is run.
-        versions: Where the work comes from.
-    """
-
-    job: CalibrationJob
-    numbers: tuple[int, ...]
-    versions: dict[str, str]
-
-
-def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int) -> list[ReplicationPiece]:
-    """Cut the work so that so many workers end at about the same time.
-
-    Args:
-        job: The plan.
-        numbers: Of the replications.
-        workers: At a time; one gets as much at once as is fitted together.
-    """
-    size = (
-        BATCH_SIZE
-        if workers == 1
-        else min(max(-(-len(numbers) // (_PIECES_PER_WORKER * workers)), _MIN_PIECE), BATCH_SIZE)
-    )
-    return [ReplicationPiece(job, tuple(numbers[i : i + size]), installed_versions()) for i in range(0, len(numbers), size)]
-
-
-def run_piece(piece: ReplicationPiece) -> list[Replication]:
-    """Run the replications of a piece.
-
-    Args:
-        piece: The work.
-
-    Raises:
-        UsageError: The work comes from a program of other versions, or hardly any tables look like ones from a bench.
-    """
-    refuse_other_versions(piece.versions)
-    return list(_make_replicator(piece.job).replicate(piece.numbers))
-
-
-@lru_cache(maxsize=1)
-def _make_replicator(job: CalibrationJob) -> Replicator:
-    """Return what serves all pieces of one plan, with what it has compiled."""
-    return Replicator(job.plan, BatchFitter(replace(RANK_SETTINGS, threads=job.threads)))
-
-
 @contextmanager
 def open_calibration(
     folder: Path | None, plan: CalibrationPlan, assumptions: Sequence[str], resume: bool, force: bool
@@ -209,3 +141,71 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
         draw_calibration(calibration, folder / FIGURES)
         write_page(calibration_page(calibration), folder / FIGURES, folder / REPORT)
         write_text(folder / CALIBRATION, json.dumps(plain_data(calibration), indent=1, allow_nan=False) + "\n")
+
+
+@dataclass(frozen=True)
+class CalibrationJob:
+    """A plan as work for other processes; two with the same plan are equal.
+
+    Args:
+        plan: What is replicated.
+        threads: In each process; 0 for one a core.
+        key: Made from the plan.
+    """
+
+    plan: CalibrationPlan = field(compare=False)
+    threads: int = 0
+    key: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", hashlib.sha256(pickle.dumps(self.plan)).hexdigest())
+
+
+@dataclass(frozen=True)
+class ReplicationPiece:
+    """Replications of a plan.
+
+    Args:
+        job: The plan.
+        numbers: Which; each is the same whatever else is run.
+        versions: Where the work comes from.
+    """
+
+    job: CalibrationJob
+    numbers: tuple[int, ...]
+    versions: dict[str, str]
+
+
+def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int) -> list[ReplicationPiece]:
+    """Cut the work so that so many workers end at about the same time.
+
+    Args:
+        job: The plan.
+        numbers: Of the replications.
+        workers: At a time; one gets as much at once as is fitted together.
+    """
+    size = (
+        BATCH_SIZE
+        if workers == 1
+        else min(max(-(-len(numbers) // (_PIECES_PER_WORKER * workers)), _MIN_PIECE), BATCH_SIZE)
+    )
+    return [ReplicationPiece(job, tuple(numbers[i : i + size]), installed_versions()) for i in range(0, len(numbers), size)]
+
+
+def run_piece(piece: ReplicationPiece) -> list[Replication]:
+    """Run the replications of a piece.
+
+    Args:
+        piece: The work.
+
+    Raises:
+        UsageError: The work comes from a program of other versions, or hardly any tables look like ones from a bench.
+    """
+    refuse_other_versions(piece.versions)
+    return list(_make_replicator(piece.job).replicate(piece.numbers))
+
+
+@lru_cache(maxsize=1)
+def _make_replicator(job: CalibrationJob) -> Replicator:
+    """Return what serves all pieces of one plan, with what it has compiled."""
+    return Replicator(job.plan, BatchFitter(replace(RANK_SETTINGS, threads=job.threads)))

@@ -1,4 +1,4 @@
-"""How often the intervals of a calibration hold the truth."""
+"""Figure of the coverage of a calibration: how often its intervals hold the truth."""
 
 from __future__ import annotations
 

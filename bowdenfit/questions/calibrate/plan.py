@@ -1,4 +1,4 @@
-"""What is calibrated: data set, quantities, and true values that a file states in place of the priors.
+"""Plan of a calibration: data set, quantities, and true values that a file states in place of the priors.
 
     mu1 = 0.1
     tau = [0.002, 0.3]
@@ -38,7 +38,7 @@ _UNBOUNDED = (
 
 @dataclass(frozen=True)
 class StatedTruth:
-    """Where the true values of a parameter come from.
+    """Source of the true values of a parameter: one value, or a range.
 
     Args:
         parameter: Which.
@@ -71,7 +71,7 @@ class StatedTruth:
 
 @dataclass(frozen=True)
 class CalibrationPlan:
-    """What is replicated.
+    """Plan of a calibration.
 
     Args:
         stated: The data set whose description and design are replicated; its readings give way to simulated ones.

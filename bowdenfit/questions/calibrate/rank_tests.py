@@ -1,4 +1,4 @@
-"""What replications say together: whether ranks are uniform, how often intervals hold the truth, and what could have been seen.
+"""Tests of the ranks of truths: whether they are uniform, how often intervals hold the truth, and the power of both.
 
 References:
     Saeilynoja, Buerkner & Vehtari 2022, "Graphical test for discrete uniformity and its applications in goodness-of-fit

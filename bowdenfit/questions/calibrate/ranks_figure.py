@@ -1,4 +1,4 @@
-"""Where the truths of a calibration lie within what its fits say."""
+"""Figure of the ranks of a calibration: where truths lie within the posteriors of its fits."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class RankedTruth:
 
 @dataclass(frozen=True)
 class Replication:
-    """What came of one replication.
+    """Result of one replication.
 
     Args:
         number: Its number.

@@ -1,4 +1,4 @@
-"""How far estimates lie from the truths of a calibration, and how much the measurements settle."""
+"""Figure of the bias of a calibration: how far estimates lie from truths, and how far data narrow priors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may be hidden by bend, and what preload does."""
+"""Figure of compensation: what may be fed forward by bend, and what preload does."""
 
 from __future__ import annotations
 

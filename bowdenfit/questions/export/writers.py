@@ -191,7 +191,7 @@ class ExportedFile(Display):
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """What is to be written, and where.
+    """Request of a file: what is to be written, and where.
 
     Args:
         fit: The fit.

@@ -61,7 +61,7 @@ class FittedInspection:
 
 @dataclass(frozen=True, repr=False)
 class Fleet(Display):
-    """What came of a fleet.
+    """Fits of all inspections of a fleet.
 
     Args:
         name: Of the fleet.

@@ -195,7 +195,7 @@ def _collect_draws(
 
 @dataclass(frozen=True)
 class FleetOptions:
-    """How a fleet is fitted and where its results go.
+    """Options of fitting a fleet, and where its results go.
 
     Args:
         results: Results folder; None to write nothing.

@@ -35,7 +35,7 @@ class _Frozen(BaseModel):
 
 
 class PrintedCondition(_Frozen):
-    """What was printed of one condition: mean net cost [W/kg] and its standard error, as written."""
+    """One condition as printed: mean net cost [W/kg] and its standard error, as written."""
 
     name: Name
     mean: Digits | None = None
@@ -43,7 +43,7 @@ class PrintedCondition(_Frozen):
 
 
 class PrintedDifference(_Frozen):
-    """What was printed of a condition less another: probability by chance, and change in percent, as written."""
+    """A condition less another as printed: probability by chance, and change in percent, as written."""
 
     condition: Name
     less: Name

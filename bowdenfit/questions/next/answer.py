@@ -172,7 +172,7 @@ class RankedCandidate(Part):
 
 @dataclass(frozen=True)
 class Repeats:
-    """What the best candidate would do if it were measured several times, each time with a new mounting.
+    """Effect of the best candidate if it were measured several times, each time with a new mounting.
 
     Args:
         times: How often.

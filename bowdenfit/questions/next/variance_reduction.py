@@ -1,4 +1,4 @@
-"""How much of an answer's variance a reading that has not been taken yet would take away, from draws of the posterior alone.
+"""Expected reduction of an answer's variance by a reading that has not been taken yet, from draws of the posterior alone.
 
 Every draw gives the answer and, with noise, the reading that a cable of these parameters would give. How far the answer can
 be told from the reading is then a regression over the draws: by the law of total variance the variance of the answer that

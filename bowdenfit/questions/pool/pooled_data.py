@@ -29,7 +29,7 @@ LEAST_EFFECTIVE_DRAWS = 100.0
 
 @dataclass(frozen=True)
 class PoolingData:
-    """What is pooled of a fleet.
+    """Data of a fleet that are pooled.
 
     Args:
         cables: Names, in the order of their numbers.

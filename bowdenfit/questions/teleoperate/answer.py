@@ -68,7 +68,7 @@ class SimulatedContact(Part):
 
 @dataclass(frozen=True, repr=False)
 class Teleoperation(Display):
-    """What a hand feels of a remote wall through a cable, and which walls are stable.
+    """Answer on teleoperation: what a hand feels of a remote wall through a cable, and which walls are stable.
 
     Args:
         cable, device: Their names.

@@ -1,4 +1,4 @@
-"""Which walls are stable, and one contact through time as in figures 12 to 14 of the haptic paper."""
+"""Figure of teleoperation: which walls are stable, and one contact through time as in figures 12 to 14 of the haptic paper."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def read(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: U
     """
     from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
     from bowdenfit.files.apart import limits_times
-    from bowdenfit.files.naming import parse_sources
+    from bowdenfit.files.headings import parse_sources
     from bowdenfit.inputs import refuse_special
     from bowdenfit.recordings.named_channels import parse_channels
 

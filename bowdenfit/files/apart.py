@@ -8,6 +8,7 @@ import atexit
 import json
 import os
 import pickle
+import signal
 import struct
 import subprocess
 import sys
@@ -23,6 +24,11 @@ from typing import Any
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.inputs import refuse_special
+
+try:
+    import resource
+except ImportError:  # Windows, where readers have no limits
+    resource = None  # type: ignore[assignment]
 
 _MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themselves, and what they unpack
 _SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
@@ -119,7 +125,9 @@ def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, .
     return 0, None
 
 
-_readers: dict[int, "subprocess.Popen[bytes]"] = {}  # by process: a copy of this one starts its own, or answers would mix
+_readers: dict[
+    int, "subprocess.Popen[bytes]"
+] = {}  # by process: a copy of this one starts its own, or answers would mix
 _request_lock = threading.Lock()
 
 
@@ -171,8 +179,6 @@ def _answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, b
 
 
 def _broken(path: Path, limits: Limits, ended: int | None) -> str:
-    import signal
-
     if ended in {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}:
         return _too_much(path, limits, "time")
     return (
@@ -191,8 +197,6 @@ def _too_much(path: Path, limits: Limits, what: str) -> str:
 
 def serve() -> None:
     """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while."""
-    import signal
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
@@ -225,9 +229,7 @@ def _read(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:
 
 def _limit(memory: int, seconds: float) -> None:
     """Let this process take so much more than it has."""
-    try:
-        import resource
-    except ImportError:  # Windows
+    if resource is None:
         return
     used = resource.getrusage(resource.RUSAGE_SELF)
     most = int(used.ru_utime + used.ru_stime + seconds) + 1

@@ -1,14 +1,29 @@
-"""The channels of one file as the acquisition wrote them: named columns of numbers, before anybody says what they mean."""
+"""The channels of one file, and what all readers of recordings share.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+A channel is a named column of numbers as the acquisition wrote it, before anybody says what it means. Readers load their
+library with `load`, refuse damaged and huge files in a sentence, and end with `channel_file`, which says what was left out.
+"""
+
+import importlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
+from bowdenfit.errors import DatasetError
 from bowdenfit.files.pieces import sample
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.types import Vector
+from bowdenfit.words import quoted
+
+LARGEST_BYTES = 2 * 1024**3
+"""The most that the samples of one file may need in memory, as 64-bit numbers [bytes]."""
+
+BYTES_PER_SAMPLE = 8
 
 
 @dataclass(frozen=True)
@@ -71,3 +86,136 @@ def with_unique_names(channels: Sequence[Channel]) -> tuple[Channel, ...]:
         seen.add(name)
         named.append(replace(channel, name=name))
     return tuple(named)
+
+
+@dataclass(frozen=True)
+class UnreadNames:
+    """Names of what was not read, by reason.
+
+    Args:
+        names: The names under each reason; filled while reading.
+    """
+
+    names: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, name: str, why: str) -> None:
+        """Note that `name` was left out; `why` completes the words "left out because"."""
+        self.names.setdefault(why, []).append(name)
+
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence for each reason."""
+        return tuple(f"Left out because {why}: {quoted(tuple(names))}." for why, names in self.names.items())
+
+
+def channel_file(
+    path: Path, kind: str, channels: Sequence[Channel], left_out: UnreadNames, remarks: Sequence[str] = ()
+) -> ChannelFile:
+    """The channels of a file with unique names, and the remarks on it.
+
+    Raises:
+        DatasetError: There is no numeric channel at all.
+    """
+    sentences = (*remarks, *left_out.remarks())
+    if not channels:
+        raise DatasetError(
+            f"{path.name} holds no recording that can be read: no channel with several numbers. "
+            f"{' '.join((*sentences, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
+        )
+    return ChannelFile(path, kind, with_unique_names(channels), sentences)
+
+
+def load(module: str, kind: str) -> ModuleType:
+    """The library called `module`.
+
+    Args:
+        module: Name to import, such as "openpyxl" or "pyarrow.parquet".
+        kind: What it reads, for the error: ".xlsx", "Parquet".
+
+    Raises:
+        DatasetError: It is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        library = module.partition(".")[0]
+        raise DatasetError(
+            f"reading {kind} files needs {library}, which is not installed; install it with pip install 'bowdenfit[lab]'."
+        ) from None
+
+
+@contextmanager
+def refuse_damage(path: Path) -> Iterator[None]:
+    """Turn whatever a library raises about a file into one sentence about that file.
+
+    Raises:
+        DatasetError: The library could not read the file.
+    """
+    try:
+        yield
+    except DatasetError:
+        raise
+    except MemoryError as error:
+        raise DatasetError(
+            f"{path.name} does not fit into the memory of this computer; save only the channels of the load cells, or "
+            "cut the recording."
+        ) from error
+    # The libraries raise anything on damaged files: OSError, ValueError, KeyError, struct.error, zlib.error, their own.
+    except Exception as error:
+        raise cut_off(path, f"{type(error).__name__}: {error}") from error
+
+
+def cut_off(path: Path, seen: str) -> DatasetError:
+    """Refusal of a file that ends early or is damaged."""
+    words = " ".join(seen.replace(f"{path.parent}/", "").split()).rstrip(".:")
+    words = words if len(words) <= 160 else f"{words[:157]}..."
+    return DatasetError(f"{path.name} is cut off or damaged ({words}); copy it again from the acquisition computer.")
+
+
+def kept_of_cut(path: Path, what: str) -> str:
+    """The remark on a file that ends early, of which `what` could be read."""
+    return (
+        f"{path.name} is cut off: {what} were kept. Copy the file again from the acquisition computer if there should be "
+        "more."
+    )
+
+
+def refuse_too_large(path: Path, n_samples: int, what: str = "") -> None:
+    """Refuse a file before it fills the memory.
+
+    Args:
+        path: The file.
+        n_samples: How many numbers it holds, times included.
+        what: What these are, for the error.
+
+    Raises:
+        DatasetError: They would need more than `LARGEST_BYTES`.
+    """
+    needed = n_samples * BYTES_PER_SAMPLE
+    if needed > LARGEST_BYTES:
+        raise DatasetError(
+            f"{path.name} holds {needed / 1024**3:.3g} GiB of numbers{what}, more than the {LARGEST_BYTES / 1024**3:.3g} GiB "
+            "that are read at once; save only the channels of the load cells, cut the recording, or decimate it."
+        )
+
+
+def refuse_larger(path: Path, most: int, remedy: str) -> None:
+    """Refuse a file of more than so many bytes, whatever it holds.
+
+    Raises:
+        DatasetError: It has more.
+    """
+    size = path.stat().st_size
+    if size > most:
+        raise DatasetError(
+            f"{path.name} has {size / 1024**3:.3g} GiB, more than the {most / 1024**3:.3g} GiB that can be read; {remedy}."
+        )
+
+
+def is_numeric(dtype: np.dtype[Any]) -> bool:
+    """Whether values of this type are real numbers, or true and false."""
+    return dtype.kind in "fiub"
+
+
+def numbers(values: np.ndarray) -> Vector:
+    """Samples as 64-bit floats, one after the other in memory."""
+    return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)

@@ -1,22 +1,29 @@
-"""Which columns of a recording are clocks, and the time that each channel takes from them."""
+"""The time of each channel of a recording: from a column that is a clock, or from a stated sampling rate.
 
+Sheets have clocks beside their channels (`with_clocks`); files with groups have them in the same group or around it
+(`with_column_clocks`). A sampling rate may be a single number in the file (`with_interval`), or a line over the data
+(`with_rate`).
+"""
+
+import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel
-from bowdenfit.files.libraries import load
+from bowdenfit.files.channels import Channel, load
 from bowdenfit.files.pieces import last_set, rises
 from bowdenfit.types import Vector
 from bowdenfit.units import conversion_factor
+from bowdenfit.words import shown
 
 _TIME_WORDS = {"time", "timestamp", "datetime", "elapsed", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"}
 _LABVIEW = "x_value"
-_SECONDS = {"sek", "sek.", "sec.", "seg", "secs"}
+_SECOND_SPELLINGS = {"sek", "sek.", "sec.", "seg", "secs"}
 _RATIO = re.compile(r"[A-Za-z]_?\d?/[A-Za-z]_?\d?")  # of two symbols, such as T/t
 _TENSION = re.compile(r"T_?\d")  # a clock only where it rises
 _EPOCH_UNITS = (
@@ -28,6 +35,28 @@ _YEARS = 1e8  # [s], three years
 _HALF_DAY, _DAY = 43200.0, 86400.0
 _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4}(?: .*)?")
 _TIME_OF_DAY = re.compile(r"\d{1,3}:\d\d(?::\d\d(?:[.,]\d+)?)?")
+_RATE_NAMES = {
+    "fs", "f_s", "rate", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency", "sampfreq", "fsample",
+    "fsampling", "acquisitionrate", "samplespersecond",
+}  # fmt: skip
+_INTERVAL_NAMES = {
+    "dt", "deltat", "ts", "tsample", "sampletime", "sampletimes", "samplinginterval", "sampleinterval", "samplingtime",
+    "timestep", "samplingperiod", "sampleperiod",
+}  # fmt: skip
+_INDEX = re.compile(r"[\[(][\d:,]+[\])]$")
+
+Settings = Mapping[str, Mapping[str, Any]]
+"""Single values by name, such as the attributes of a data set, for each data set and group: "bench" or "rec.run"."""
+
+_STATED_RATE = re.compile(
+    r"(?P<what>(?:sampl\w*|scan\w*|acquisition|acq\.?|data|logging)[\s_-]*(?:rate|freq\w*|interval|period|time|step)|rate|"
+    r"f_?s|abtast\w*|delta_x|d_?t)\b[^\d+\-]{0,20}?(?P<value>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)\s*"
+    r"(?P<unit>[kM]?Hz|[kM]?S/s|s/s|sps|[mµun]?s\b|sec\w*)?",
+    re.IGNORECASE,
+)
+_PERIOD_WORDS = ("interval", "period", "time", "step", "delta_x", "dt", "d_t")
+_PERIOD_UNITS = ("s", "ms", "us", "µs", "ns")
+_RATE_FACTORS = {"khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
 def with_clocks(
@@ -62,6 +91,42 @@ def with_clocks(
     return tuple(timed(i, channel) for i, channel in enumerate(channels))
 
 
+def with_column_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Give each channel without a time that of the nearest time channel of its group, else of the groups around it.
+
+    Args:
+        channels: Channels with their groups before their names, as "bench/F_in" or "rec.F_in".
+    """
+    return with_clocks(channels, groups_around)
+
+
+def with_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Give the channels that have no time yet that of the only time channel of the file, wherever it stands."""
+    clocks = [c for c in channels if is_clock(replace(c, name=c.name.removeprefix(_group(c.name))))]
+    if len(clocks) != 1:
+        return tuple(channels)
+    (clock,), seconds = clocks, seconds_of(clocks[0])
+    return tuple(
+        channel
+        if channel is clock or channel.time is not None or len(channel.values) != len(seconds)
+        else replace(channel, time=seconds, clock=clock.name)
+        for channel in channels
+    )
+
+
+def groups_around(name: str) -> Iterator[str]:
+    """The group of a channel and those around it, to the file as a whole: "rec.run.", "rec." and "" of "rec.run.F"."""
+    while name:
+        name = _group(name)
+        yield name
+        name = name[:-1]
+
+
+def _group(name: str) -> str:
+    """The groups before the name."""
+    return name.removesuffix(re.split(r"[/.](?=[^/.]+$)", name)[-1])
+
+
 def is_clock(channel: Channel) -> bool:
     """Whether a channel is a time, by its name or by its unit.
 
@@ -88,6 +153,27 @@ def names_time(heading: str) -> bool:
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW
 
 
+def seconds_of(clock: Channel) -> Vector:
+    """The times that a clock shows, from its first where they can only be dates [s]."""
+    finite = np.isfinite(clock.values)
+    lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
+    largest = max(-lowest, highest)
+    factor = _time_factor(clock.unit)
+    if factor is None:
+        factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
+    if largest * factor > _YEARS:
+        return _from_first(clock.values) * factor
+    return clock.values if factor == 1 else clock.values * factor
+
+
+def _time_factor(unit: str) -> float | None:
+    """Factor from a unit to seconds; None if it is no unit of time."""
+    try:
+        return conversion_factor("s" if unit.lower() in _SECOND_SPELLINGS else unit, "time") if unit else None
+    except DatasetError:
+        return None
+
+
 def without_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     """The channels without the blank cells below them, where runs of different length stand side by side.
 
@@ -102,6 +188,11 @@ def without_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
         length = max(_filled(channel.values) for channel in block)
         kept += [replace(channel, values=channel.values[:length]) for channel in block]
     return tuple(kept)
+
+
+def _filled(values: Vector) -> int:
+    """Number of samples up to the last that is none of the blank ones."""
+    return last_set(~np.isnan(values), len(values)) + 1
 
 
 def is_date(text: str) -> bool:
@@ -155,27 +246,82 @@ def _from_first(seconds: Vector) -> Vector:
     return seconds - finite[0] if len(finite) else seconds
 
 
-def _filled(values: Vector) -> int:
-    """Number of samples up to the last that is none of the blank ones."""
-    return last_set(~np.isnan(values), len(values)) + 1
+def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+    """Give channels without a clock the times that follow from their sampling rate, and say so.
+
+    Args:
+        channels: The channels of a file.
+        settings: Where rates [1/s] and intervals [s] may stand.
+
+    Returns:
+        All channels in their order, and a remark on each setting that was used.
+    """
+    result, used = [], dict[str, float]()
+    for channel in channels:
+        setting = _nearest(channel.name, settings) if channel.time is None and not is_clock(channel) else None
+        if setting:
+            interval, name = setting
+            used[name] = interval
+            channel = replace(channel, time=np.arange(len(channel.values)) * interval, clock=name)
+        result.append(channel)
+    return tuple(result), tuple(
+        f"Without a time channel the time was counted from the first sample by {name} ({1 / interval:.6g} samples a "
+        "second)."
+        for name, interval in used.items()
+    )
 
 
-def _time_factor(unit: str) -> float | None:
-    """Factor from a unit to seconds; None if it is no unit of time."""
-    try:
-        return conversion_factor("s" if unit.lower() in _SECONDS else unit, "time") if unit else None
-    except DatasetError:
+def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
+    """Seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
+    owners = (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
+    intervals = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
+    return next((interval for interval in intervals if interval), None)
+
+
+def _interval(name: str, value: Any) -> tuple[float, str] | None:
+    """Seconds between samples by one setting, and its name; None if it says nothing of them."""
+    number, words = _positive(value), {_plain(name), _plain(name.rpartition(".")[2])}
+    if number is not None and words & _RATE_NAMES:
+        return 1 / number, name
+    return (number, name) if number is not None and words & _INTERVAL_NAMES else None
+
+
+def _plain(name: str) -> str:
+    """The name in lower case without what separates words and without a unit behind it."""
+    letters = name.lower().replace("_", "").replace(" ", "").replace("-", "").replace(".", "")
+    return letters.removesuffix("hz") or letters
+
+
+def _positive(value: Any) -> float | None:
+    """The value as a number if it is one, single, finite and above 0."""
+    array = np.asarray(value)
+    if array.size != 1 or array.dtype.kind not in "fiu":
         return None
+    number = float(array.reshape(-1)[0])
+    return number if np.isfinite(number) and number > 0 else None
 
 
-def seconds_of(clock: Channel) -> Vector:
-    """The times that a clock shows, from its first where they can only be dates [s]."""
-    finite = np.isfinite(clock.values)
-    lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
-    largest = max(-lowest, highest)
-    factor = _time_factor(clock.unit)
-    if factor is None:
-        factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
-    if largest * factor > _YEARS:
-        return _from_first(clock.values) * factor
-    return clock.values if factor == 1 else clock.values * factor
+def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
+    """Sampling rate [Hz] that the lines over the data state, and the line; None if none does."""
+    for line in lines:
+        plain = " ".join(line.replace('"', " ").strip(" #%;,\t\r\n").split())
+        match = _STATED_RATE.search(plain)
+        if match is None:
+            continue
+        value = float(match["value"].replace(",", ".")) * _RATE_FACTORS.get((match["unit"] or "").lower(), 1.0)
+        period = match["what"].lower().endswith(_PERIOD_WORDS) or (match["unit"] or "").lower() in _PERIOD_UNITS
+        if value > 0 and math.isfinite(value):
+            return (1 / value if period else value), plain[:80]
+    return None
+
+
+def with_rate(channels: Sequence[Channel], lines: Sequence[str]) -> tuple[tuple[Channel, ...], list[str]]:
+    """Channels without any clock get one from the sampling rate stated over the data, and a remark says so."""
+    if any(channel.time is not None or names_time(channel.name) for channel in channels):
+        return tuple(channels), []
+    stated = stated_rate(lines)
+    if stated is None:
+        return tuple(channels), []
+    rate, line = stated
+    timed = tuple(replace(c, time=np.arange(len(c.values)) / rate, clock=line) for c in channels)
+    return timed, [f"There is no column of time; it comes from the line {shown(line)}: {rate:g} samples a second."]

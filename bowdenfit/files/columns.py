@@ -8,12 +8,10 @@ from typing import TypeVar
 
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.headings import split_brackets
-from bowdenfit.files.matching import MatchedColumn, find_candidates, meanings, plain_name
-from bowdenfit.files.matching import Quantity as Quantity  # readers of tables take both from here
-from bowdenfit.files.naming import option_naming
+from bowdenfit.files.headings import MatchedColumn, find_candidates, meanings, option_naming, plain_name, split_brackets
+from bowdenfit.files.headings import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.spellings import parse_heading
+from bowdenfit.files.tables import RawTable
 from bowdenfit.units import (
     LARGEST,
     ColumnSource,

@@ -1,4 +1,4 @@
-"""Recordings in Excel workbooks: every sheet that holds columns of numbers."""
+"""Excel workbooks: as recordings, every sheet that holds columns of numbers; as tables, the sheet that holds readings."""
 
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.channels import Channel, ChannelFile, load, refuse_damage, refuse_larger
+from bowdenfit.files.headings import Quantity, find_candidates
 from bowdenfit.files.layout import layout_of
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import refuse_damage, refuse_larger
 from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, account_of
-from bowdenfit.files.sheet_cells import SheetRows, text_of
-from bowdenfit.files.sheet_columns import columns_of
-from bowdenfit.files.sheets import channels_of
-from bowdenfit.words import shown
+from bowdenfit.files.sheet_columns import SheetRows, channels_of, columns_of, text_of
+from bowdenfit.files.tables import RawTable, raw_table
+from bowdenfit.files.text_file import CsvRecord, Line
+from bowdenfit.words import quoted, shown
 
 LARGEST_BYTES = 1 << 28
 _FIRST_ROWS = 300
 _Cells = Sequence[Any]
+_DEFINING = (Quantity("input_force", "force"), Quantity("output_force", "force"), Quantity("efficiency", "ratio"))
 
 
 def read(path: Path) -> ChannelFile:
@@ -76,6 +76,66 @@ def _without_numbers(path: Path) -> DatasetError:
     )
 
 
+def _read_sheet(
+    place: str, file: str, cells: Iterable[_Cells]
+) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
+    iterator = iter(cells)
+    first = list(islice(iterator, _FIRST_ROWS))
+    layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
+    if layout is None:
+        return (), [], None
+    start = layout.start
+    rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
+    columns = columns_of(rows)
+    channels, left_out = channels_of(layout, columns.values)
+    above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
+    over = [i + 1 for i in layout.over]
+    account = account_of(file, start + columns.rows, over, above | columns.left_out, columns.beside)
+    return channels, [*left_out, *columns.remarks], account
+
+
+def read_workbook(path: Path, most: int | None = None) -> RawTable:
+    """The table of a workbook; of several sheets that hold one, that whose headings say what they are.
+
+    Args:
+        path: The workbook (.xlsx or .xlsm).
+        most: Number of first rows of each sheet that are enough; all if omitted.
+
+    Raises:
+        DatasetError: It cannot be read, or holds no table, or several that could be meant.
+    """
+    openpyxl = load("openpyxl", ".xlsx")
+    refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
+    tables: dict[str, RawTable] = {}
+    errors: list[DatasetError] = []
+    for title, rows in sheets_of(openpyxl, path):
+        cells = [[text_of(cell).strip() for cell in row] for row in islice(rows, most)]
+        while cells and not any(cells[-1]):
+            cells.pop()  # Excel keeps the format of rows that were once filled
+        records = [CsvRecord(i, 0, row) for i, row in enumerate(cells, start=1)]
+        lines = [Line(record.row, 0, " ".join(record.cells) + "\n") for record in records]
+        try:
+            if not all(record.blank for record in records):
+                tables[title] = raw_table(path.name, lines, records, ";")
+        except DatasetError as error:
+            errors.append(error)
+    by_headings = {title: table for title, table in tables.items() if _has_forces(table)} or tables
+    if len(by_headings) == 1:
+        return next(iter(by_headings.values()))
+    if not tables and errors:
+        raise errors[0]
+    what = (
+        f"several sheets that could be meant, {quoted(tuple(by_headings))}" if by_headings else "no sheet with a table"
+    )
+    raise DatasetError(f"{path.name} has {what}; save the one with the readings as CSV, or in a workbook of its own.")
+
+
+def _has_forces(table: RawTable) -> bool:
+    """Whether two headings say an end of the cable each, or one an efficiency."""
+    columns = find_candidates(list(zip(table.header, table.units, strict=True)), _DEFINING)
+    return bool(columns["efficiency"] or (columns["input_force"] and columns["output_force"]))
+
+
 def sheets_of(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
     """Title and rows of each sheet; what the library cannot read becomes one sentence."""
     with warnings.catch_warnings():
@@ -93,19 +153,3 @@ def sheets_of(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]
 def _rows(path: Path, sheet: Any) -> Iterator[_Cells]:
     with refuse_damage(path):
         yield from sheet.iter_rows(values_only=True)
-
-
-def _read_sheet(place: str, file: str, cells: Iterable[_Cells]) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
-    iterator = iter(cells)
-    first = list(islice(iterator, _FIRST_ROWS))
-    layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
-    if layout is None:
-        return (), [], None
-    start = layout.start
-    rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
-    columns = columns_of(rows)
-    channels, left_out = channels_of(layout, columns.values)
-    above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
-    over = [i + 1 for i in layout.over]
-    account = account_of(file, start + columns.rows, over, above | columns.left_out, columns.beside)
-    return channels, [*left_out, *columns.remarks], account

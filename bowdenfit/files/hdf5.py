@@ -4,12 +4,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
-from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
-from bowdenfit.files.outcome import UnreadNames, channel_file, is_numeric, numbers, refuse_damage, refuse_too_large
-from bowdenfit.files.sampling import with_interval
+from bowdenfit.files.channels import (
+    Channel,
+    ChannelFile,
+    UnreadNames,
+    channel_file,
+    is_numeric,
+    numbers,
+    refuse_damage,
+    refuse_too_large,
+)
+from bowdenfit.files.clocks import with_column_clocks, with_interval, with_only_clock
 
 MOST_COLUMNS = 64
 _LONGEST = 400  # characters of a path
@@ -25,8 +33,6 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: The file is damaged, too large or without numeric channels.
     """
-    import h5py
-
     left_out = UnreadNames()
     with refuse_damage(path), h5py.File(path, "r") as file:
         chosen = [dataset for dataset in _datasets(file, left_out, set()) if _is_recording(dataset, left_out)]
@@ -39,8 +45,6 @@ def read(path: Path) -> ChannelFile:
 
 def _datasets(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[Any]:
     """All data sets, in the order of the file, but for what lies elsewhere."""
-    import h5py
-
     for path, member in members(group, left_out, seen):
         if isinstance(member, h5py.Group):
             yield from _datasets(member, left_out, seen)
@@ -58,8 +62,6 @@ def members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[tuple
         left_out: Takes the paths of what is left alone.
         seen: Takes the groups, by their places in the file: one that holds itself is gone through once.
     """
-    import h5py
-
     for key in group:
         path = f"{group.name.rstrip('/')}/{key}".lstrip("/")
         if not isinstance(group.get(key, getlink=True), h5py.HardLink):

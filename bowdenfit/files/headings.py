@@ -1,11 +1,20 @@
-"""Headings of recordings: the name of each column and the unit that stands with it."""
+"""What the heading of a column says: its name, its unit, and the quantities that it can be; and how users name columns.
+
+`heading_of` divides a heading into name and unit; `find_candidates` finds the columns that can be each quantity; options
+such as `--column input_force='Force input (N)'` are written by `option_naming` and read by `parse_sources`.
+"""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import shlex
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 
+from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time
-from bowdenfit.units import is_unit
+from bowdenfit.files.spellings import parse_heading
+from bowdenfit.units import ColumnSource, is_unit
+from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _LONGEST = 200
@@ -16,6 +25,7 @@ _SUFFIXES = (
     "cm/s rad deg degree degrees rad/s deg/s rpm s ms us ns min h sec seconds Hz"
 )
 _FORCES = {"N", "kN", "mN", "lbf", "kgf"}
+_LONGEST_HEADING = 200
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,37 @@ class Heading:
 
     name: str
     unit: str = ""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column that a table may have.
+
+    Args:
+        name: Canonical name.
+        dimension: Kind of quantity (`units.INTERNAL_UNITS`), "route" for the route variable, "speed" for the velocity of
+            the rope or of the motor, "text" for labels.
+        to: Unit to convert to; the internal one if omitted.
+    """
+
+    name: str
+    dimension: str
+    to: str | None = None
+
+
+@dataclass(frozen=True)
+class MatchedColumn:
+    """A column that can be a quantity.
+
+    Args:
+        position: Which of the columns.
+        unit: Unit written in its heading; None without one.
+        pair: What its meaning rests on (see `Spelling`); empty where it says it alone.
+    """
+
+    position: int
+    unit: str | None
+    pair: str = ""
 
 
 def heading_of(text: str, unit: str = "") -> Heading:
@@ -40,6 +81,16 @@ def heading_of(text: str, unit: str = "") -> Heading:
     if name and unit not in {"", "-", "1"} and is_unit(unit):
         return Heading(name, unit)
     return Heading(plain, _unit_behind(plain))
+
+
+def _unit_behind(heading: str) -> str:
+    """Unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
+    words = re.split(r"[\s_]+", heading)
+    for start in range(1, len(words)):
+        candidate = "_".join(words[start:]).replace("_per_", "/")
+        if candidate in _SUFFIXES.split():
+            return candidate
+    return next((word for word in words[1:] if word in _FORCES), "")
 
 
 def split_brackets(heading: str) -> tuple[str, str]:
@@ -64,41 +115,101 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text.strip()))
 
 
-def without_label(cells: Sequence[str]) -> list[str]:
-    """A row of numbers over columns ("Angle", 45, 45, 90) without the word before it that says what they are."""
-    filled = [i for i, cell in enumerate(cells) if cell.strip()]
-    labeled = len(filled) > 1 and not is_number(cells[filled[0]]) and all(is_number(cells[i]) for i in filled[1:])
-    if labeled and not names_time(cells[filled[0]]):
-        return ["" if i == filled[0] else cell for i, cell in enumerate(cells)]
-    return list(cells)
+def find_candidates(
+    headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], stated: Collection[str] = ()
+) -> dict[str, list[MatchedColumn]]:
+    """The columns that can be each quantity; several where a file leaves it open.
 
-
-def pair_clocks(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:
-    """Names for the nameless clocks of sheets that have one heading for each pair of time and force.
-
-    The heading stands over the force, over the time (as a merged cell does), or over both.
+    The name of a quantity comes first, then other spellings of it; one that only a pair makes clear, such as T1 beside T2,
+    counts where nothing clearer does and the other end is there too.
 
     Args:
-        headings: One for each column.
-        rising: Whether the values of the column rise in even steps.
+        headings: What stands over each column, and the unit that the file gives elsewhere; both may be empty.
+        wanted: What to look for.
+        stated: Quantities whose column the user has named; none is looked for.
     """
-    named = list(headings)
-    for i in range(len(named) - 1):
-        here, right = named[i], named[i + 1]
-        if not rising[i] or rising[i + 1] or not numeric[i + 1] or names_time(here.name):
-            continue
-        if not here.name and right.name and not names_time(right.name):
-            named[i] = Heading(f"time of {right.name}", here.unit)
-        elif here.name and (not right.name or (right.name == here.name and is_number(here.name))):
-            named[i], named[i + 1] = Heading(f"time of {here.name}"), replace(here, unit=right.unit or here.unit)
-    return tuple(named)
+    by_quantity: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
+    loose: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
+    for i, (heading, unit) in enumerate(headings):
+        named = meanings(heading, wanted)
+        for quantity, written in named:
+            by_quantity[quantity.name].append(MatchedColumn(i, written or unit or None))
+        other = parse_heading(heading, unit) if heading and not named and len(heading) <= _LONGEST_HEADING else None
+        if other and other.quantity in by_quantity:
+            (loose if other.pair else by_quantity)[other.quantity].append(MatchedColumn(i, other.unit, other.pair))
+    for one, far in (("input_force", "output_force"), ("output_force", "input_force")):
+        if one in by_quantity and not by_quantity[one]:
+            beside = [candidate.pair for candidate in (*by_quantity[far], *loose[far])] + [""] * (far in stated)
+            by_quantity[one] = [candidate for candidate in loose[one] if _is_paired(candidate.pair, beside)]
+    return {name: [] if name in stated else columns for name, columns in by_quantity.items()}
 
 
-def _unit_behind(heading: str) -> str:
-    """Unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
-    words = re.split(r"[\s_]+", heading)
-    for start in range(1, len(words)):
-        candidate = "_".join(words[start:]).replace("_per_", "/")
-        if candidate in _SUFFIXES.split():
-            return candidate
-    return next((word for word in words[1:] if word in _FORCES), "")
+def _is_paired(pair: str, beside: Collection[str]) -> bool:
+    """Whether the columns at the other end make clear what this one is."""
+    return "number" in beside if pair == "number" else bool({*beside} - {"number"})
+
+
+def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
+    """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
+    if len(heading) > _LONGEST_HEADING:
+        return []
+    name, unit = split_brackets(heading)
+    exact = [(q, unit or _suffix(name, q.name)) for q in wanted if plain_name(name) == plain_name(q.name)]
+    whole = [(q, None) for q in wanted if plain_name(heading) == plain_name(q.name)]
+    named = exact or whole or [(q, behind) for q in wanted if (behind := _suffix(heading, q.name)) is not None]
+    return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]
+
+
+def _suffix(heading: str, name: str) -> str | None:
+    """Unit behind the name in `input_force_N` or "Input force N", case kept; None where it is no unit."""
+    words = re.split(r"[\s_\-]+", heading.strip())
+    units = ["_".join(words[i:]) for i in range(1, len(words)) if plain_name("_".join(words[:i])) == plain_name(name)]
+    if not units:
+        return None
+    candidate = units[-1].replace("_per_", "/").replace("_", "*")
+    if candidate.lower() in {"pct", "percent"}:
+        return "%"
+    return candidate if is_unit(candidate) else None
+
+
+@lru_cache(maxsize=1024)  # of each heading it is asked for every quantity
+def plain_name(heading: str) -> str:
+    """Heading in lower case with underscores for anything between words."""
+    return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")
+
+
+def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--column") -> str:
+    """The option that names a column or channel, as it can be pasted into a shell."""
+    return f"{option} {quantity}={shlex.quote(heading + (f':{unit}' if unit else ''))}"
+
+
+def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()) -> dict[str, ColumnSource]:
+    """What the user names by options such as "input_force=ai0:lbf": the name in the file, and its unit, by quantity.
+
+    Args:
+        texts: What stands behind the options.
+        option: The option, for errors.
+        known: Quantities that may be named; any where it is empty.
+
+    Raises:
+        DatasetError: A text is not of that form, or names a quantity that there is not, or one twice.
+    """
+    what = option.removeprefix("--").upper()
+    sources: dict[str, ColumnSource] = {}
+    for text in texts:
+        quantity, equals, target = (part.strip() for part in text.partition("="))
+        name, _, unit = target.rpartition(":") if ":" in target else (target, "", "")
+        if not equals or not quantity or not name.strip():
+            raise DatasetError(
+                f"{option} {shown(text)} is not of the form QUANTITY={what}:UNIT, such as input_force=ai0:N."
+            )
+        if known and quantity not in known:
+            raise DatasetError(
+                f"{option} {shown(text)}: no quantity is called {shown(quantity)}{suggest_name(quantity, list(known))}"
+            )
+        if quantity in sources:
+            raise DatasetError(
+                f"{option} names {quantity} twice, as {shown(sources[quantity].name)} and {shown(target)}; keep one of them."
+            )
+        sources[quantity] = ColumnSource(name=name.strip(), unit=unit.strip() or None)
+    return sources

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from bowdenfit.files.cells import Kind, kind_of, number_of
-from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row, pair_clocks, without_label
+from bowdenfit.files.clocks import names_time
+from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row
 from bowdenfit.types import Vector
 
 Rows = Sequence[Sequence[str]]
@@ -66,11 +67,6 @@ class Layout:
         return self.headings[column].name or f"column{column + 1}"
 
 
-def is_summary(cells: Sequence[str]) -> bool:
-    """Whether a row below the data is one of minima, averages and the like."""
-    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
-
-
 def layout_of(rows: Rows, decimal: str) -> Layout | None:
     """How the first rows of a sheet are laid out; None if they hold no data.
 
@@ -103,6 +99,11 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
         tuple(over),
         by_numbers,
     )
+
+
+def is_summary(cells: Sequence[str]) -> bool:
+    """Whether a row below the data is one of minima, averages and the like."""
+    return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
 
 
 def is_index(values: Vector) -> bool:
@@ -218,3 +219,33 @@ def _names(header: Sequence[Sequence[str]], width: int) -> list[str]:
     width = max(width, *map(len, header))
     padded = [[*row, *[""] * (width - len(row))] for row in header]
     return [" ".join(" ".join(cells).split()) for cells in zip(*padded, strict=True)]
+
+
+def without_label(cells: Sequence[str]) -> list[str]:
+    """A row of numbers over columns ("Angle", 45, 45, 90) without the word before it that says what they are."""
+    filled = [i for i, cell in enumerate(cells) if cell.strip()]
+    labeled = len(filled) > 1 and not is_number(cells[filled[0]]) and all(is_number(cells[i]) for i in filled[1:])
+    if labeled and not names_time(cells[filled[0]]):
+        return ["" if i == filled[0] else cell for i, cell in enumerate(cells)]
+    return list(cells)
+
+
+def pair_clocks(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:
+    """Names for the nameless clocks of sheets that have one heading for each pair of time and force.
+
+    The heading stands over the force, over the time (as a merged cell does), or over both.
+
+    Args:
+        headings: One for each column.
+        rising: Whether the values of the column rise in even steps.
+    """
+    named = list(headings)
+    for i in range(len(named) - 1):
+        here, right = named[i], named[i + 1]
+        if not rising[i] or rising[i + 1] or not numeric[i + 1] or names_time(here.name):
+            continue
+        if not here.name and right.name and not names_time(right.name):
+            named[i] = Heading(f"time of {right.name}", here.unit)
+        elif here.name and (not right.name or (right.name == here.name and is_number(here.name))):
+            named[i], named[i + 1] = Heading(f"time of {here.name}"), replace(here, unit=right.unit or here.unit)
+    return tuple(named)

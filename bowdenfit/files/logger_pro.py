@@ -6,9 +6,8 @@ from xml.etree.ElementTree import Element, XMLParser
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.channels import Channel, ChannelFile, UnreadNames, channel_file, refuse_damage, refuse_larger
 from bowdenfit.files.clocks import with_clocks
-from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_larger
 from bowdenfit.types import Vector
 
 LARGEST_BYTES = 512 * 1024**2

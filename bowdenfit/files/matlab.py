@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
+import scipy.io
 
-from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
-from bowdenfit.files.hdf5 import members
-from bowdenfit.files.outcome import (
+from bowdenfit.files.channels import (
     BYTES_PER_SAMPLE,
+    Channel,
+    ChannelFile,
     UnreadNames,
     channel_file,
     is_numeric,
@@ -22,7 +23,8 @@ from bowdenfit.files.outcome import (
     refuse_damage,
     refuse_too_large,
 )
-from bowdenfit.files.sampling import with_interval
+from bowdenfit.files.clocks import with_column_clocks, with_interval, with_only_clock
+from bowdenfit.files.hdf5 import members
 
 MOST_COLUMNS = 64
 _TEXT = "they are text"
@@ -90,8 +92,6 @@ def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 def _read_classic(path: Path) -> _Variables:
     """Files of MATLAB 4 to 7.2, which SciPy reads."""
-    import scipy.io
-
     variables = _Variables()
     with warnings.catch_warnings():
         # Names that occur twice, and objects without a name: the numbers are read all the same.
@@ -174,8 +174,6 @@ def _unpacked(start: bytes, order: str) -> int:
 
 def _read_hdf5(path: Path) -> _Variables:
     """Files of MATLAB 7.3, which are HDF5 with all arrays transposed."""
-    import h5py
-
     variables = _Variables()
     with h5py.File(path, "r") as file:
         stored = list(_stored(file, variables.left_out, set()))
@@ -187,8 +185,6 @@ def _read_hdf5(path: Path) -> _Variables:
 
 def _stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """The numeric variables of a group and of the structures in it, with their names."""
-    import h5py
-
     for path, member in members(group, left_out, seen):
         key = path.rpartition("/")[2]
         name, kind = f"{prefix}{key}", _class(member)

@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import (
+from bowdenfit.files.channels import (
+    Channel,
+    ChannelFile,
     UnreadNames,
     channel_file,
     cut_off,
     is_numeric,
     kept_of_cut,
+    load,
     numbers,
     refuse_damage,
     refuse_too_large,

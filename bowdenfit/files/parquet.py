@@ -5,11 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.channels import Channel, ChannelFile, with_unique_names
+from bowdenfit.files.channels import (
+    Channel,
+    ChannelFile,
+    UnreadNames,
+    channel_file,
+    load,
+    refuse_damage,
+    refuse_too_large,
+    with_unique_names,
+)
 from bowdenfit.files.clocks import with_clocks
 from bowdenfit.files.headings import Heading, heading_of
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_too_large
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
 
@@ -22,7 +29,7 @@ def read(path: Path) -> ChannelFile:
     The unit is what the metadata of the column say under "unit", else what its heading says. Columns are read one by
     one, so that the memory needed is about that of the numbers, 8 bytes a cell.
 
-    Limits: 2 GiB of numbers (`outcome.LARGEST_BYTES`).
+    Limits: 2 GiB of numbers (`channels.LARGEST_BYTES`).
 
     Args:
         path: The file.

@@ -8,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_damage, refuse_too_large
+from bowdenfit.files.channels import (
+    Channel,
+    ChannelFile,
+    UnreadNames,
+    channel_file,
+    load,
+    refuse_damage,
+    refuse_too_large,
+)
 
 MOST_ELEMENTS = 64
 _HEADER = "header"

@@ -1,28 +1,26 @@
-"""The columns of a sheet out of its rows of cells: numbers, dates, and what stands below the data."""
+"""From the rows of a sheet, whatever program wrote it, to channels.
 
+`cells_of_sheet` reads cell by cell and notes a letter for what each row holds; `columns_of` decides by these letters where
+the data end and what is a remark; `channels_of` names the columns and gives them their clocks.
+"""
+
+import math
 import re
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.cells import Cell, kind_of
-from bowdenfit.files.clocks import seconds_of_dates
-from bowdenfit.files.csv_rows import too_many_cells
+from bowdenfit.files.cells import Cell, kind_of, number_of
+from bowdenfit.files.channels import Channel, with_unique_names
+from bowdenfit.files.clocks import seconds_of_dates, with_clocks, without_tails
 from bowdenfit.files.headings import heading_of
+from bowdenfit.files.layout import Layout, is_index, is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
-from bowdenfit.files.sheet_cells import (
-    EMPTY,
-    REMARK,
-    REMARKED,
-    SPACE,
-    SUMMARY,
-    WORDS,
-    SheetCells,
-    SheetRows,
-    cells_of_sheet,
-    text_of,
-)
+from bowdenfit.files.text_file import too_many_cells
 from bowdenfit.types import Vector
 from bowdenfit.words import few, shown
 
@@ -30,6 +28,49 @@ _MOST_SUMMARY_ROWS = 40
 _MOST_ROWS_AFTER_BLANK = 10
 _BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
 _LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
+
+DATA, SPACE, EMPTY, REMARKED, SUMMARY, WORDS, MIXED, REMARK = b"d ,#swmr"
+"""What a row holds: readings, nothing, separators only, a comment, statistics, words, words among numbers, a remark."""
+
+
+@dataclass(frozen=True)
+class SheetRows:
+    """The rows of a sheet from the first of data on.
+
+    Args:
+        place: File and sheet, for errors.
+        layout: Headings and kinds of the columns.
+        rows: Their cells, text or as the library gives them; None for a comment.
+        number: The number in the file of the row at a position, from 0.
+        decimal: Decimal mark of numbers that are text.
+        of_text: Whether they are lines of text, of which blank ones are only space and none may have too many cells.
+        before: Numbers or dates of each column that have been read from the rows before, in pieces; taken out.
+    """
+
+    place: str
+    layout: Layout
+    rows: Iterable[Sequence[Any] | None]
+    number: Callable[[int], int]
+    decimal: str = "."
+    of_text: bool = False
+    before: dict[int, list[np.ndarray]] | None = None
+
+
+@dataclass(frozen=True)
+class SheetCells:
+    """What has been read of a sheet.
+
+    Args:
+        numbers: The numbers of each column.
+        dates: The texts of each column of dates.
+        words: Position, column and text of each cell that is not as it should be; the cells of a row that has too many.
+        letters: What each row holds.
+    """
+
+    numbers: dict[int, array]
+    dates: dict[int, list[str]]
+    words: list[tuple[int, int, Any]]
+    letters: bytearray
 
 
 @dataclass(frozen=True)
@@ -49,6 +90,32 @@ class SheetColumns:
     left_out: dict[int, tuple[str, str]]
     beside: list[tuple[int, str]]
     rows: int
+
+
+def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple[Channel, ...], list[str]]:
+    """The channels of a sheet with their clocks, and remarks on the columns left out.
+
+    Args:
+        layout: Its headings.
+        columns: The numbers of each column; None for one of text.
+    """
+    kept: list[Channel] = []
+    remarks: list[str] = []
+    nameless = [not heading.name for heading in layout.headings]
+    for i, (heading, values) in enumerate(zip(layout.headings, columns, strict=True)):
+        place = f"Column {i + 1}" if nameless[i] else f"The column {shown(heading.name)}"
+        if values is None:
+            remarks.append(f"{place} holds text and was left out.")
+        elif not np.isfinite(values).any():
+            remarks += [] if nameless[i] else [f"{place} holds no numbers and was left out."]
+        elif nameless[i] and layout.named and is_index(values):
+            remarks.append(f"{place} has no heading, only counts the rows and was left out.")
+        else:
+            kept.append(Channel(layout.name(i), heading.unit, values))
+    if not layout.named:
+        remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
+    named = with_unique_names(kept)
+    return with_clocks(without_tails(named)) if named else (), remarks
 
 
 def columns_of(sheet: SheetRows) -> SheetColumns:
@@ -165,3 +232,57 @@ def _remarks(
     sentences += [f"Left out because no numbers stand there: {few(between)}."] if between else []
     texts = [f"{shown(text)} in row {row}" for row, text in beside]
     return sentences + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])
+
+
+def cells_of_sheet(sheet: SheetRows) -> SheetCells:
+    """All cells of a sheet."""
+    kinds = sheet.layout.kinds
+    numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
+    cells = SheetCells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
+    for position, row in enumerate(sheet.rows):
+        filled = row or ()
+        if sheet.of_text and len(filled) > len(kinds) and any(map(str.strip, filled[len(kinds) :])):
+            cells.words.append((position, len(kinds), filled))
+        known = len(cells.words)
+        for i, column in cells.numbers.items():
+            cell = filled[i] if i < len(filled) else None
+            column.append(cell if type(cell) in (float, int) else _number(cells, position, i, cell, sheet.decimal))
+        for i, texts in cells.dates.items():
+            texts.append(text_of(filled[i]) if i < len(filled) else "")
+            if kind_of(texts[-1], sheet.decimal) == "text":
+                cells.words.append((position, i, texts[-1]))
+        cells.letters.append(_letter(row, sheet, len(cells.words) > known))
+    return cells
+
+
+def _number(cells: SheetCells, row: int, column: int, cell: object, decimal: str) -> float:
+    value = number_of(text_of(cell), decimal)
+    if value is None:
+        cells.words.append((row, column, text_of(cell)))
+    return math.nan if value is None else value
+
+
+def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
+    """What a row holds; statistics bear a label in a column that holds no words in the data."""
+    if row is None:
+        return REMARKED
+    if all(cell is None or cell == "" for cell in row):
+        return EMPTY if sheet.of_text and row else SPACE
+    if not worded:
+        return DATA
+    texts, kinds = [text_of(cell) for cell in row], sheet.layout.kinds
+    if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
+        return SUMMARY
+    kinds_of_cells = {kind_of(text, sheet.decimal) for text in texts}
+    return MIXED if len(kinds) == 1 or kinds_of_cells & {"number", "date"} else WORDS
+
+
+def text_of(cell: object) -> str:
+    """A cell as text: dates as ISO dates, true and false as words."""
+    if isinstance(cell, str):
+        return cell
+    if isinstance(cell, timedelta):
+        return repr(cell.total_seconds())
+    if cell is None:
+        return ""
+    return repr(cell) if isinstance(cell, bool | int | float) else str(cell)

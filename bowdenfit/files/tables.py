@@ -1,11 +1,68 @@
-"""Tables of readings in whatever file they are kept."""
+"""Tables of readings in CSV files and workbooks: headings, and rows of cells that know where they stood."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.errors import DatasetError, Faults
+from bowdenfit.files.apart import LIMITS, call_apart
+from bowdenfit.files.cells import Cell, Decimals, is_plain_number
+from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, checked_ending, recognize
+from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
+from bowdenfit.files.table_parts import TableParts, is_measured, numbers_found, parts_of
+from bowdenfit.files.text_file import (
+    SEPARATORS,
+    CsvRecord,
+    Line,
+    comment_mark,
+    declared_separator,
+    first_bytes,
+    first_lines,
+    is_blank,
+    records,
+    too_few_cells,
+    too_many_cells,
+)
 from bowdenfit.inputs import refuse_special
+from bowdenfit.words import shown
 
 WORKBOOKS = (".xlsx", ".xlsm")
+_FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18
+_LARGEST = 40e6  # bytes; some fifty times as many are needed to read them
+_SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """Header and rows of one file, all cells as text.
+
+    Args:
+        file: Its name.
+        header: What stands over each column.
+        header_row: The row of the headings, of which the last stands over the units or the data.
+        rows: Rows of readings.
+        units: The unit that stands below each heading; empty without one.
+        lines: Where the rows of the file went.
+        faults: What is found wrong while it is read.
+    """
+
+    file: str
+    header: tuple[str, ...]
+    header_row: int
+    rows: tuple[tuple[Cell, ...], ...]
+    units: tuple[str, ...]
+    lines: RowAccount
+    faults: Faults = field(default_factory=Faults, compare=False)
+
+    @property
+    def account(self) -> RowAccount:
+        """Where the rows of the file went, for a reader that is through with it.
+
+        Raises:
+            DatasetError: All that is wrong with the file.
+        """
+        self.faults.refuse()
+        return self.lines
 
 
 def read_table(path: Path, most: int | None = None) -> RawTable:
@@ -21,9 +78,169 @@ def read_table(path: Path, most: int | None = None) -> RawTable:
     refuse_special(path)
     if path.suffix.lower() not in WORKBOOKS:
         return read_csv(path, most)
-    from bowdenfit.files import checked_ending
-    from bowdenfit.files.apart import call_apart
-
     checked_ending(path)
-    table: RawTable = call_apart(path, "bowdenfit.files.workbook_table:read_workbook", most)
+    table: RawTable = call_apart(path, "bowdenfit.files.excel:read_workbook", most)
     return table
+
+
+def read_csv(path: Path, most: int | None = None) -> RawTable:
+    """Read one table.
+
+    Understands comma, semicolon, tab, bar and blanks between columns; decimal comma; UTF-8, UTF-16 and Windows encodings;
+    comment lines starting with #; Excel's `sep=;` line, trailing empty columns, blank lines and quoted cells; lines over the
+    headings, a row of units below them, remarks between the rows and beside them, statistics and other text below.
+
+    Args:
+        path: The file.
+        most: Number of its first rows that are enough; all if omitted.
+
+    Raises:
+        DatasetError: The file is missing, is no text, is empty, has no header or duplicate columns, or a row is longer
+            than the header.
+    """
+    if most is None:
+        _refuse_large(path)
+    name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
+    content = recognize(path, data[:4096])
+    if content not in (UNKNOWN, PLAIN_TEXT):
+        raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
+    _, all_lines = first_lines(data, name, whole=most is None, most=most)
+    if most is not None and len(all_lines) > 1 and not all_lines[-1].ended:
+        all_lines = all_lines[:-1]
+    declared, lines = declared_separator(all_lines, name)
+    lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
+    separator = declared or max(SEPARATORS, key=lambda candidate: _fitness(lines, candidate))
+    rows = list(records(lines, separator, len(lines)))
+    for row in rows:
+        if not row.closed:
+            raise DatasetError(
+                f"{name}, row {row.row}: a quotation mark opens there that is never closed, or a cell is too long; close or "
+                "delete it."
+            )
+    if all(row.blank for row in rows):
+        raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
+    return raw_table(name, all_lines, rows, separator)
+
+
+def _refuse_large(path: Path) -> None:
+    """Refuse what no table of readings is, before it fills the memory.
+
+    Raises:
+        DatasetError: The file is too large.
+    """
+    size, largest = path.stat().st_size if path.is_file() else 0, _LARGEST * LIMITS.get()
+    if size > largest:
+        raise DatasetError(
+            f"{path.name} has {size / 1e6:.0f} MB, more than the {largest / 1e6:.0f} MB that a table may have; keep the "
+            "rows that are readings, name a recording as one, or allow more with --reading-limit 4."
+        )
+
+
+def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
+    """The table that the rows of a file make.
+
+    Args:
+        name: Of the file.
+        lines: All its lines.
+        rows: The cells of those that are no comments.
+        separator: What stands between columns.
+
+    Raises:
+        DatasetError: See `read_csv`.
+    """
+    parts = parts_of(rows, name)
+    header = _header(parts, name)
+    if not parts.body:
+        raise DatasetError(
+            f"{name} has a header row but no measurements; add the rows, or remove the table from cable.toml."
+        )
+    decimals = Decimals.of((cell for row in parts.body for cell in row.cells), separator != ",")
+    units = (*parts.units, *[""] * len(header))[: len(header)]
+    in_column = decimals.of_columns([_column(parts.body, i) for i in range(len(header))])
+    wrong_width = Faults()
+    nothing = tuple[Cell, ...]()
+    fewest = _fewest_cells(parts.body, len(header))
+    cells = tuple(wrong_width.read_all(lambda row: _cells(name, header, row, in_column, fewest), parts.body, nothing))
+    wrong_width.refuse()
+    return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
+
+
+def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
+    """How well a separator splits the first rows: into most numbers and fewest words, equally many cells, and most of them.
+
+    Blanks, which stand in headings too, separate columns only where nothing else does.
+    """
+    rows = [row for row in records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
+    widths = [len(row.cells) for row in rows] or [0]
+    alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
+    return numbers_found(rows, separator), separator != " ", alike, widths[0]
+
+
+def _header(parts: TableParts, file: str) -> tuple[str, ...]:
+    """The headings, without the empty ones behind the last."""
+    header, row = parts.names, parts.headings[0].row
+    while not header[-1]:
+        header = header[:-1]
+    if all(is_plain_number(column) for column in header if column):
+        raise DatasetError(
+            f"{file}, row {row}: this is the header row, but it holds numbers only ({shown(header[0])}, ...); write the "
+            "names of the columns, with their units, above them."
+        )
+    seen: dict[str, int] = {}
+    for position, column in enumerate(header, start=1):
+        if column and column.lower() in seen:
+            raise DatasetError(
+                f"{file}, row {row}: the column {shown(column)} appears twice (columns {seen[column.lower()]} and "
+                f"{position}); rename or delete one of them."
+            )
+        seen[column.lower()] = position
+    return header
+
+
+def _column(rows: Sequence[CsvRecord], position: int) -> list[str]:
+    """Texts of one column, of the rows that reach it."""
+    return [row.cells[position] for row in rows if position < len(row.cells)]
+
+
+def _fewest_cells(rows: Sequence[CsvRecord], width: int) -> int:
+    """Number of cells that a row must have: up to the last column in which any row has a number."""
+    return max((i + 1 for row in rows for i, cell in enumerate(row.cells[:width]) if is_measured(cell)), default=0)
+
+
+def _cells(
+    file: str, header: tuple[str, ...], row: CsvRecord, decimals: Sequence[Decimals], fewest: int
+) -> tuple[Cell, ...]:
+    if any(map(is_measured, _behind(row, len(header)))):
+        too_many_cells(file, row.row, row.cells, len(header))
+    if len(row.cells) < fewest:
+        raise too_few_cells(file, row.row, row.cells, header)
+    padded = row.cells + [""] * (len(header) - len(row.cells))
+    return tuple(
+        Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals[i])
+        for i, (column, text) in enumerate(zip(header, padded, strict=False))
+    )
+
+
+def _behind(row: CsvRecord, width: int) -> list[str]:
+    """What stands in cells behind the last column."""
+    return [cell.strip() for cell in row.cells[width:] if cell.strip()]
+
+
+def _account(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], parts: TableParts, width: int) -> RowAccount:
+    starts = {row.row: row for row in rows}
+    reasons: dict[int, tuple[str, str]] = {}
+    for line in lines:
+        row = starts.get(line.row)
+        if line.text.strip().strip('"').lower().startswith("sep="):
+            reasons[line.row] = _SEPARATOR, ""
+        elif comment_mark(line.text) == "#":
+            reasons[line.row] = COMMENT, ""
+        elif row is None:
+            reasons[line.row] = (BLANK, "") if is_blank(line.text) else (_CONTINUED, "")
+        elif row.blank:
+            reasons[line.row] = BLANK, ""
+        elif row.row in parts.left_out:
+            reasons[row.row] = parts.left_out[row.row], " ".join(filter(None, map(str.strip, row.cells)))
+    beside = [(row.row, " ".join(text)) for row in parts.body if (text := _behind(row, width))]
+    over = [row.row for row in parts.headings]
+    return account_of(name, len(lines), over, reasons, (*parts.beside, *beside))

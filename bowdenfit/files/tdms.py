@@ -8,19 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.column_clocks import with_column_clocks, with_only_clock
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import (
+from bowdenfit.files.channels import (
+    Channel,
+    ChannelFile,
     UnreadNames,
     channel_file,
     cut_off,
     is_numeric,
     kept_of_cut,
+    load,
     numbers,
     refuse_damage,
     refuse_too_large,
 )
+from bowdenfit.files.clocks import with_column_clocks, with_only_clock
 
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 _WAVEFORM = "wf_increment"

@@ -10,14 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.clocks import is_date, names_time
-from bowdenfit.files.contents import TEXT
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, find_candidates
-from bowdenfit.files.sheets import stated_rate
+from bowdenfit.files.clocks import is_date, names_time, stated_rate
+from bowdenfit.files.formats import TEXT
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of
 from bowdenfit.files.spellings import parse_heading, without_accents
-from bowdenfit.files.tables import WORKBOOKS, read_table
+from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
 from bowdenfit.kinds.forces.table import count_loads
 from bowdenfit.units import conversion_factor, dimension_of, is_unit

@@ -10,12 +10,9 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, find_candidates
-from bowdenfit.files.naming import option_naming
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming
 from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.file_kind import (
     BESIDE_FORCES,
     FORCES,

@@ -14,8 +14,8 @@ from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require_column
-from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.spellings import without_accents
+from bowdenfit.files.tables import RawTable
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown, significant
 

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.matching import Quantity
+from bowdenfit.files.headings import Quantity
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import match_files
 from bowdenfit.units import ColumnSource

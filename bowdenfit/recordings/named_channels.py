@@ -8,8 +8,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.matching import Quantity, find_candidates, meanings
-from bowdenfit.files.naming import parse_sources
+from bowdenfit.files.headings import Quantity, find_candidates, meanings, parse_sources
 from bowdenfit.files.pieces import sample
 from bowdenfit.units import ChannelSource, ColumnSource, contradiction, conversion_factor
 from bowdenfit.words import quoted, shown

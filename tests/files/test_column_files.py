@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from three_columns import INPUT, OUTPUT, TIME, check
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import columns_csv, excel, outcome, parquet, read_channels
+from bowdenfit.files import channels, csv_recording, excel, parquet, read_channels
 from bowdenfit.files.channels import Channel
 from bowdenfit.files.clocks import with_clocks
 
@@ -30,7 +30,7 @@ def rows_of(separator=",", decimal=".", end="\n"):
 def read_text(folder, text, name="run.csv", encoding="utf-8"):
     path = folder / name
     path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
-    return columns_csv.read(path)
+    return csv_recording.read(path)
 
 
 HEADER = "time [s],input_force [N],output_force [N]\n"
@@ -77,16 +77,16 @@ SLOW_HABIT = "comment between the rows"
 @pytest.fixture
 def as_if_long(monkeypatch):
     """Read all but the last lines as those of long files are, and return how many columns each such reading gave."""
-    widths, read_long = [], columns_csv._read_long
+    widths, read_long = [], csv_recording._read_long
 
     def watched(*arguments):
         columns = read_long(*arguments)
         widths.append(columns and len(columns))
         return columns
 
-    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
-    monkeypatch.setattr(columns_csv, "_FEW_BYTES", 0)
-    monkeypatch.setattr(columns_csv, "_read_long", watched)
+    monkeypatch.setattr(csv_recording, "_LAST_BYTES", 30)
+    monkeypatch.setattr(csv_recording, "_FEW_BYTES", 0)
+    monkeypatch.setattr(csv_recording, "_read_long", watched)
     return widths
 
 
@@ -99,14 +99,14 @@ def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, as_if_long):
 @pytest.fixture
 def both_ways(monkeypatch):
     """Read all but the last lines both as those of short files and as those of long ones, and return what each gave."""
-    found, few = [], columns_csv._read_short
+    found, few = [], csv_recording._read_short
 
     def watched(*arguments):
-        found.append((few(*arguments), columns_csv._read_long(*arguments)))
+        found.append((few(*arguments), csv_recording._read_long(*arguments)))
         return found[-1][0]
 
-    monkeypatch.setattr(columns_csv, "_LAST_BYTES", 30)
-    monkeypatch.setattr(columns_csv, "_read_short", watched)
+    monkeypatch.setattr(csv_recording, "_LAST_BYTES", 30)
+    monkeypatch.setattr(csv_recording, "_read_short", watched)
     return found
 
 
@@ -127,7 +127,7 @@ def test_few_rows_are_read_as_many_are(habit, tmp_path, both_ways):
 @pytest.mark.parametrize("path", OF_LABORATORIES, ids=lambda path: path.name)
 def test_few_rows_of_a_laboratory_are_read_as_many_are(path, both_ways):
     try:
-        columns_csv.read(path)
+        csv_recording.read(path)
     except DatasetError:  # it is no recording
         return
     for few, long in both_ways:
@@ -140,7 +140,7 @@ def test_a_comment_between_the_rows_of_a_long_file_is_read_the_slow_way(tmp_path
 
 
 def test_pieces_of_a_long_file_are_joined(tmp_path, monkeypatch, as_if_long):
-    monkeypatch.setattr(columns_csv, "_ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(csv_recording, "_ROWS_AT_ONCE", 2)
     check(read_text(tmp_path, HABITS["plain"]))
     assert as_if_long == [3]
 
@@ -302,14 +302,14 @@ def test_a_missing_file_and_a_huge_one_are_refused(tmp_path, monkeypatch):
     for name in ("none.csv", "none.xlsx", "none.parquet"):
         with pytest.raises(DatasetError, match=f"{name} does not exist"):
             read_channels(tmp_path / name)
-    monkeypatch.setattr(columns_csv, "LARGEST_BYTES", 10)
+    monkeypatch.setattr(csv_recording, "LARGEST_BYTES", 10)
     with pytest.raises(DatasetError, match="Parquet"):
         read_text(tmp_path, HABITS["plain"])
 
 
 def test_a_text_file_of_too_many_numbers_is_refused_before_they_are_read(tmp_path, monkeypatch):
     lines = [f"{i / 1000},{i % 7}" for i in range(30_000)]
-    monkeypatch.setattr(outcome, "LARGEST_BYTES", 100_000)
+    monkeypatch.setattr(channels, "LARGEST_BYTES", 100_000)
     with pytest.raises(DatasetError, match=r"GiB of numbers, more than .* that are read at once"):
         read_text(tmp_path, "\n".join(["time,input_force", *lines, ""]))
 
@@ -368,11 +368,11 @@ def test_clocks_are_known_by_name_or_unit(name, unit, is_clock):
     assert (timed[1].time is not None) == is_clock
 
 
-@pytest.mark.parametrize(("module", "reader"), [("openpyxl", excel), ("pyarrow", parquet), ("pandas", columns_csv)])
+@pytest.mark.parametrize(("module", "reader"), [("openpyxl", excel), ("pyarrow", parquet), ("pandas", csv_recording)])
 def test_a_missing_library_is_named_with_how_to_install_it(module, reader, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     for limit in ("_LAST_BYTES", "_FEW_BYTES"):
-        monkeypatch.setattr(columns_csv, limit, 1)
+        monkeypatch.setattr(csv_recording, limit, 1)
     (tmp_path / "run").write_text(HABITS["plain"])
     with pytest.raises(DatasetError, match=rf"needs {module}, which is not installed.*bowdenfit\[lab\]"):
         reader.read(tmp_path / "run")

@@ -10,7 +10,7 @@ import pytest
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import FORMATS, read_channels
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_csv
 
 ROWS = [(0.0, 6.5, 5.25), (0.5, 6.75, 5.5), (1.0, 7.25, 5.75), (1.5, 7.0, -6.0)]
 HEADINGS = ("time (s)", "input_force (N)", "output_force (N)")
@@ -114,7 +114,7 @@ def test_short_recordings_and_tables_are_read_without_pandas(more, tmp_path):
     (tmp_path / "run.csv").write_text(text + f"{text.splitlines()[-1]}\n" * more)
     code = (
         "import sys; from pathlib import Path; from bowdenfit.files import read_channels; "
-        "from bowdenfit.files.csv_table import read_csv; path = Path(sys.argv[1]); read_csv(path); read_channels(path); "
+        "from bowdenfit.files.tables import read_csv; path = Path(sys.argv[1]); read_csv(path); read_channels(path); "
         "print({'pandas', 'jax', 'openpyxl', 'matplotlib'} & sys.modules.keys())"
     )
     done = subprocess.run(

@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Writer as Bag2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import outcome, read_channels, read_here
+from bowdenfit.files import channels, read_channels, read_here
 from bowdenfit.files.channels import Channel, ChannelFile
 
 pytestmark = pytest.mark.extended
@@ -432,19 +432,19 @@ def test_a_file_too_large_for_the_memory_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     {**WRITERS, "a.tdms": write_tdms}[name](tmp_path / name)
-    monkeypatch.setattr(outcome, "LARGEST_BYTES", 2000)
+    monkeypatch.setattr(channels, "LARGEST_BYTES", 2000)
     assert "decimate it" in refusal(tmp_path / name, read_here)
 
 
 def test_a_packed_structure_is_measured_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scipy.io.savemat(tmp_path / "a.mat", {"rec": {"F": np.zeros(10**5)}}, do_compression=True)
     assert (tmp_path / "a.mat").stat().st_size < 10**4
-    monkeypatch.setattr(outcome, "LARGEST_BYTES", 4 * 10**5)
+    monkeypatch.setattr(channels, "LARGEST_BYTES", 4 * 10**5)
     assert "decimate it" in refusal(tmp_path / "a.mat", read_here)
 
 
 def test_an_mdf_file_too_large_is_refused(mf4: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outcome, "LARGEST_BYTES", 2000)
+    monkeypatch.setattr(channels, "LARGEST_BYTES", 2000)
     assert "decimate it" in refusal(mf4, read_here)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_csv
 
 HEADING = "input_force_N,output_force_N\n"
 

@@ -4,7 +4,7 @@ import pytest
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import read_channels
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_csv
 
 ROWS = ["20.5;15.25", "40.25;30.5", "61.0;45.25", "80.5;61.0"]
 HEADER = "F_in (N);F_out (N)"

@@ -10,7 +10,7 @@ import pytest
 from three_columns import INPUT, OUTPUT, TIME, check
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import excel, outcome, parquet
+from bowdenfit.files import channels, excel, parquet
 
 pytestmark = pytest.mark.extended
 
@@ -113,7 +113,7 @@ def test_parquet_timestamps_are_clocks_and_nulls_are_missing(tmp_path):
 
 def test_damaged_and_huge_parquet_files_are_refused(tmp_path, monkeypatch):
     path = write_parquet(tmp_path, {"a": np.arange(1000.0)})
-    monkeypatch.setattr(outcome, "LARGEST_BYTES", 100)
+    monkeypatch.setattr(channels, "LARGEST_BYTES", 100)
     with pytest.raises(DatasetError, match="1000 rows of 1 columns"):
         parquet.read(path)
     path.write_bytes(path.read_bytes()[:2000])

@@ -12,7 +12,7 @@ import pytest
 
 from bowdenfit.description import Preparation
 from bowdenfit.description.pulleys import Pulleys
-from bowdenfit.files import columns_csv, pieces, read_channels
+from bowdenfit.files import csv_recording, pieces, read_channels
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.preparation.bandwidth import main_frequency
@@ -115,7 +115,7 @@ def test_a_long_file_is_kept_in_half_the_bits_and_read_once(tmp_path, monkeypatc
         return to_recording(channels, "long", {}, Pulleys(), is_loop=False)[0], channels
 
     whole = made()[0]
-    monkeypatch.setattr(columns_csv, "_MANY_ROWS", 1000)
+    monkeypatch.setattr(csv_recording, "_MANY_ROWS", 1000)
     half, channels = made()
     assert [each.values.dtype for each in channels.channels] == [np.float64, np.float32, np.float32, np.float32]
     assert half.input_force is channels.channels[1].values and half.input_time is half.velocity_time

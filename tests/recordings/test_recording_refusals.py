@@ -14,7 +14,7 @@ from spoiling import replaced
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError
-from bowdenfit.files import columns_csv
+from bowdenfit.files import csv_recording
 from bowdenfit.kinds import KINDS
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
@@ -334,7 +334,7 @@ def test_missing_files_and_folders_are_refused(refuse, tmp_path):
 
 def test_a_file_that_is_too_large_is_refused(columns, refuse, tmp_path, monkeypatch):
     path = write(tmp_path / "run.csv", columns)
-    monkeypatch.setattr(columns_csv, "LARGEST_BYTES", 1000)
+    monkeypatch.setattr(csv_recording, "LARGEST_BYTES", 1000)
     said = refuse("check", *alone(path))
     for part in ("run.csv", "more than", "Parquet", "cut it into runs"):
         assert part in said

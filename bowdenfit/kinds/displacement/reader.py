@@ -15,7 +15,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.csv_table import RawTable, read_csv
+from bowdenfit.files.tables import RawTable, read_csv
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, follow_motor, history_of_sliding_rope
 from bowdenfit.kinds.rows import (
     OwnAngles,

@@ -12,9 +12,8 @@ from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, find_columns
-from bowdenfit.files.csv_table import RawTable
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.forces.mountings import (
     GROUP,
     NO_GROUP,

@@ -11,9 +11,8 @@ from bowdenfit.description.elastic import PRELOAD
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.matching import meanings
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.headings import meanings
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (

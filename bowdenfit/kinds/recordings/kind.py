@@ -8,7 +8,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.matching import Quantity
+from bowdenfit.files.headings import Quantity
 from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
 from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings, read_recordings

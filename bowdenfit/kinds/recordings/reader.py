@@ -13,7 +13,7 @@ from bowdenfit.description import Description, Preparation, QuantityValue, Recor
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.matching import Quantity
+from bowdenfit.files.headings import Quantity
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.table_files import Source, TableFromFiles

@@ -14,8 +14,7 @@ from bowdenfit.description.values import QuantityValue
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.rows import FileRows, RowOrigin, origin_of_rows
 from bowdenfit.kinds.table_files import RUN, InitQuestions, Source, TableFromFiles, WantedColumn

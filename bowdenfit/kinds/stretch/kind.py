@@ -10,8 +10,7 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor, split_by_group
 from bowdenfit.kinds.rows import (

@@ -4,9 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.headings import heading_of
-from bowdenfit.files.matching import Quantity, find_candidates
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.file_kind import FileKind, columns_of_kind
 from bowdenfit.kinds.fit_command import FitCommand, list_number_columns

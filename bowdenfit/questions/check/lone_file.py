@@ -12,7 +12,7 @@ from bowdenfit.errors import BowdenfitError, DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.clocks import is_clock
-from bowdenfit.files.naming import parse_sources
+from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.file_kind import FileKind, guess_file_kind

@@ -14,9 +14,8 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError, DescriptionError, StoreError, UsageError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.csv_table import RawTable
-from bowdenfit.files.naming import parse_sources
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.headings import parse_sources
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.inference.batch.pieces import ShapedDataset, input_hash, shape_dataset
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.descriptions import load_description

@@ -7,7 +7,7 @@ from typing import Any
 
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.errors import DatasetError, UsageError
-from bowdenfit.files.matching import Quantity
+from bowdenfit.files.headings import Quantity
 from bowdenfit.files.spellings import without_accents
 from bowdenfit.kinds.file_kind import find_stated_angle
 from bowdenfit.questions.start.measured_file import (

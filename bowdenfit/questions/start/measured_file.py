@@ -14,8 +14,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import read_channels
 from bowdenfit.files.clocks import is_clock, names_time
-from bowdenfit.files.headings import heading_of, split_brackets
-from bowdenfit.files.matching import Quantity, find_candidates, plain_name
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of, plain_name, split_brackets
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds import KINDS

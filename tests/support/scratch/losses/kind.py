@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.files.columns import Quantity, find_columns, require_column
-from bowdenfit.files.csv_table import read_csv
+from bowdenfit.files.tables import read_csv
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.table_files import TableFromFiles
 from bowdenfit.types import Vector

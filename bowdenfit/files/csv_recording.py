@@ -1,10 +1,14 @@
-"""Recordings in CSV files and their relatives, a million rows and more."""
+"""Recordings in CSV files and their relatives, a million rows and more.
+
+The first lines tell encoding, separator, decimal mark and headings (`start_of`). Then pandas reads all rows but the last
+few, which are read cell by cell, because statistics and remarks may stand below the data and the file may break off there.
+"""
 
 import csv
 import io
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,26 +16,38 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import MISSING
-from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.csv_account import account_of_csv
-from bowdenfit.files.csv_rows import cells_of
-from bowdenfit.files.csv_start import Sheet, start_of
-from bowdenfit.files.layout import is_summary
-from bowdenfit.files.libraries import load
-from bowdenfit.files.outcome import UnreadNames, channel_file, refuse_larger, refuse_too_large
+from bowdenfit.files.channels import ChannelFile, UnreadNames, channel_file, load, refuse_larger, refuse_too_large
+from bowdenfit.files.clocks import with_rate
+from bowdenfit.files.headings import Heading, heading_of
+from bowdenfit.files.layout import Layout, is_summary, layout_of
 from bowdenfit.files.pieces import rises
-from bowdenfit.files.sheet_cells import DATA, EMPTY, SPACE, SheetRows, cells_of_sheet
-from bowdenfit.files.sheet_columns import columns_of
-from bowdenfit.files.sheets import channels_of, with_rate
+from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT, RowAccount, account_of
+from bowdenfit.files.sheet_columns import (
+    DATA,
+    EMPTY,
+    SPACE,
+    SheetColumns,
+    SheetRows,
+    cells_of_sheet,
+    channels_of,
+    columns_of,
+)
 from bowdenfit.files.text_file import (
+    SEPARATORS,
+    CsvRecord,
     Line,
     Section,
+    cells_of,
     comment_mark,
+    declared_separator,
     first_bytes,
+    first_lines,
     is_blank,
     last_lines,
     lines_between,
+    records,
     rows_before,
+    too_many_cells,
 )
 
 LARGEST_BYTES = 2 << 30
@@ -42,6 +58,36 @@ _FEW_BYTES = 1 << 16  # of data; cell by cell they take 0.03 s, and pandas 0.2 s
 _ROWS_AT_ONCE = 200_000
 _MANY_ROWS = 1 << 22
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
+_CUT = "the file breaks off there"
+_FIRST_LINES = 300
+_HEADING_LINES = 12
+# Equal readings of a file are decided by the order; "1,2" is two numbers before it is one with a decimal comma.
+_HABITS = (*((s, d) for s in SEPARATORS for d in ".," if (s, d) != (",", ",")), (",", ","))
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What the first lines of a file tell about all of it.
+
+    Args:
+        encoding: Name of the encoding.
+        separator: What stands between columns; a blank for any run of blanks and tabs.
+        decimal: Decimal mark.
+        start: Where the data start [bytes].
+        layout: Headings and kinds of the columns.
+        metadata: The lines above the data.
+        headings: Rows of the headings and their units.
+        above: Why the other rows above the data are not read, and what they say, by their numbers.
+    """
+
+    encoding: str
+    separator: str
+    decimal: str
+    start: int
+    layout: Layout
+    metadata: tuple[str, ...]
+    headings: tuple[int, ...]
+    above: dict[int, tuple[str, str]]
 
 
 def read(path: Path) -> ChannelFile:
@@ -174,3 +220,105 @@ def _is_cut(lines: Sequence[Line], separator: str) -> bool:
         return True
     ends = [row[-1].strip() for row in whole if len(row) == len(last)]
     return bool(ends) and (len(last[-1].strip()) < min(map(len, ends)) or last[-1].strip()[-1:] in {*"eE+-"})
+
+
+def start_of(path: Path, data: bytes) -> Sheet:
+    """What the first bytes of a file tell.
+
+    Raises:
+        DatasetError: They are no text, or hold no numbers in columns.
+    """
+    encoding, lines = first_lines(data, path.name, whole=False, most=_FIRST_LINES)
+    if len(lines) > 1 and not lines[-1].ended:
+        lines = lines[:-1]
+    every = lines
+    declared, lines = declared_separator(lines, path.name)
+    texts = [line for line in lines if not comment_mark(line.text)]
+    rows = {s: list(records(texts, s, _HEADING_LINES)) for s in _separators(texts, declared)}
+    readings = [(layout_of([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
+    layouts = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
+    if not layouts:
+        raise DatasetError(
+            f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
+        )
+    layout, separator, decimal = max(layouts, key=lambda reading: _worth(reading[0]))
+    below = rows[separator][layout.start :]
+    above = [line for line in lines if line.start < below[0].start]
+    layout = _fitting(path, layout, below, separator, above)
+    over = tuple(rows[separator][i].row for i in layout.over)
+    others = {line.row: _why_above(line) for line in every if line.start < below[0].start and line.row not in over}
+    return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
+
+
+def _worth(layout: Layout) -> tuple[bool, bool, int]:
+    """How much speaks for a reading: headings in words that have room for all columns, any such, and numbers."""
+    named = layout.named and layout.fits
+    return named and not layout.by_numbers, named, layout.score
+
+
+def _why_above(line: Line) -> tuple[str, str]:
+    if is_blank(line.text):
+        return BLANK, ""
+    return (COMMENT, "") if comment_mark(line.text) else (ABOVE, " ".join(line.text.split()))
+
+
+def _separators(lines: Sequence[Line], declared: str | None) -> list[str]:
+    """What may separate the columns; of those that stand nowhere, which all make one column, the first, and blanks."""
+    return [
+        separator
+        for separator in SEPARATORS
+        if declared in (None, separator)
+        and (separator in (declared, SEPARATORS[0], " ") or any(separator in line.text for line in lines))
+    ]
+
+
+def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
+    """The layout with as many headings as columns; headings may stand in a comment.
+
+    Raises:
+        DatasetError: A row has more cells than there are headings.
+    """
+    if separator == " " and layout.named and layout.heading_cells != len(layout.kinds):
+        return _from_comment(layout, separator, above)
+    for row in () if layout.fits else below:
+        too_many_cells(path.name, row.row, row.cells, layout.room)
+    return layout.inside if layout.named else _from_comment(layout, separator, above)
+
+
+def _from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
+    width = len(layout.kinds)
+    for line in reversed([line for line in above if comment_mark(line.text)]):
+        cells = cells_of(line.text.strip().lstrip("#% "), separator)
+        if len(cells) == width and all(cell.strip() for cell in cells):
+            return replace(layout, named=True, headings=tuple(map(heading_of, cells)))
+    return replace(layout, named=False, headings=tuple(Heading(f"column{i + 1}") for i in range(width)))
+
+
+def account_of_csv(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:
+    """The account of a file.
+
+    Args:
+        path: The file.
+        sheet: What its first lines tell.
+        columns: What its last rows hold, which were read one by one.
+        quick: Where the rows end that were read at once [bytes], and how many these are.
+        stop: Where the last whole row ends [bytes].
+    """
+    end, rows = quick
+    size = path.stat().st_size
+    first = rows_before(path, sheet.start) + 1
+    reasons = {**sheet.above, **columns.left_out}
+    if end > sheet.start and rows_before(path, end) - first + 1 != rows:
+        texts = enumerate(lines_between(path, sheet.encoding, sheet.start, end), start=first)
+        reasons |= {row: (BLANK, "") for row, text in texts if not text.strip()}
+    total = rows_before(path, size) + (0 if _ends(path, size) else 1)
+    if stop < size:
+        reasons |= dict.fromkeys(range(rows_before(path, stop) + 1, total + 1), (_CUT, ""))
+    return account_of(path.name, total, sheet.headings, reasons, columns.beside)
+
+
+def _ends(path: Path, size: int) -> bool:
+    """Whether the last line has an end."""
+    with path.open("rb") as file:
+        file.seek(max(size - 2, 0))
+        return file.read().rstrip(b"\0").endswith((b"\n", b"\r"))

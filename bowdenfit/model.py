@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bowdenfit.cable.cable import Cable, constant_angle_name
-from bowdenfit.cable.groups import split_coefficient
-from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.registry import split_coefficient
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import (
     Description,

@@ -1,7 +1,7 @@
 """Names of array types; jaxtyping checks the shapes while testing, and costs nothing in use.
 
 Only NumPy types live here, so that reading and checking tables never waits for JAX to load. Functions of JAX arrays
-write `Float[Array, "..."]` themselves.
+write `Float[Array, "..."]` themselves. `Other...` and `Chosen...` are for functions that take arrays of several lengths.
 """
 
 from typing import TypeAlias
@@ -14,3 +14,8 @@ Flags: TypeAlias = Bool[np.ndarray, " rows"]
 Labels: TypeAlias = Int[np.ndarray, " rows"]
 Matrix: TypeAlias = Float[np.ndarray, "rows columns"]
 ChainDraws: TypeAlias = Float[np.ndarray, "chain draw"]
+OtherVector: TypeAlias = Float[np.ndarray, " other"]
+OtherLabels: TypeAlias = Int[np.ndarray, " other"]
+ChosenVector: TypeAlias = Float[np.ndarray, " chosen"]
+ChosenFlags: TypeAlias = Bool[np.ndarray, " chosen"]
+Positions: TypeAlias = Int[np.ndarray, " chosen"]

@@ -12,9 +12,8 @@ from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
 from bowdenfit.cable.friction import FrictionModel, friction_options
-from bowdenfit.cable.groups import coefficient_of
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
-from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, load_class
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, coefficient_of, load_class
 from bowdenfit.description import Contact, Description, PriorDefaults
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter

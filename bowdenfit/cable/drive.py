@@ -18,7 +18,7 @@ from jaxtyping import Float
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.friction import FrictionModel
-from bowdenfit.cable.load_cells import LoadCells
+from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 

@@ -1,9 +1,10 @@
-"""Contact laws and curve families by name, and where their classes stand.
+"""Contact laws and curve families by name, where their classes stand, and names of the coefficients of groups.
 
 Nothing is loaded before a cable needs it, so that a description can be judged without JAX. A new one is one line here, with
 the place of its class as "module:Class".
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -52,3 +53,14 @@ def load_class(class_path: str) -> Any:
     """The class at a place such as "bowdenfit.cable.laws:Capstan"."""
     module, _, name = class_path.partition(":")
     return getattr(import_module(module), name)
+
+
+def coefficient_of(friction: str, group: str) -> str:
+    """Name of a group's coefficient, such as "mu[new rope]"."""
+    return f"{friction}[{group}]"
+
+
+def split_coefficient(name: str, whole: Collection[str]) -> tuple[str, str]:
+    """The coefficient and the group of such a name; no group of one that is whole."""
+    stem, _, group = name.removesuffix("]").partition("[")
+    return (name, "") if name in whole else (stem, group)

@@ -5,12 +5,17 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from bowdenfit.description.contacts import Contact, Route, WrapAngle
+from bowdenfit.description.cable_parts import CableSettings, Contact, PreloadSettings, Route, StretchSettings, WrapAngle
 from bowdenfit.description.defaults import PriorDefaults, Sampler, SamplerSettings, Sensors
-from bowdenfit.description.elastic import PreloadSettings, StretchSettings
-from bowdenfit.description.recordings import ForceLimits, Phase, Preparation, RecordingFile
-from bowdenfit.description.sizes import CableSettings
-from bowdenfit.description.tables import Table, Tables, TableSettings
+from bowdenfit.description.measurements import (
+    ForceLimits,
+    Phase,
+    Preparation,
+    RecordingFile,
+    Table,
+    Tables,
+    TableSettings,
+)
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,

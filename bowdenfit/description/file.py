@@ -1,15 +1,17 @@
-"""Reading `cable.toml`: settings from the command line on top, and errors that name the key and the nearest known one."""
+"""Reading `cable.toml`: settings from the command line on top, and errors that name the key and the nearest known one.
+
+A description in which the template's placeholders still stand is refused by `find_placeholders`.
+"""
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from bowdenfit.description import Description, ParameterSetting, QuantityValue, Route
-from bowdenfit.description.elastic import check_elastic
-from bowdenfit.description.shares import check_shares
+from bowdenfit.description.cable_parts import check_elastic, check_shares
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
@@ -20,6 +22,18 @@ _FLEET = "fleet.toml"  # stands in the folder of many cables, which have no desc
 
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
+
+PLACEHOLDERS = {
+    "NAME OF THE CABLE": "what the cable is called",
+    "WHO MEASURED IT, WHEN, ON WHICH BENCH": "where the numbers come from, or delete the line",
+    "SHORTEST": "the shortest length at which the angles were measured, a number",
+    "LONGEST": "the longest length at which the angles were measured, a number",
+    "WRAP ANGLE": "the angle, a number in the unit beside it",
+}
+"""By what is to be written in their place."""
+
+Place = tuple[str | int, ...]
+"""The keys that lead to a value."""
 
 
 def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:
@@ -163,3 +177,31 @@ def _set(raw: dict[str, Any], override: str) -> None:
     if isinstance(node, list):
         raise DescriptionError(f"--set {override!r}: {key} is a list; name an entry by its number, from 0.")
     node[last] = value
+
+
+def find_placeholders(raw: Mapping[str, Any], text: str, file: str) -> dict[Place, DescriptionError]:
+    """The placeholders of the template that were left in a description, by where they stand.
+
+    Args:
+        raw: Its plain data.
+        text: Its text, in which the lines are looked up.
+        file: Its file.
+    """
+    faults = {}
+    for place, value in _strings(raw):
+        if value in PLACEHOLDERS:
+            lines = [i for i, line in enumerate(text.splitlines(), start=1) if value in line.partition("#")[0]]
+            where = f"{file}, line {lines[0]}" if lines else f"{file}, {'.'.join(map(str, place))}"
+            what = f"{where}: {shown(value)} is left from the template; write {PLACEHOLDERS[value]}."
+            faults[place] = DescriptionError(what)
+            faults[place].key_path = place
+    return faults
+
+
+def _strings(raw: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:
+    """Every text in plain data, with the keys that lead to it."""
+    if isinstance(raw, str):
+        yield place, " ".join(raw.split())
+    elif isinstance(raw, dict | list):
+        for key, value in raw.items() if isinstance(raw, dict) else enumerate(raw):
+            yield from _strings(value, (*place, key))

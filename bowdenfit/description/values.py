@@ -135,3 +135,17 @@ class FrictionSetting(ParameterSetting):
     """The same for a friction coefficient, which cannot be negative."""
 
     fixed: NonNegative | None = None
+
+
+
+
+
+
+
+
+
+
+
+
+
+

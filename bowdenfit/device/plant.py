@@ -2,18 +2,23 @@ r"""A pull-pull loop between motor and joint as a plant stepped through time, al
 
 Each half passes :math:`S(d) = K d + \text{clip}(K d, \pm P r)` for a twist d: twice the stiffness of the loop while both
 sides are taut, and half of that once the return side is slack. The node holds still while the torque at the joint lies
-inside the band of the loop, and slides along its limits otherwise: the loop's play operator, whatever moves.
+inside the band of the loop, and slides along its limits otherwise: the loop's play operator, whatever moves. The quantities of
+a device are drawn from what is known of them (`draw_device`).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from bowdenfit.description.device import Known
 from bowdenfit.physics.stretch import mean_tension
 
 Numbers: TypeAlias = Any  # an array over runs, of JAX or NumPy, or one number for all of them
+_MAX_REDRAWS = 200
 
 
 @jax.tree_util.register_dataclass
@@ -181,3 +186,34 @@ def mechanical_energy(plant: Plant, motion: Motion) -> Numbers:
     kinetic = plant.motor_inertia * motion.motor_speed**2 + plant.joint_inertia * motion.joint_speed**2
     loop = plant.loop
     return kinetic / 2 + loop.half_energy(motion.motor - motion.node) + loop.half_energy(motion.node - motion.joint)
+
+
+def draw_device(known: Mapping[str, Known], n: int, seed: int) -> dict[str, np.ndarray]:
+    """Draw every quantity `n` times; a quantity that is set is constant.
+
+    Draws of a fit are picked alike for all quantities that it tells, and what they hold besides is taken from them.
+
+    Args:
+        known: Quantities by key.
+        n: Number of draws.
+        seed: Of the fit.
+    """
+    draws = {
+        key: _draw_truncated_normal(quantity, np.random.default_rng([seed, 41, *key.encode()]), n)
+        for key, quantity in known.items()
+    }
+    for key, quantity in known.items():
+        if quantity.draws:
+            picked = np.array(quantity.draws)[np.random.default_rng([seed, 47]).integers(len(quantity.draws), size=n)]
+            draws[key] = np.maximum(picked - draws.get(quantity.beside, 0.0), 0.0)
+    return draws
+
+
+def _draw_truncated_normal(known: Known, generator: np.random.Generator, n: int) -> np.ndarray:
+    draws = known.value + known.sd * generator.standard_normal(n)
+    for _ in range(_MAX_REDRAWS):
+        below = draws < 0
+        if not below.any():
+            break
+        draws[below] = known.value + known.sd * generator.standard_normal(int(below.sum()))
+    return np.maximum(draws, 0.0)

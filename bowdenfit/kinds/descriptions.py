@@ -8,8 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError, create_model
 
 from bowdenfit.description import BY_GROUP, Description, Table, Tables
-from bowdenfit.description.file import check_quantities, read_toml, validate
-from bowdenfit.description.placeholders import Place, find_placeholders
+from bowdenfit.description.file import Place, check_quantities, find_placeholders, read_toml, validate
 from bowdenfit.description.values import Frozen
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError, Faults, suggest_name

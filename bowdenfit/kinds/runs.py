@@ -11,8 +11,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.row_angles import resolve_angles
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, InsideRuns, SlidingRows, list_readings_inside_runs
 from bowdenfit.kinds.term import round_up_count

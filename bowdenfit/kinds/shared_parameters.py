@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from bowdenfit.cable.elasticity import RopeScales, preload_parameter, rope_parameters
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.sensors import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.description import Description
 from bowdenfit.kinds.tables import LoopTable, PreloadTable, StretchTable
 from bowdenfit.kinds.term import Circumstances

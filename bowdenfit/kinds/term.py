@@ -24,7 +24,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.noise import NoiseLaw, noise_law, scatter
+from bowdenfit.cable.sensors import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles

@@ -20,7 +20,7 @@ from bowdenfit.cable.elasticity import (
     STRETCH_ZERO,
 )
 from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
-from bowdenfit.cable.load_cells import (
+from bowdenfit.cable.sensors import (
     BLOCK_NOISE,
     DELAY_ERROR,
     FORCE_NOISE,

@@ -189,7 +189,7 @@ def play_operator(
     y = g(F_out): while pulling the output follows at :math:`x - \Lambda`, on the return at :math:`x + \Lambda`, and in
     between it stands still, however the input moves inside the band. It remembers noise peaks of the input as if the rope
     had moved: average recordings down to the mechanical bandwidth first, and smooth the input as in
-    `bowdenfit.recordings.preparation.input_smoothing`.
+    `bowdenfit.recordings.preparation.hysteresis`.
 
     The slope is that of the limit that was touched last, where it was touched: kept while the output stands still, and 0
     before the rope has slid at all.

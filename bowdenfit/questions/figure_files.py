@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import write_all
-from bowdenfit.results.figures_folder import write_captions
+from bowdenfit.results.answer_cache import write_captions
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from bowdenfit.cable.groups import coefficient_of
+from bowdenfit.cable.registry import coefficient_of
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.results.record import Record, cached_per_fit

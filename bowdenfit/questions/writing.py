@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import StoreError
 from bowdenfit.plots.write import FORMATS
-from bowdenfit.results.figures_folder import copy_captions
+from bowdenfit.results.answer_cache import copy_captions
 from bowdenfit.results.folder import fill_folder_atomically, is_empty, write_text
 
 if TYPE_CHECKING:

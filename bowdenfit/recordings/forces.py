@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bowdenfit.description.pulleys import Pulleys
+from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.pieces import same

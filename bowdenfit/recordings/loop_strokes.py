@@ -8,9 +8,16 @@ import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play_between, white_noise
-from bowdenfit.recordings.preparation.robust import Deviations, robust_cost, robust_minimum
+from bowdenfit.recordings.preparation.hysteresis import (
+    Deviations,
+    Hysteresis,
+    clear_of_turns,
+    play_between,
+    robust_cost,
+    robust_minimum,
+    smooth_input,
+    white_noise,
+)
 from bowdenfit.recordings.recording import PULL, Blocks
 from bowdenfit.types import Flags, Labels, Vector
 

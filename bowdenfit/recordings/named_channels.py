@@ -1,8 +1,12 @@
-"""The channels of a recording by what they are: named by the user or found by their names, in internal units."""
+"""The channels of a recording by what they are: named by the user or found by their names, in internal units.
+
+What a recording was made at may stand in the name of its file (`match_name`).
+"""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +26,7 @@ WANTED = (
 TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _PATH = re.compile(r"[/.]")
+_FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 
 
 def rows_where(file: ChannelFile, where: Mapping[str, float]) -> ChannelFile:
@@ -187,3 +192,41 @@ def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
     return parse_sources(texts, "--channel", [quantity.name for quantity in (*WANTED, *TORQUES)])
+
+
+def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
+    """Names and units of the quantities in a pattern such as "{at}mm_{velocity:r/min}rpm".
+
+    Raises:
+        DatasetError: A name stands there twice.
+    """
+    fields = tuple(_FIELD.findall(pattern))
+    names = [name for name, _ in fields]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DatasetError(
+            f"cable.toml, tables.recordings.pattern: {shown(pattern)} has {{{twice}}} twice; keep one of them, and put * in "
+            "the place of the other."
+        )
+    return fields
+
+
+def match_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
+    """What a file's name says by a pattern such as "{at}mm_{velocity:r/min}rpm": text and unit by quantity.
+
+    Raises:
+        DatasetError: The name does not follow the pattern.
+    """
+    fields = pattern_fields(pattern)
+    expression = re.escape(pattern).replace(r"\*", ".*")
+    for name, unit in fields:
+        written = re.escape("{" + name + (f":{unit}" if unit else "") + "}")
+        kind = r".+?" if name == "run" else r"[+-]?[0-9]+(?:[.,][0-9]+)?"
+        expression = expression.replace(written, f"(?P<{name}>{kind})", 1)
+    match = re.fullmatch(expression, path.stem) or re.fullmatch(expression, path.name)
+    if match is None:
+        raise DatasetError(
+            f"{path.name} does not follow the pattern {shown(pattern)} of the recordings in cable.toml; correct one of them, "
+            "or describe the file in a [[recording]] of its own."
+        )
+    return {name: (match[name].replace(",", "."), unit) for name, unit in fields}

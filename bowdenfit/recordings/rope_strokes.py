@@ -1,4 +1,7 @@
-"""What a recording of a single rope says of its phases: the capstan's play operator, with drag, that follows it best."""
+"""What a recording of a single rope says of its phases: the capstan's play operator, with drag, that follows it best.
+
+A recording without a reversal has no loop; other signs say where its rope slides (`sliding_one_way`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,10 +11,15 @@ import numpy as np
 
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError
-from bowdenfit.recordings.one_way import refuse_dead, sliding_one_way
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.play import Hysteresis, clear_of_turns, play, white_noise
-from bowdenfit.recordings.preparation.robust import Deviations, robust_minimum
+from bowdenfit.recordings.preparation.hysteresis import (
+    Deviations,
+    Hysteresis,
+    clear_of_turns,
+    play,
+    robust_minimum,
+    smooth_input,
+    white_noise,
+)
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent
@@ -25,6 +33,11 @@ _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction o
 _COST_OF_NOISE = 1.5  # cost up to which a loop follows its recording as well as noise lets it
 _ONE_PHASE = 4.0  # spread of the log ratio, in units of its noise, below which there is only one phase
 _LARGEST_GAIN_ERROR = 0.1  # log ratio that a bad calibration of load cells may add: ten times what their data sheets state
+_WINDOW, _SHARE = 5, 20  # least blocks on both sides over which a force must rise, and one part in so many of the recording
+_SURELY_RISES = 4.0  # standard errors by which it must
+_STILL = 0.05  # fraction of the highest speed below which the motor is taken to stand
+_FOLLOWS = 0.5  # correlation, and share of the output's variance that friction explains, below both of which it does not
+_CHANGES = 3.0  # spread of the input, in units of its noise, from which the output could follow it
 
 
 def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
@@ -63,6 +76,91 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     deviation, followed, state = _follow(force_in, likely, force_out, exponent, middle, drag)
     state = clear_of_turns(state, likely)
     return Hysteresis(force_in, force_out, exponent, middle, drag, deviation, followed, state, cost / len(few_in))
+
+
+def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
+    """Half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
+    pull, back = ratio[state == PULL], ratio[state == RETURN]
+    if not len(pull) or not len(back):
+        one = pull if len(pull) else -back
+        return max(float(np.median(one)) if len(one) else 0.0, _LEAST_EXPONENT), 0.0
+    upper, lower = float(np.median(pull)), float(np.median(back))
+    return max((upper - lower) / 2, _LEAST_EXPONENT), (upper + lower) / 2
+
+
+def _follow(
+    force_in: Vector, likely: Vector, force_out: Vector, exponent: float, center: float, drag: float
+) -> tuple[Vector, Vector, Labels]:
+    """Deviation of the output from the operator, the operator's output, and its contact.
+
+    The operator follows the likely input force; where the rope slides, the reading's noise is in its output as it is.
+    """
+    x, moved, y = (np.log(force + drag) for force in (force_in, likely, force_out))
+    followed, state = play(moved, exponent, float(y[0] + center))
+    followed += np.where(state != 0, x - moved, 0.0)
+    return y + center - followed, followed, state
+
+
+def _residuals(
+    force_in: Vector, likely: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
+) -> Deviations:
+    """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
+
+    Args:
+        force_in, likely, force_out: Forces [N].
+        noise: Standard deviations of the forces [N].
+        level: Force that drag is measured in [N].
+        p: Friction exponent, center, and drag over the level.
+    """
+    drag = level * float(p[2])
+    deviation, _, state = _follow(force_in, likely, force_out, float(p[0]), float(p[1]), drag)
+    touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    known, one_in, one_out = touched >= 0, 1 / (force_in + drag), 1 / (force_out + drag)
+    one_followed = np.where(state != 0, one_in, 1 / (likely + drag)[touched])
+    scale = np.hypot(noise[0] * one_in, noise[1] * one_out)
+    by_drag = one_out - np.where(known, one_followed, one_out[0])
+    by_drag += deviation * (noise[0] ** 2 * one_in**3 + noise[1] ** 2 * one_out**3) / scale**2
+    slopes = np.stack([np.where(known, state[touched], 0), known, level * by_drag], axis=1) / scale[:, None]
+    weak = np.sqrt(len(force_in)) * 0.1
+    prior = np.diag([0.0, weak / _GAIN_SD, weak])[1:]
+    return np.append(deviation / scale, prior @ p), np.vstack([slopes, prior])
+
+
+def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
+    """Contact of each block, where the recording has no reversal also by other signs that the rope slides.
+
+    Friction lets the output rise while the input does only if the rope slides; and where the motor moves, the rope slides
+    whatever the forces do, even if they stay the same.
+
+    Args:
+        loop: What the play operator finds.
+        velocity: Of the blocks; NaN where it is not known.
+    """
+    ratio = np.log(loop.force_in / loop.force_out)
+    if RETURN in loop.state or np.median(ratio) <= 0:
+        return loop.state
+    known = np.isfinite(velocity)
+    highest = np.max(np.abs(velocity[known]), initial=0.0)
+    signs = set(np.sign(velocity[known & (np.abs(velocity) > _STILL * highest)]).tolist())
+    if len(signs) > 1:
+        return loop.state
+    moves = known & (np.abs(velocity) > _STILL * highest) if highest > 0 else np.zeros(len(known), dtype=bool)
+    rises = _rises(loop.force_in) & _rises(loop.force_out)
+    return np.where(moves | (rises & ~known), PULL, loop.state)
+
+
+def _rises(force: Vector) -> Flags:
+    """Where a force is clearly higher after a block than before it."""
+    n, window = len(force), max(_WINDOW, len(force) // _SHARE)
+    if n <= 2 * window:
+        return np.zeros(n, dtype=bool)
+    total = np.append(0.0, np.cumsum(force))
+    at = np.arange(n)
+    before, after = np.maximum(at - window, 0), np.minimum(at + window, n - 1)
+    earlier = (total[at + 1] - total[before]) / (at + 1 - before)
+    later = (total[after + 1] - total[at]) / (after + 1 - at)
+    error = white_noise(force) * np.sqrt(1 / (at + 1 - before) + 1 / (after + 1 - at))
+    return later - earlier > _SURELY_RISES * error
 
 
 @dataclass(frozen=True)
@@ -153,54 +251,6 @@ class RopeStrokes:
         return *_plain_loop(ratio, state), loop.lost, _remarks(name, strokes, loop)
 
 
-def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
-    """Half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
-    pull, back = ratio[state == PULL], ratio[state == RETURN]
-    if not len(pull) or not len(back):
-        one = pull if len(pull) else -back
-        return max(float(np.median(one)) if len(one) else 0.0, _LEAST_EXPONENT), 0.0
-    upper, lower = float(np.median(pull)), float(np.median(back))
-    return max((upper - lower) / 2, _LEAST_EXPONENT), (upper + lower) / 2
-
-
-def _follow(
-    force_in: Vector, likely: Vector, force_out: Vector, exponent: float, center: float, drag: float
-) -> tuple[Vector, Vector, Labels]:
-    """Deviation of the output from the operator, the operator's output, and its contact.
-
-    The operator follows the likely input force; where the rope slides, the reading's noise is in its output as it is.
-    """
-    x, moved, y = (np.log(force + drag) for force in (force_in, likely, force_out))
-    followed, state = play(moved, exponent, float(y[0] + center))
-    followed += np.where(state != 0, x - moved, 0.0)
-    return y + center - followed, followed, state
-
-
-def _residuals(
-    force_in: Vector, likely: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
-) -> Deviations:
-    """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
-
-    Args:
-        force_in, likely, force_out: Forces [N].
-        noise: Standard deviations of the forces [N].
-        level: Force that drag is measured in [N].
-        p: Friction exponent, center, and drag over the level.
-    """
-    drag = level * float(p[2])
-    deviation, _, state = _follow(force_in, likely, force_out, float(p[0]), float(p[1]), drag)
-    touched = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
-    known, one_in, one_out = touched >= 0, 1 / (force_in + drag), 1 / (force_out + drag)
-    one_followed = np.where(state != 0, one_in, 1 / (likely + drag)[touched])
-    scale = np.hypot(noise[0] * one_in, noise[1] * one_out)
-    by_drag = one_out - np.where(known, one_followed, one_out[0])
-    by_drag += deviation * (noise[0] ** 2 * one_in**3 + noise[1] ** 2 * one_out**3) / scale**2
-    slopes = np.stack([np.where(known, state[touched], 0), known, level * by_drag], axis=1) / scale[:, None]
-    weak = np.sqrt(len(force_in)) * 0.1
-    prior = np.diag([0.0, weak / _GAIN_SD, weak])[1:]
-    return np.append(deviation / scale, prior @ p), np.vstack([slopes, prior])
-
-
 def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
     remarks = []
     if not strokes:
@@ -220,3 +270,29 @@ def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
             "offset_sd, or tare the recording."
         )
     return tuple(remarks)
+
+
+def refuse_dead(force_in: Vector, force_out: Vector, file: str, name: str, loop: Hysteresis | None = None) -> None:
+    """Refuse a recording whose output does not follow its input.
+
+    Args:
+        force_in, force_out: Forces of the blocks [N].
+        file: File name, for errors.
+        name: Name of the recording.
+        loop: What friction makes of them; None where that cannot be said.
+
+    Raises:
+        DatasetError: The input changes, the output hardly with it, and friction does not explain it.
+    """
+    if len(force_in) < 2 or not np.std(force_in) > _CHANGES * white_noise(force_in):
+        return
+    alike = float(np.corrcoef(force_in, force_out)[0, 1]) if np.ptp(force_out) > 0 else 0.0
+    spread = float(np.var(np.log(loop.force_out + loop.lost))) if loop is not None else 0.0
+    explained = 1 - float(np.var(loop.deviation)) / spread if loop is not None and spread > 0 else 0.0
+    if alike < _FOLLOWS and explained < _FOLLOWS:
+        raise DatasetError(
+            f"{file}: the output does not follow the input in {name!r}: correlation {alike:.2f}, while the input goes from "
+            f"{force_in.min():.4g} to {force_in.max():.4g} N and the output from {force_out.min():.4g} to "
+            f"{force_out.max():.4g} N. The usual causes are a dead load cell, another channel than meant, and a rope that "
+            "never slid; map the right channel, or leave the recording out."
+        )

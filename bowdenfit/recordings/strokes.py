@@ -10,10 +10,9 @@ import numpy as np
 from bowdenfit.description import Description, Phase
 from bowdenfit.errors import DatasetError
 from bowdenfit.recordings.loop_strokes import LoopStrokes
-from bowdenfit.recordings.one_way import refuse_dead
 from bowdenfit.recordings.preparation.noise import autocorrelation
 from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
-from bowdenfit.recordings.rope_strokes import RopeStrokes
+from bowdenfit.recordings.rope_strokes import RopeStrokes, refuse_dead
 from bowdenfit.types import Flags, Labels, Vector
 
 _FEWEST = 10  # blocks

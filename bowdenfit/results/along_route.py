@@ -11,8 +11,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.cable.noise import noise_law
+from bowdenfit.cable.sensors import RUN_SCATTER, noise_law
 from bowdenfit.description import Description, Route
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import DrawFunction, curves_at, for_each_draw

@@ -17,7 +17,7 @@ from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
-from bowdenfit.results.figures_folder import record_drawn_figures, write_captions
+from bowdenfit.results.answer_cache import record_drawn_figures, write_captions
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit, write_text
 from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable

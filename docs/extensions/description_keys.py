@@ -1,6 +1,6 @@
 """The directive `keys`: a list of the keys of one part of cable.toml, from the class that reads it.
 
-    ```{keys} bowdenfit.description.contacts:Route
+    ```{keys} bowdenfit.description.cable_parts:Route
     variable: what it says, in words
     ```
 

@@ -10,7 +10,7 @@ import numpy as np
 from benchmark_tables import Table, say
 
 from bowdenfit.physics.friction import play_operator
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.hysteresis import play
 from recordings.simulated import SEED, Simulated
 from recordings.timing import milliseconds
 

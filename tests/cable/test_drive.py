@@ -10,11 +10,11 @@ from elastic_cables import CONSTANT, HOUSING, elastic_cable
 from bowdenfit.cable.conditions import LEAST_SHARE, Conditions
 from bowdenfit.cable.drive import LEAST_EXPONENT, LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.friction import FrictionModel
-from bowdenfit.cable.load_cells import LoadCells
+from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import make_measured_cable as cable_of
 from bowdenfit.physics.friction import force_from_scale, force_scale
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.hysteresis import play
 
 N, EXPONENT, MOUNTING = 300, np.array([0.25, 0.4]), np.array([0.02, -0.03])
 ERRORS = {"input_offset": 0.7, "output_offset": -0.4, "gain_error": 0.03}

@@ -9,7 +9,7 @@ import pytest
 from cables import cable, measured
 from elastic_cables import TRUTH, bench, elastic_cable
 
-from bowdenfit.cable.load_cells import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, LoadCells
+from bowdenfit.cable.sensors import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, LoadCells
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import KINDS
 from bowdenfit.model import build_model

@@ -21,7 +21,7 @@ from raw_recordings import to_raw
 from scipy import stats
 
 import bowdenfit
-from bowdenfit.cable.load_cells import DELAY_ERROR
+from bowdenfit.cable.sensors import DELAY_ERROR
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings
 from bowdenfit.inference.log_density import LogDensity

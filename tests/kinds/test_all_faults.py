@@ -5,7 +5,7 @@ import re
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.description.placeholders import PLACEHOLDERS
+from bowdenfit.description.file import PLACEHOLDERS
 from bowdenfit.errors import DatasetError, Faults, combine_errors
 
 CABLE = """

@@ -15,8 +15,7 @@ from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.hysteresis import play, smooth_input
 from bowdenfit.recordings.recording import Recordings
 
 pytestmark = pytest.mark.extended

@@ -35,7 +35,7 @@ from bowdenfit.questions.simulate.bench import (
     simulate_recording,
 )
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.hysteresis import play
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.recordings.strokes import find_strokes
 

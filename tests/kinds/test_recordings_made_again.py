@@ -13,7 +13,7 @@ from bowdenfit.kinds.recordings.term import make_recordings_term, number_shared_
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
+from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recordings
 
 pytestmark = pytest.mark.extended

@@ -13,7 +13,7 @@ from cables import cable
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.cable.noise import NormalNoise, StudentNoise, noise_law, scatter
+from bowdenfit.cable.sensors import NormalNoise, StudentNoise, noise_law, scatter
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import find_maximum_posterior

@@ -17,7 +17,7 @@ from bowdenfit.questions.simulate.bench import (
     simulate_recording,
 )
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.preparation.play import play
+from bowdenfit.recordings.preparation.hysteresis import play
 
 STEPS, BAND = 300, 0.25
 

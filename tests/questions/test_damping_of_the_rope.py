@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bowdenfit.description.device import read_device
-from bowdenfit.device.draws import draw_device
+from bowdenfit.device.plant import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.questions.bends import ring_down

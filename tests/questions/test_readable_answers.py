@@ -24,7 +24,7 @@ from bowdenfit.questions.figures import FIGURES
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate, TargetQuantity
 from bowdenfit.questions.next.candidates import has_candidates
-from bowdenfit.results.figures_folder import CAPTIONS
+from bowdenfit.results.answer_cache import CAPTIONS
 
 pytestmark = pytest.mark.extended
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from bowdenfit.description import Preparation
-from bowdenfit.description.pulleys import Pulleys
+from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.files import csv_recording, pieces, read_channels
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.preparation.bandwidth import main_frequency
+from bowdenfit.recordings.preparation.blocks import main_frequency
 from bowdenfit.recordings.preparation.clock import spread_repeated
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.recordings.strokes import find_strokes

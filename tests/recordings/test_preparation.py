@@ -19,16 +19,20 @@ from bowdenfit.questions.simulate.bench import (
     MotorProfile,
     simulate_recording,
 )
-from bowdenfit.recordings.preparation import input_smoothing, prepare
-from bowdenfit.recordings.preparation.bandwidth import estimate_bandwidth, main_frequency
+from bowdenfit.recordings.preparation import hysteresis, prepare
+from bowdenfit.recordings.preparation.blocks import estimate_bandwidth, main_frequency
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread_repeated
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples, frozen, resolution, saturation, spikes
-from bowdenfit.recordings.preparation.noise import correlation_time, noise_about_trend, noise_of, quantum_of
-from bowdenfit.recordings.preparation.play import play
-from bowdenfit.recordings.preparation.rests import Rests, play_along_rows
-from bowdenfit.recordings.preparation.segments import Segments
-from bowdenfit.recordings.preparation.tare import estimate_tare
+from bowdenfit.recordings.preparation.hysteresis import play
+from bowdenfit.recordings.preparation.noise import (
+    correlation_time,
+    estimate_tare,
+    noise_about_trend,
+    noise_of,
+    quantum_of,
+)
+from bowdenfit.recordings.preparation.segments import Rests, Segments, play_along_rows
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.recordings.strokes import find_strokes
 
@@ -517,11 +521,11 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
 @pytest.mark.parametrize("blocks", [7, 8, 50, 1000])
 def test_the_input_is_smoothed_and_pooled_as_scipy_does(blocks):
     force = np.cumsum(np.random.default_rng(blocks).standard_normal(blocks)) + 0.1 * np.arange(blocks)
-    pooled = input_smoothing._isotonic(force)
+    pooled = hysteresis._isotonic(force)
     np.testing.assert_allclose(pooled, isotonic_regression(force).x, atol=1e-12)
     assert np.all(np.diff(pooled) >= 0) and np.any(pooled != force)
     level = np.tile([0.0, 1.0, 0.0, -1.0], blocks)[:blocks] + 1e-3 * force  # much noise, none of it beyond what may change
-    smooth = input_smoothing._smooth(level, 100.0)
+    smooth = hysteresis._smooth(level, 100.0)
     np.testing.assert_allclose(smooth, savgol_filter(level, 7, 2), atol=1e-12)
 
 

@@ -5,8 +5,7 @@ import pytest
 from scipy import optimize
 
 from bowdenfit.recordings import loop_strokes, rope_strokes
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.robust import robust_cost, robust_minimum
+from bowdenfit.recordings.preparation.hysteresis import robust_cost, robust_minimum, smooth_input
 
 pytestmark = pytest.mark.extended
 

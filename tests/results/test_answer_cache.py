@@ -17,7 +17,7 @@ from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figur
 from bowdenfit.questions.length.verb import VERB as LENGTH
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.questions.summary import figure_files
-from bowdenfit.results import figures_folder
+from bowdenfit.results import answer_cache
 from bowdenfit.results.answer_cache import SCHEMA, read_answers, write_answers
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
@@ -154,7 +154,7 @@ def edit_fit(folder, monkeypatch):
 
 
 def update_matplotlib(folder, monkeypatch):
-    monkeypatch.setattr(figures_folder, "installed_version", lambda _: "99.0")
+    monkeypatch.setattr(answer_cache, "installed_version", lambda _: "99.0")
 
 
 def leave_unnamed(folder, monkeypatch):

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation

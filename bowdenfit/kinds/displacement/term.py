@@ -13,8 +13,7 @@ from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import BEDDING_LOAD, BEDDING_STRETCH, STIFFNESS
-from bowdenfit.cable.load_cells import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions

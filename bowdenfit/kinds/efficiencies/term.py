@@ -12,8 +12,7 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, simulate_rows

@@ -11,8 +11,7 @@ from jax import Array
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import scatter
+from bowdenfit.cable.sensors import BLOCK_NOISE, FORCE_NOISE, RUN_SCATTER, LoadCells, scatter
 from bowdenfit.kinds.candidate import (
     STROKE_WORDS,
     UNKNOWN_SCATTER,

@@ -12,8 +12,7 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.next_run import ForceRunCandidates

@@ -14,8 +14,7 @@ from typing_extensions import override
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.elasticity import PRELOAD as REFERENCE_PRELOAD
 from bowdenfit.cable.elasticity import spread_matrix
-from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, choose_loads, simulate_rows
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload

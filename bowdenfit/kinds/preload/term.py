@@ -12,7 +12,7 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.cable.noise import noise_law
+from bowdenfit.cable.sensors import noise_law
 from bowdenfit.kinds.candidate import (
     UNKNOWN_SCATTER,
     Candidate,

@@ -21,8 +21,7 @@ from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import LoopDrive, RopeDrive
 from bowdenfit.description import Description
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, expected_forces
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.play import white_noise
+from bowdenfit.recordings.preparation.hysteresis import smooth_input, white_noise
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.types import Labels, Vector
 

@@ -18,8 +18,7 @@ from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.forces import to_recording
-from bowdenfit.recordings.name_patterns import match_name, pattern_fields
-from bowdenfit.recordings.named_channels import TORQUES, WANTED, rows_where, steady_value
+from bowdenfit.recordings.named_channels import TORQUES, WANTED, match_name, pattern_fields, rows_where, steady_value
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings

@@ -21,7 +21,7 @@ from typing_extensions import override
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
-from bowdenfit.cable.load_cells import BLOCK_NOISE, DELAY_ERROR, RUN_SCATTER, LoadCells
+from bowdenfit.cable.sensors import BLOCK_NOISE, DELAY_ERROR, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import (
@@ -53,8 +53,7 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
-from bowdenfit.recordings.preparation.play import clear_of_turns, last_contact, play
+from bowdenfit.recordings.preparation.hysteresis import clear_of_turns, last_contact, play, smooth_input
 from bowdenfit.recordings.recording import Blocks, Recording, Recordings, Strokes
 from bowdenfit.recordings.strokes import cable_of, find_strokes
 

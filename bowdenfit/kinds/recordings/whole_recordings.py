@@ -17,8 +17,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive, make_drive
-from bowdenfit.cable.load_cells import BLOCK_NOISE, RUN_SCATTER, LoadCells
-from bowdenfit.cable.noise import noise_law, scatter
+from bowdenfit.cable.sensors import BLOCK_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     WITHOUT_WEIGHT,

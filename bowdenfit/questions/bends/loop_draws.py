@@ -10,7 +10,7 @@ from jax import Array
 
 from bowdenfit.cable.drive import LEAST_EXPONENT
 from bowdenfit.cable.elasticity import PRELOAD
-from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.description.device import Device, missing_settings
 from bowdenfit.errors import DatasetError, DescriptionError, UsageError
 from bowdenfit.inference.draws import for_each_draw

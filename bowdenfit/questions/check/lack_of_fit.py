@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from bowdenfit.cable.load_cells import DELAY_ERROR
 from bowdenfit.cable.registry import CURVES
+from bowdenfit.cable.sensors import DELAY_ERROR
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.lack_of_fit import FALSE_ALARM, Departure
 from bowdenfit.kinds import describe_reading, find_readings

@@ -72,7 +72,7 @@ def show_priors(dataset: "Dataset", folder: str | Path, seed: int = 0) -> "Prior
     from bowdenfit.questions.check import prior_figure
     from bowdenfit.questions.check.prior_predictive import prior_predictive
     from bowdenfit.questions.figure_files import write_figure
-    from bowdenfit.results.figures_folder import copy_captions
+    from bowdenfit.results.answer_cache import copy_captions
     from bowdenfit.results.folder import fill_folder_atomically
 
     with jax.enable_x64(True):

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import jax
 import numpy as np
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.description import Description
 from bowdenfit.display import Display, Named, Rows, Several
 from bowdenfit.errors import UsageError

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from bowdenfit.description.device import Device, Known
-from bowdenfit.device.draws import draw_device
 from bowdenfit.device.limits import (
     LinearDevice,
     largest_safe_share,
@@ -14,6 +13,7 @@ from bowdenfit.device.limits import (
     safe_shares,
     stable_gain,
 )
+from bowdenfit.device.plant import draw_device
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends

@@ -9,7 +9,6 @@ import numpy as np
 import bowdenfit.questions.compensate.words  # noqa: F401  registers the text of the answer
 from bowdenfit.arguments import Bends
 from bowdenfit.description.device import ENCODER, Device, Known, missing_settings
-from bowdenfit.device.draws import draw_device
 from bowdenfit.device.limits import safe_shares
 from bowdenfit.device.motion import (
     Controller,
@@ -19,7 +18,7 @@ from bowdenfit.device.motion import (
     oscillating_path,
     simulate_device,
 )
-from bowdenfit.device.plant import LoopTransmission, Motion, Plant
+from bowdenfit.device.plant import LoopTransmission, Motion, Plant, draw_device
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.loop_draws import LoopDraws
 from bowdenfit.questions.bends.ring_down import device_with_ring_down

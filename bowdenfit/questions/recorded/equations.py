@@ -10,14 +10,14 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
-from bowdenfit.cable.load_cells import LoadCells
+from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.recordings.blocks import pad_columns
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
-from bowdenfit.recordings.preparation.input_smoothing import smooth_input
+from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recordings
 
 DRAWS = 200  # enough for the edges of a band

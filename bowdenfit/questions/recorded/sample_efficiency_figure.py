@@ -83,7 +83,7 @@ def sample_efficiencies(
 
 def _run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
     """Of each run: efficiency as expected, as measured, and the standard error of that from its readings alone."""
-    from bowdenfit.cable.load_cells import BLOCK_NOISE
+    from bowdenfit.cable.sensors import BLOCK_NOISE
     from bowdenfit.kinds.recordings.blocks import RECORDED
     from bowdenfit.questions.recorded.traces import QUANTILES
     from bowdenfit.recordings.recording import Recordings

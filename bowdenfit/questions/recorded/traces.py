@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
-from bowdenfit.cable.noise import noise_law
+from bowdenfit.cable.sensors import RUN_SCATTER, noise_law
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.questions.recorded.equations import DRAWS, RecordingFollower, choose_blocks
 from bowdenfit.recordings.recording import Recording, Recordings

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bowdenfit.cable.cable import ANGLE_NOISE, Cable
-from bowdenfit.cable.load_cells import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
+from bowdenfit.cable.sensors import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, RUN_SCATTER
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.descriptions import design_without_recordings
 from bowdenfit.kinds.tables import AngleSettings, AngleTable, Measurements

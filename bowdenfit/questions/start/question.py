@@ -11,7 +11,7 @@ from typing import Generic, Protocol, TypeVar, runtime_checkable
 from pydantic import TypeAdapter, ValidationError
 
 from bowdenfit.description import RESERVED_NAMES, Contact, Name
-from bowdenfit.description.placeholders import PLACEHOLDERS
+from bowdenfit.description.file import PLACEHOLDERS
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, UsageError, suggest_name
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.parameters.space import Parameter

@@ -4,7 +4,7 @@ from math import isfinite
 from typing import Any
 
 from bowdenfit.cable.curves import Curve
-from bowdenfit.cable.load_cells import RUN_SCATTER
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import KINKED, Estimate
 from bowdenfit.kinds import find_readings

@@ -11,7 +11,7 @@ from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.plots.write import FORMATS, PNG
 from bowdenfit.questions import summary
 from bowdenfit.questions.writing import Files
-from bowdenfit.results.figures_folder import captions_if_unchanged, copy_captions, write_captions
+from bowdenfit.results.answer_cache import captions_if_unchanged, copy_captions, write_captions
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
 from bowdenfit.results.folder import fill_folder_atomically
 

@@ -6,7 +6,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.load_cells import FORCE_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.table import ForceTable

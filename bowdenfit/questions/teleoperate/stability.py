@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from bowdenfit.description.device import ENCODER, Device, Known, missing_settings
-from bowdenfit.device.draws import draw_device
 from bowdenfit.device.motion import Hand
-from bowdenfit.device.plant import LoopTransmission, Plant
+from bowdenfit.device.plant import LoopTransmission, Plant, draw_device
 from bowdenfit.device.teleoperation import (
     CouplingGains,
     MasterController,

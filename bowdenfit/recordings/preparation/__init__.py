@@ -11,8 +11,14 @@ import numpy as np
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import pieces
-from bowdenfit.recordings.preparation.bandwidth import estimate_bandwidth, main_frequency
-from bowdenfit.recordings.preparation.blocks import CommonClock, average_blocks, choose_block_samples, refuse_too_long
+from bowdenfit.recordings.preparation.blocks import (
+    CommonClock,
+    average_blocks,
+    choose_block_samples,
+    estimate_bandwidth,
+    main_frequency,
+    refuse_too_long,
+)
 from bowdenfit.recordings.preparation.checks import check_recording, check_sign
 from bowdenfit.recordings.preparation.clock import (
     GOOD,
@@ -26,8 +32,7 @@ from bowdenfit.recordings.preparation.clock import (
 )
 from bowdenfit.recordings.preparation.delay import Delay, estimate_delay
 from bowdenfit.recordings.preparation.flags import flag_samples
-from bowdenfit.recordings.preparation.noise import noise_about_trend
-from bowdenfit.recordings.preparation.tare import estimate_tare
+from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_trend
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Vector
 

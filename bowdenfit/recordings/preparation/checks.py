@@ -4,9 +4,8 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.pieces import numbers, parts, sample
-from bowdenfit.recordings.preparation.shapes import OtherVector
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.types import Vector
+from bowdenfit.types import OtherVector, Vector
 
 _MISSING_CODE = 10.0  # times all other forces: -9999 and the like; no load cell overshoots so far twice to the same digit
 FEWEST_SAMPLES = 20

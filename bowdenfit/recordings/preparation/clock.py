@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.files.pieces import parts, rises, same, sample
-from bowdenfit.recordings.preparation.shapes import OtherLabels, OtherVector
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import Flags, Labels, OtherLabels, OtherVector, Vector
 
 GAP_STEPS = 5
 GOOD, SPIKE, SATURATED, DROPOUT, QUIET, NO_OVERLAP = range(6)

@@ -17,21 +17,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bowdenfit.recordings.preparation.noise import correlation_time
-from bowdenfit.recordings.preparation.rests import (
+from bowdenfit.recordings.preparation.segments import (
     USED,
     Rests,
+    Segments,
     at_drag,
     band_of,
+    cut_segments,
     play_along_rows,
     read_rests,
+    reverses,
     shift_rows,
     sides,
     starts,
     with_drag,
 )
-from bowdenfit.recordings.preparation.segments import Segments, cut_segments, reverses
-from bowdenfit.recordings.preparation.shapes import ChosenVector, OtherVector
-from bowdenfit.types import Flags, Labels, Matrix, Vector
+from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Vector
 
 RANGE = 0.25
 COMMON_ERROR = 0.0015

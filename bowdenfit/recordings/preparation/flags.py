@@ -10,8 +10,7 @@ from bowdenfit.files.pieces import first_set, interpolated, last_set, parts, sam
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
-from bowdenfit.recordings.preparation.shapes import ChosenFlags, ChosenVector, OtherVector, Positions
-from bowdenfit.types import Flags, Labels, Vector
+from bowdenfit.types import ChosenFlags, ChosenVector, Flags, Labels, OtherVector, Positions, Vector
 
 _SPIKE_SDS = 8.0
 _HALF_WINDOW = 5

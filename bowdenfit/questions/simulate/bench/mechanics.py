@@ -9,7 +9,7 @@ from pydantic import Field
 
 from bowdenfit.description import Finite, NonNegative, Positive
 from bowdenfit.errors import UsageError
-from bowdenfit.recordings.preparation.play import play_between
+from bowdenfit.recordings.preparation.hysteresis import play_between
 from bowdenfit.recordings.recording import SWITCH
 from bowdenfit.types import Labels, Vector
 

@@ -1,0 +1,245 @@
+"""What a description says of the cable: its route, the contacts along it, sizes and pulleys, stretch and preload."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import field_validator, model_validator
+
+from bowdenfit.description.values import Finite, Frozen, Name, NonNegative, ParameterSetting, Positive, QuantityValue
+from bowdenfit.errors import DatasetError, DescriptionError
+from bowdenfit.words import capitalized
+
+LEAST_BEND_RATIO = 20.0  # rope diameters; haptic paper, equation 2
+PRELOAD = "preload"
+
+LOWEST = {"stiffness": False, "bedding_load": False, "bedding_stretch": True, "lengthening": True, PRELOAD: True}
+"""Elastic parameters that cannot be negative, and whether they can be 0."""
+
+RUN_SCATTER, GAIN_ERROR = "tau", "gain_error"
+_OF_WHAT = {
+    RUN_SCATTER: "how much mountings of one cable differ",
+    GAIN_ERROR: "how much the load cells differ",
+}
+_MOST = 1.0  # a factor of e between two mountings or two cells
+
+
+class Route(Frozen):
+    """What the design question varies: a column of the tables, and where the angle curves hold."""
+
+    variable: Name = "cable_length"
+    unit: str = "mm"
+    range: tuple[Finite, Finite]
+    choices: tuple[Finite, ...] = ()
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Route":
+        if not self.range[0] < self.range[1]:
+            raise ValueError("range must be [lowest, highest]")
+        outside = [c for c in self.choices if not self.range[0] <= c <= self.range[1]]
+        if outside:
+            raise ValueError(f"choices must lie inside range; {outside[0]:g} does not")
+        return self
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range."""
+        return (self.range[0] + self.range[1]) / 2
+
+    @property
+    def half_width(self) -> float:
+        """Half the range."""
+        return (self.range[1] - self.range[0]) / 2
+
+    @property
+    def label(self) -> str:
+        """Name and unit for an axis or a heading."""
+        return f"{capitalized(self.variable.replace('_', ' '))} ({self.unit})"
+
+    def outside(self, value: float) -> str:
+        """That the angle curves do not hold at a value, in words; empty where they do."""
+        low, high = self.range
+        return "" if low <= value <= high else f"outside the curves, {low:g} to {high:g} {self.unit}"
+
+
+class WrapAngle(Frozen):
+    """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
+
+    curve: str | None = None
+    column: Name | None = None
+    published_range: tuple[Finite, Finite] | None = None
+    nominal: QuantityValue | None = None
+    value: NonNegative | None = None
+    unit: str | None = None
+    sd: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "WrapAngle":
+        if (self.value is None) == (self.column is None):
+            raise ValueError(
+                'write either { value = 45, unit = "deg" } or { column = "..." }, with curve where it has one'
+            )
+        if self.value is not None and (self.unit is None or self.curve is not None):
+            raise ValueError('a constant wrap angle needs a unit and no curve, such as { value = 45, unit = "deg" }')
+        if self.column is not None and (self.unit is not None or self.sd is not None):
+            raise ValueError("unit and sd belong to a constant angle; a column carries its unit in its heading")
+        if self.published_range is not None and self.curve is None:
+            raise ValueError("published_range belongs to a curve")
+        if self.nominal is not None and self.curve is not None:
+            raise ValueError("nominal belongs to an angle measured in each row, without a curve")
+        return self
+
+    @property
+    def constant(self) -> QuantityValue | None:
+        """The constant angle, if it is one."""
+        if self.value is None or self.unit is None:
+            return None
+        return QuantityValue(value=self.value, unit=self.unit, sd=self.sd)
+
+
+class Contact(Frozen):
+    """One place where rope rubs; whether its coefficient may be another in each group of readings, if groups are asked for."""
+
+    name: Name
+    friction: Name
+    law: str = "capstan"
+    by_group: bool = True
+    wrap_angle: WrapAngle
+
+    @field_validator("friction")
+    @classmethod
+    def _is_a_name(cls, friction: str) -> str:
+        if friction.replace("-", " ").strip().lower() == "by group":
+            raise ValueError(
+                'this is the name of the coefficient, such as "mu"; for one in each group write friction_model = "by-group" at '
+                "the top of the file, or --friction by-group"
+            )
+        return friction
+
+    @property
+    def special_law(self) -> str:
+        """Its law where that is not the usual one; empty otherwise."""
+        return "" if self.law == type(self).model_fields["law"].default else self.law
+
+
+@dataclass(frozen=True)
+class Pulleys:
+    """Radii of the pulleys at the motor and at the load side [mm]; None if not stated."""
+
+    input_radius: float | None = None
+    output_radius: float | None = None
+
+    def forces(self, torques: np.ndarray, end: str, file: str) -> np.ndarray:
+        """Forces [N] from torques [N mm] at one end, "input" or "output", of a file.
+
+        Raises:
+            DatasetError: The radius of that pulley is not known.
+        """
+        radius = self.input_radius if end == "input" else self.output_radius
+        if radius is None:
+            raise DatasetError(
+                f"{file} gives {end}_torque, but the radius of that pulley is not known; add it to cable.toml: [cable] "
+                f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}.'
+            )
+        return torques / radius
+
+
+class CableSettings(Frozen):
+    """What kind of cable it is: one rope, or a pull-pull loop of two; radii of the pulleys; sizes to check."""
+
+    kind: Literal["single", "loop"] = "single"
+    input_pulley_radius: QuantityValue | None = None
+    output_pulley_radius: QuantityValue | None = None
+    rope_diameter: QuantityValue | None = None
+    bend_radius: QuantityValue | None = None
+    backlash: QuantityValue | None = None
+
+    @property
+    def pulleys(self) -> Pulleys:
+        """Radii of the pulleys in mm."""
+        stated = self.input_pulley_radius, self.output_pulley_radius
+        return Pulleys(*(None if radius is None else radius.to("length") for radius in stated))
+
+    @property
+    def lengths(self) -> dict[str, QuantityValue | None]:
+        """All its lengths by name."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name != "kind"}
+
+    @property
+    def sharp_bend(self) -> str:
+        """A warning where the rope is bent more sharply than its makers recommend; empty otherwise."""
+        if self.rope_diameter is None or self.bend_radius is None:
+            return ""
+        ratio = self.bend_radius.to("length") / self.rope_diameter.to("length")
+        if ratio >= LEAST_BEND_RATIO:
+            return ""
+        return (
+            f"the smallest bend radius is {ratio:.3g} rope diameters; makers recommend at least {LEAST_BEND_RATIO:g}, because "
+            "a rope that is bent more sharply wears, and its friction grows with time."
+        )
+
+
+class StretchSettings(Frozen):
+    """The coefficient of friction that acts while the rope is stretched; one of its own if none is named."""
+
+    friction: str | None = None
+
+
+class PreloadSettings(Frozen):
+    """How preload depends on the wrap angle: constant by springs, or as the stretch of the rope between fixed ends has it.
+
+    Without a word it follows the stretch where a table of preload is given, and is constant elsewhere. The parameter
+    `preload` is its value, at `wrap_angle` where it depends on that; free if no value is stated.
+    """
+
+    model: Literal["constant", "stretch"] | None = None
+    wrap_angle: QuantityValue = QuantityValue(value=0.0, unit="deg")
+    value: QuantityValue | None = None
+
+
+def check_elastic(preload: PreloadSettings, prior: Mapping[str, ParameterSetting], file: str) -> None:
+    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
+    if preload.value is not None and PRELOAD in prior:
+        raise DescriptionError(
+            f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
+        )
+    for name, setting in prior.items():
+        if name not in LOWEST or setting.fixed is None:
+            continue
+        if setting.fixed < 0 or (setting.fixed == 0 and not LOWEST[name]):
+            least = "0 or more" if LOWEST[name] else "more than 0"
+            raise DescriptionError(
+                f"{file}, prior.{name}.fixed: {setting.fixed:g} is not possible; it must be {least}."
+            )
+
+
+def check_shares(prior: Mapping[str, ParameterSetting], file: str) -> None:
+    """No share is of a size that only a number of per cent has.
+
+    Raises:
+        DescriptionError: One is, or is expected to be.
+    """
+    for name in (name for name in _OF_WHAT if name in prior):
+        key, size = _size(prior[name])
+        if size >= _MOST:
+            raise DescriptionError(
+                f"{file}, prior.{name}.{key}: {size:g} would be {100 * size:g} %, and {_OF_WHAT[name]} is a few per cent; it "
+                f"is stated as a fraction, so write {size / 100:g} for {size:g} %."
+            )
+
+
+def _size(setting: ParameterSetting) -> tuple[str, float]:
+    """The largest number that says how large a parameter is, with its key."""
+    if setting.fixed is not None:
+        return "fixed", abs(setting.fixed)
+    if setting.measured is not None:
+        return "measured", max(setting.measured.value, setting.measured.sd)
+    stated = setting.prior.model_dump(exclude_none=True) if setting.prior is not None else {}
+    sizes = {
+        f"prior.{kind}.{key}": abs(value)
+        for kind, numbers in stated.items()
+        for key, value in numbers.items()
+        if key in ("median", "mean", "sd", "scale")
+    }
+    return max(sizes.items(), key=lambda item: item[1], default=("prior", 0.0))

@@ -143,7 +143,7 @@ def read_arguments(function: Callable[..., Any], arguments: Mapping[str, Any], t
 
 def _validate(type_: Any, value: Any, name: str) -> Any:
     """Return the value as pydantic converts it to a type."""
-    import pydantic
+    import pydantic  # here, because `--help` does not load it
 
     try:
         return pydantic.TypeAdapter(type_, config=pydantic.ConfigDict(arbitrary_types_allowed=True)).validate_python(value)

@@ -13,6 +13,8 @@ from bowdenfit.description.file import override
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DescriptionError, Faults
 from bowdenfit.files import is_ros2_folder
+from bowdenfit.files.apart import limits_times
+from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, iterate_tables
@@ -20,6 +22,7 @@ from bowdenfit.kinds.descriptions import add_columns, load_description, order_gr
 from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
+from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.units import ColumnSource
 from bowdenfit.words import printable
 
@@ -43,13 +46,42 @@ class Dataset(Display):
     accounts: tuple[RowAccount, ...] = ()
 
     def sentences(self) -> list[str]:
-        """What the cable is, and what was measured on it."""
+        """Return what the cable is, and what was measured on it."""
         lines = [line for kind, table in iterate_tables(self.measurements) for line in kind.describe(table, self.description)]
         return [*self.description.sentences(), *(f"- {line}" for line in lines), *self.measurements.remarks]
 
     def _table(self) -> Rows:
         rows = [{"file": account.file, "rows": account.rows, "read": account.read} for account in self.accounts]
         return rows, {"rows": "1", "read": "1"}
+
+
+def load_folder_or_file(
+    path: Path,
+    overrides: Sequence[str],
+    channels: Sequence[str],
+    columns: Sequence[str],
+    wrap_angle: tuple[float, str] | None,
+    reading_limit: float,
+) -> Dataset:
+    """Read a folder with `cable.toml`, the `cable.toml` itself, or a lone table or recording.
+
+    Args:
+        path: Folder or file.
+        overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
+        channels: Channels of recordings as the command line names them, such as `input_force=ai0:lbf`.
+        columns: Columns of tables, likewise.
+        wrap_angle: The angle of a lone file and its unit; None where its rows have their own.
+        reading_limit: So many times the usual memory and time may be taken to read a binary file.
+
+    Raises:
+        DescriptionError, DatasetError: What is wrong, in a sentence.
+    """
+    refuse_special(path)
+    channel_sources, column_sources = parse_channels(channels), parse_sources(columns, "--column")
+    with limits_times(reading_limit):
+        if wrap_angle is not None or is_lone_file(path):
+            return single_file_dataset(path, wrap_angle, overrides, channel_sources, column_sources)
+        return load_dataset(path, overrides, channel_sources, column_sources)
 
 
 def load_dataset(
@@ -79,7 +111,7 @@ def load_dataset(
 
 
 def is_lone_file(path: Path) -> bool:
-    """Whether a data set is one file, or the folder of a ROS 2 bag, without a description."""
+    """Return whether a data set is one file, or the folder of a ROS 2 bag, without a description."""
     if path.is_dir():
         return is_ros2_folder(path) and not (path / DESCRIPTION_FILE).exists()
     return path.suffix.lower() not in {".toml", ""} and path.is_file()
@@ -93,7 +125,7 @@ def single_file_dataset(
     columns: Mapping[str, ColumnSource] | None = None,
     kind: str = "",
 ) -> Dataset:
-    """A data set from one table or recording of a cable with one contact.
+    """Read a data set that is one table or recording of a cable with one contact.
 
     Args:
         path: Table of forces or of efficiencies, or a recording.
@@ -175,7 +207,7 @@ def read_dataset(
 
 
 def _sha256(path: Path) -> str:
-    """Of a file, or of the names and contents of those in a folder."""
+    """Return the checksum of a file, or of the names and contents of those in a folder."""
     if path.is_dir():
         inside = sorted(file for file in path.rglob("*") if file.is_file())
         listed = "".join(f"{_sha256(file)}  {file.relative_to(path)}\n" for file in inside)

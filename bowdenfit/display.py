@@ -43,7 +43,9 @@ class Display:
 
     def to_frame(self) -> "DataFrame":
         """Return the table for pandas; `attrs["units"]` has the units by column or, of parameters, by name ("1": none)."""
-        from pandas import DataFrame
+        from pandas import (
+            DataFrame,  # here, because pandas takes a fifth of a second, and results seldom become a frame
+        )
 
         rows, units = self._table()
         frame = DataFrame(rows if isinstance(rows, Mapping) else list(rows))

@@ -83,7 +83,7 @@ def refuse_packed(archive: "NpzFile") -> None:
     Raises:
         ValueError: One is packed, or says that it is larger than what is there.
     """
-    from numpy.lib import format as npy
+    from numpy.lib import format as npy  # here, because `--help` does not load NumPy
 
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     zipped = archive.zip

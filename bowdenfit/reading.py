@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, PATH, TEXTS, Quantity, as_pair, number_with_unit, read_first, whole_number
+from bowdenfit.errors import UsageError
+from bowdenfit.words import listed
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -69,28 +71,23 @@ def read(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: U
         DescriptionError, DatasetError: What is wrong, in a sentence.
         UsageError: There is no such keyword, or it comes too late for a data set that has been read.
     """
-    from bowdenfit.dataset import Dataset, is_lone_file, load_dataset, single_file_dataset
-    from bowdenfit.files.apart import limits_times
-    from bowdenfit.files.headings import parse_sources
-    from bowdenfit.inputs import refuse_special
-    from bowdenfit.recordings.named_channels import parse_channels
+    from bowdenfit.dataset import Dataset, load_folder_or_file  # here, because --help lists `Reading` without NumPy
 
     if isinstance(dataset, Dataset):
         refuse_named(reading, f"{dataset.description.name} has been read already", "name that where it is read")
         return dataset
-    refuse_special(Path(dataset))
-    changes = changed_settings(reading)
-    sources = parse_channels(reading.get("channels", ()))
-    columns = parse_sources(reading.get("columns", ()), "--column")
-    wrap_angle = as_pair(reading.get("wrap_angle"))
-    with limits_times(reading.get("reading_limit") or 1):
-        if wrap_angle is not None or is_lone_file(Path(dataset)):
-            return single_file_dataset(Path(dataset), wrap_angle, changes, sources, columns)
-        return load_dataset(Path(dataset), changes, sources, columns)
+    return load_folder_or_file(
+        Path(dataset),
+        changed_settings(reading),
+        reading.get("channels", ()),
+        reading.get("columns", ()),
+        as_pair(reading.get("wrap_angle")),
+        reading.get("reading_limit") or 1,
+    )
 
 
 def changed_settings(reading: Reading) -> list[str]:
-    """Settings of cable.toml that keywords change, as on the command line.
+    """Return the settings of cable.toml that keywords change, as on the command line.
 
     Args:
         reading: The keywords.
@@ -110,8 +107,5 @@ def refuse_named(reading: Reading, why: str, remedy: str) -> None:
     Raises:
         UsageError: Something is named.
     """
-    from bowdenfit.errors import UsageError
-    from bowdenfit.words import listed
-
     if named := [name for name, value in reading.items() if value not in (None, (), [])]:
         raise UsageError(f"{why}, and {listed(named)} would change nothing: {remedy}.")

@@ -1,4 +1,4 @@
-"""A verb: one function for notebooks, what the command line prints of its answer, and its progress bar. Loads nothing."""
+"""A verb: one function for notebooks, what the command line prints of its answer, and its progress bar. Loads little."""
 
 import io
 import sys
@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
+
+from tqdm import tqdm
 
 NOT_TRUSTED = 3  # exit code
 
@@ -92,8 +94,7 @@ def show_progress_bar(watch: Watch, report: Callable[..., None] | None) -> Itera
     if report is not None or not is_notebook():
         yield report
         return
-    from IPython.display import display
-    from tqdm import tqdm
+    from IPython.display import display  # which a notebook brings, and nothing else needs
 
     line = display({"text/plain": ""}, raw=True, display_id=True)
 

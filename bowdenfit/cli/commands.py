@@ -8,6 +8,7 @@ from importlib.metadata import version
 from inspect import Parameter as Stated
 from inspect import Signature, unwrap
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter, UnusedCliTokensError
@@ -15,6 +16,7 @@ from cyclopts.help import DefaultFormatter, PanelSpec
 from docstring_parser.google import parse
 from rich.box import Box
 
+import bowdenfit as bf
 from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
 from bowdenfit.cli.running import watch_verb
@@ -189,15 +191,13 @@ def _to_json(reply: Reply) -> str:
 
 def _load_fits(results: Path | tuple[Path, ...]) -> "Fit | dict[str, Fit]":
     """Load one fit, or several by folder name (by path from the common folder where two names are equal)."""
-    from bowdenfit.finished_fit import load
-
     if isinstance(results, Path):
-        return load(results)
+        return bf.load(results)
     names = [folder.name for folder in results]
     paths = [folder.resolve() for folder in results]
     above = Path(os.path.commonpath(paths)) if len(set(paths)) > 1 else Path(paths[0].anchor)
     return {
-        name if names.count(name) == 1 or path == above else str(path.relative_to(above)): load(folder)
+        name if names.count(name) == 1 or path == above else str(path.relative_to(above)): bf.load(folder)
         for name, path, folder in zip(names, paths, results, strict=True)
     }
 
@@ -238,15 +238,18 @@ def init(
         files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
         example: Write a data set that comes with bowdenfit; without a name, list them.
     """
-    from bowdenfit.cli.init_dialog import start_data_set
-
-    start_data_set(folder, files or [], example)
+    _init_dialog().start_data_set(folder, files or [], example)
 
 
 def _examples() -> list[str]:
-    from bowdenfit.questions.start.folder import find_examples
+    return list(_init_dialog().find_examples())
 
-    return list(find_examples())
+
+def _init_dialog() -> ModuleType:
+    """Return the module that starts data sets, imported when first used, because it loads NumPy and `--help` does not."""
+    from bowdenfit.cli import init_dialog
+
+    return init_dialog
 
 
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.

@@ -16,6 +16,8 @@ from contextvars import copy_context
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from tqdm import tqdm
+
 from bowdenfit.cli.terminal import say_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.resources import refuse_low_memory
@@ -158,7 +160,5 @@ def _bar(watch: Watch) -> Iterator[Report]:
     if not sys.stderr.isatty():
         yield lambda *_: None
         return
-    from tqdm import tqdm
-
     with tqdm(leave=False, **watch.bar) as bar:
         yield lambda *progress: watch.show(bar, *progress)

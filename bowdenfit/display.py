@@ -76,7 +76,7 @@ class Part(Display):
     """A part of a result, displayed by the first line of its docstring and a row for each field."""
 
     def sentences(self) -> Sequence[str]:
-        """What it is."""
+        """Return what it is."""
         return [inspect.cleandoc(self.__doc__ or "").partition("\n")[0]]
 
     def _table(self) -> Rows:
@@ -87,7 +87,7 @@ class Several(Display, tuple[Item, ...]):
     """A tuple of results of one kind, displayed with a row for each."""
 
     def sentences(self) -> Sequence[str]:
-        """How many there are."""
+        """Return how many there are."""
         return [f"{len(self)} in all."]
 
     def _table(self) -> Rows:
@@ -230,7 +230,7 @@ def _block(lines: list[str]) -> str:
 
 
 def _continues(above: list[str], line: str) -> bool:
-    """Whether a line is a row of the table above it."""
+    """Return whether a line is a row of the table above it."""
     columns = len(_cells(above[:1] + above[2:])[0])
     return not _MORE.match(line) and (len(above) == 2 or len(_cells([above[0], *above[2:], line])[0]) >= columns)
 

@@ -98,7 +98,7 @@ def refuse_packed(archive: "NpzFile") -> None:
 
 
 def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
-    """Text and plain data of a TOML file.
+    """Return text and plain data of a TOML file.
 
     Args:
         path: The file.
@@ -129,7 +129,7 @@ def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
 
 
 def _is_deeper(page: dict[str, Any], levels: int) -> bool:
-    """Whether keys lie below more than so many others."""
+    """Return whether keys lie below more than so many others."""
     layer: list[Any] = [page]
     for _ in range(levels):
         inside = [part for x in layer for part in (x.values() if isinstance(x, dict) else x)]
@@ -140,7 +140,7 @@ def _is_deeper(page: dict[str, Any], levels: int) -> bool:
 
 
 def match_files(folder: Path, pattern: str) -> list[Path]:
-    """Files that a pattern names, in sorted order.
+    """Return files that a pattern names, in sorted order.
 
     Args:
         folder: Where the pattern starts.

@@ -116,7 +116,7 @@ def _registry() -> "pint.UnitRegistry":
 
 
 def is_unit(text: str) -> bool:
-    """Whether `text` is a unit that pint reads."""
+    """Return whether `text` is a unit that pint reads."""
     if text in _COMMON_UNITS:
         return True
     try:
@@ -127,7 +127,7 @@ def is_unit(text: str) -> bool:
 
 
 def dimension_of(unit: str) -> str:
-    """Which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
+    """Return which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
     if unit in _COMMON_UNITS:
         return _COMMON_UNITS[unit][0]
     parsed = _parsed(unit)
@@ -138,7 +138,7 @@ def dimension_of(unit: str) -> str:
 
 
 def speed_dimension(unit: str) -> str:
-    """Whether a unit of speed is one of the motor ("angular_velocity") or of the rope ("velocity").
+    """Return whether a unit of speed is one of the motor ("angular_velocity") or of the rope ("velocity").
 
     Anything else counts as one of the rope, and is refused when it is converted.
     """
@@ -146,7 +146,7 @@ def speed_dimension(unit: str) -> str:
 
 
 def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float:
-    """Factor from `unit` to the internal unit of `dimension` (or to another unit of the same kind).
+    """Return the factor from `unit` to the internal unit of `dimension` (or to another unit of the same kind).
 
     Args:
         unit: Unit as written by the user, anything pint reads.
@@ -186,7 +186,7 @@ def contradiction(stated: str | None, written: str | None) -> str:
 
 
 def route_conversion_factor(unit: str, to: str) -> float:
-    """Factor between two units of the route variable, whatever it measures.
+    """Return the factor between two units of the route variable, whatever it measures.
 
     Raises:
         DatasetError: A unit is unknown, or the two measure different things.

@@ -109,6 +109,6 @@ def show_progress_bar(watch: Watch, report: Callable[..., None] | None) -> Itera
 
 
 def is_notebook() -> bool:
-    """Whether the program runs in the kernel of a notebook."""
+    """Return whether the program runs in the kernel of a notebook."""
     shell: Any = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return getattr(shell, "kernel", None) is not None

@@ -23,7 +23,7 @@ def shown(value: object) -> str:
 
 
 def capitalized(text: str) -> str:
-    """Text whose first letter is upper case; all others keep their case, so that "freie Hülle" becomes "Freie Hülle"."""
+    """Return text whose first letter is upper case; all others keep their case, so that "freie Hülle" becomes "Freie Hülle"."""
     return text[:1].upper() + text[1:]
 
 

@@ -78,7 +78,7 @@ class Cable:
         return tuple(dict.fromkeys(law.friction for laws in by_contact for law in laws))
 
     def law_parameters(self, defaults: PriorDefaults) -> list[Parameter]:
-        """Parameters that contact laws have of their own."""
+        """Return parameters that contact laws have of their own."""
         return [parameter for law in self.laws for parameter in law.parameters(defaults)]
 
     def wrap_angles(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, "rows contacts"]:
@@ -115,7 +115,7 @@ class Cable:
         return self._in_own_group(total, group)
 
     def _in_own_group(self, total: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
-        """What the laws of each row's group give."""
+        """Return what the laws of each row's group give."""
         if group is None or not self.friction.groups:
             return total(self.laws)
         by_group = jnp.stack([total(laws) for laws in self.laws_by_group], axis=-1)
@@ -156,7 +156,7 @@ class Cable:
         stroke: Float[Array, ""],
         mounting: Float[Array, ""] | float = 0.0,
     ) -> Float[Array, " rows"]:
-        """Output force [N] at values of the route variable, at the reference speed.
+        """Return the output force [N] at values of the route variable, at the reference speed.
 
         Args:
             values: Values of the parameters.
@@ -170,7 +170,7 @@ class Cable:
     def output_force_at_angles(
         self, values: Mapping[str, Array], angles: Array, input_force: Array, stroke: Array, mounting: Array | float = 0.0
     ) -> Float[Array, "..."]:
-        """Output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
+        """Return the output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
         exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
             return loop_output_force(input_force, preload, exponent, stroke)
@@ -204,7 +204,7 @@ class Cable:
         return exponent, self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1)) if self.is_loop else None
 
     def loss_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """What is least where efficiency is highest: the friction exponent, or of a loop the efficiency with a minus."""
+        """Return what is least where efficiency is highest: the friction exponent, or of a loop the efficiency with a minus."""
         return -self.efficiency_at(values, route) if self.is_loop else self.exponent_at(values, route)
 
     def exponent_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
@@ -213,12 +213,12 @@ class Cable:
 
 
 def constant_angle_name(contact: Contact) -> str:
-    """Name of the parameter for a constant wrap angle that is itself uncertain."""
+    """Return the name of the parameter for a constant wrap angle that is itself uncertain."""
     return parameter_of("wrap_angle", contact.name)
 
 
 def make_cable(description: Description, own_angles: Mapping[str, float], conditions: Conditions) -> Cable:
-    """The cable of a description.
+    """Return the cable of a description.
 
     Args:
         description: What was said about the cable.

@@ -68,7 +68,7 @@ def make_conditions(
     velocity_unit: str,
     groups: tuple[str, ...] = (),
 ) -> Conditions:
-    """Reference force and speed as stated, or from the middle of the measurements.
+    """Return the reference force and speed as stated, or from the middle of the measurements.
 
     Args:
         description: What was said about the cable.

@@ -63,7 +63,7 @@ class Curve(ABC):
         return {}
 
     def derived_units(self) -> dict[str, tuple[str, str]]:
-        """Unit and symbol of each derived quantity."""
+        """Return the unit and symbol of each derived quantity."""
         return {}
 
     def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
@@ -77,11 +77,11 @@ class Curve(ABC):
         return Parameter(name, symbol, meaning, "curve", prior, unit, scale, prior_words=words)
 
     def _symbol(self, letter: str) -> str:
-        """The letter with the first word of the column."""
+        """Return the letter with the first word of the column."""
         return make_symbol(letter, self.column.split("_")[0] or self.column)
 
     def _level(self, detected: Vector, defaults: PriorDefaults) -> Parameter:
-        """Logarithm of the angle in the middle of the range, about that of the median angle."""
+        """Return the logarithm of the angle in the middle of the range, about that of the median angle."""
         level, sd = _median(detected, defaults), defaults.curve_level_sd
         words = f"Normal(log {np.rad2deg(level):.3g} deg, {sd:g})"
         meaning = f"logarithm of the {self.what} in the middle of the range"
@@ -96,7 +96,7 @@ class GaussianCurve(Curve):
     not_limited = "the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle.
+        """Return the level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle.
 
         The prior of c is one on how many C half of the range is: as many bells are wider than half the range as narrower.
         """
@@ -113,13 +113,13 @@ class GaussianCurve(Curve):
         return log_quadratic_wrap_angle(z, *coefficients)
 
     def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        """A, B and C as papers print them; infinite where the curve is an exponential (c = 0)."""
+        """Return a, B and C as papers print them; infinite where the curve is an exponential (c = 0)."""
         a, b, c = (values[name] for name in self.names)
         A, B, C = gaussian_coefficients(a, b, c, self.middle, self.half_width)
         return {f"{self.column}_A": jnp.rad2deg(A), f"{self.column}_B": B, f"{self.column}_C": C}
 
     def derived_units(self) -> dict[str, tuple[str, str]]:
-        """A in degrees, B and C in the unit of the route."""
+        """Return a in degrees, B and C in the unit of the route."""
         units = {"A": "deg", "B": self.unit, "C": self.unit}
         return {f"{self.column}_{x}": (unit, self._symbol(x)) for x, unit in units.items()}
 
@@ -131,7 +131,7 @@ class LineCurve(Curve):
     heading = "Straight lines: angle in the middle of the range, and slope"
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """The angle at the start and at the end of the range."""
+        """Return the angle at the start and at the end of the range."""
         prior, unit = HalfNormal(defaults.curve_end_over_median * _median(detected, defaults)), ("deg", 1 / _DEGREE)
         words, ends = prior.text(*unit, digits=3), (self.middle - self.half_width, self.middle + self.half_width)
         return tuple(
@@ -142,11 +142,11 @@ class LineCurve(Curve):
         )
 
     def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
-        """Start (1 - z)/2 + end (1 + z)/2, and 0 where that is negative, outside the range."""
+        """Return the start (1 - z)/2 + end (1 + z)/2, and 0 where that is negative, outside the range."""
         return line_wrap_angle(z, *coefficients)
 
     def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        """The angle in the middle [deg] and the slope [deg per unit of the route]."""
+        """Return the angle in the middle [deg] and the slope [deg per unit of the route]."""
         start, end = (jnp.rad2deg(values[name]) for name in self.names)
         slope = (end - start) / (2 * self.half_width)
         return {f"{self.column}_middle": (start + end) / 2, f"{self.column}_slope": slope}
@@ -167,7 +167,7 @@ class LogisticCurve(Curve):
     not_limited = "the data also allow an exponential, at which A and B are infinite; a, k and s above say it all."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Level a (log rad), steepness k, and the share s of the plateau that the middle of the range has reached."""
+        """Return the level a (log rad), steepness k, and the share s of the plateau reached in the middle of the range."""
         steepness = Normal(0.0, defaults.curve_steepness_sd)
         return (
             self._level(detected, defaults),
@@ -188,12 +188,12 @@ class LogisticCurve(Curve):
         return {f"{self.column}_A": jnp.rad2deg(A), f"{self.column}_B": B, f"{self.column}_C": C}
 
     def derived_units(self) -> dict[str, tuple[str, str]]:
-        """A in degrees, B and C in the unit of the route."""
+        """Return a in degrees, B and C in the unit of the route."""
         units = {"A": "deg", "B": self.unit, "C": self.unit}
         return {f"{self.column}_{x}": (unit, self._symbol(x)) for x, unit in units.items()}
 
 
 def _median(detected: Vector, defaults: PriorDefaults) -> float:
-    """The median detected angle [rad], or a usual one where none above 0 was detected."""
+    """Return the median detected angle [rad], or a usual one where none above 0 was detected."""
     detected = detected[detected > 0]
     return float(np.median(detected)) if len(detected) else defaults.curve_level_degrees_without_data * _DEGREE

@@ -52,11 +52,11 @@ class RopeDrive:
         return self.friction.conditions.least_force
 
     def band(self, mounting: PerRecording) -> PerTime:
-        """Half the width of the friction band on the scale g [1], with an effect of the mounting on the exponent."""
+        """Return half the width of the friction band on the scale g [1], with an effect of the mounting on the exponent."""
         return jnp.maximum(self.exponent * self.rate + mounting, LEAST_EXPONENT)
 
     def scaled(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """The scale on which the operator works [1]."""
+        """Return the scale on which the operator works [1]."""
         return self.friction.scaled(self.values, force)
 
     def follow(
@@ -67,7 +67,7 @@ class RopeDrive:
         restart: PerTime | None = None,
         noise: PerTime | None = None,
     ) -> tuple[PerTime, PerTime]:
-        """Output force [N], and the derivative of its `scaled` by the friction exponent [1].
+        """Return the output force [N], and the derivative of its `scaled` by the friction exponent [1].
 
         Args:
             input_force: Time first [N].
@@ -85,18 +85,18 @@ class RopeDrive:
         return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
 
     def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
-        """Logarithm of what the output's cell shows, and its derivative by the friction exponent, of what `follow` gave."""
+        """Return the log of what the output's cell shows, and its derivative by the exponent, of what `follow` gave."""
         shown = cells.shown_output(output_force, self.least_force)
         return jnp.log(shown), cells.shown_change(slope) / (self.friction.slope(self.values, output_force) * shown)
 
     @staticmethod
     def reading(shown: Shown) -> Shown:
-        """What is compared of a shown output force: its logarithm."""
+        """Return what is compared of a shown output force: its logarithm."""
         return np.log(np.maximum(shown, LEAST_SHARE * np.max(np.abs(shown))))
 
     @staticmethod
     def without_delay(shown: Float[Array, "*batch"], late: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """A shown output force [N] less what a delay added to its `reading`."""
+        """Return a shown output force [N] less what a delay added to its `reading`."""
         return shown * jnp.exp(-late)
 
 
@@ -121,7 +121,7 @@ class LoopDrive:
         return jnp.maximum(self.exponent + mounting, LEAST_EXPONENT)
 
     def scaled(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """The scale on which the operator works: the force itself [N]."""
+        """Return the scale on which the operator works: the force itself [N]."""
         return force
 
     def follow(
@@ -132,7 +132,7 @@ class LoopDrive:
         restart: PerTime | None = None,
         noise: PerTime | None = None,
     ) -> tuple[PerTime, PerTime]:
-        """Output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
+        """Return the output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
         exponent = self.band(mounting)
 
         def limits(exponent: PerRecording) -> tuple[PerTime, PerTime]:
@@ -146,17 +146,17 @@ class LoopDrive:
         return y + jnp.where(y - low < high - y, lower - low, upper - high), slope
 
     def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
-        """What the output's cell shows, and its derivative by the friction exponent, of what `follow` gave [N]."""
+        """Return what the output's cell shows, and its derivative by the friction exponent, of what `follow` gave [N]."""
         return cells.shown_output(output_force), cells.shown_change(slope)
 
     @staticmethod
     def reading(shown: Shown) -> Shown:
-        """What is compared of a shown output force: itself [N]."""
+        """Return what is compared of a shown output force: itself [N]."""
         return shown
 
     @staticmethod
     def without_delay(shown: Float[Array, "*batch"], late: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """A shown output force [N] less what a delay added to it."""
+        """Return a shown output force [N] less what a delay added to it."""
         return shown - late
 
 
@@ -167,7 +167,7 @@ def make_drive(
     velocity: PerTime,
     exponent: PerRecording | None = None,
 ) -> RopeDrive | LoopDrive:
-    """The cable as it lies in each recording.
+    """Return the cable as it lies in each recording.
 
     Args:
         cable: The cable.

@@ -50,15 +50,15 @@ class Elasticity:
         return values[STIFFNESS], values[BEDDING_STRETCH], values[BEDDING_LOAD]
 
     def extension(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Extension of the rope under a tension that is the same all along it [mm]."""
+        """Return extension of the rope under a tension that is the same all along it [mm]."""
         return extension(tension, *self.rope(values))
 
     def compliance(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Change of the extension with that tension [mm/N]."""
+        """Return change of the extension with that tension [mm/N]."""
         return compliance(tension, *self.rope(values))
 
     def tension(self, values: Values, extended: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Tension from the extension [N]; 0 where the rope is slack."""
+        """Return the tension from the extension [N]; 0 where the rope is slack."""
         return tension_from_extension(extended, *self.rope(values))
 
     def friction_exponent(self, values: Values, wrap_angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
@@ -72,7 +72,7 @@ class Elasticity:
         wrap_angle: Float[Array, "*batch"],
         peak: Float[Array, "*batch"],
     ) -> Float[Array, "*batch"]:
-        r"""Stretch seen at the loaded end [mm], :math:`e(\bar T(F, \theta)) + g \theta - \Delta L_0`.
+        r"""Return the stretch seen at the loaded end [mm], :math:`e(\bar T(F, \theta)) + g \theta - \Delta L_0`.
 
         Args:
             values: Values of the parameters.
@@ -84,7 +84,7 @@ class Elasticity:
         return self.extension(values, mean) + values[LENGTHENING] * wrap_angle - values[STRETCH_ZERO]
 
     def stretch_of_rows(self, values: Values, rows: Mapping[str, Array]) -> Float[Array, " rows"]:
-        """The same for the rows of a table, friction worked out once for every different wrap angle [mm].
+        """Return the same for the rows of a table, friction worked out once for every different wrap angle [mm].
 
         Args:
             values: Values of the parameters.
@@ -146,7 +146,7 @@ class RopeScales:
 
 
 def rope_parameters(defaults: PriorDefaults, by: RopeScales) -> list[Parameter]:
-    """How the rope stretches and the sheath lengthens."""
+    """Return how the rope stretches and the sheath lengthens."""
     degree, lengthening = float(np.deg2rad(1.0)), HalfCauchy(by.lengthening.value)
     return [
         Parameter(

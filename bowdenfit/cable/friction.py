@@ -46,12 +46,12 @@ class FrictionOption(ABC):
         """
 
     def load_exponent(self, values: Mapping[str, Array]) -> Array:
-        """What it adds to the exponent p of the scale g, see `bowdenfit.physics.friction.force_scale` [1]."""
+        """Return what it adds to the exponent p of the scale g, see `bowdenfit.physics.friction.force_scale` [1]."""
         del values
         return jnp.zeros(())
 
     def drag(self, values: Mapping[str, Array]) -> Array:
-        """What it adds to the drag D of that scale [N]."""
+        """Return what it adds to the drag D of that scale [N]."""
         del values
         return jnp.zeros(())
 
@@ -77,7 +77,7 @@ class Drag(FrictionOption):
     of_load = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """The drag in newtons."""
+        """Return the drag in newtons."""
         conditions.needs_loads("drag")
         meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
         prior = HalfCauchy(defaults.drag_share * conditions.load.value)
@@ -89,14 +89,13 @@ class Drag(FrictionOption):
         return values[DRAG]
 
 
-
 class LoadDependent(FrictionOption):
     """Friction coefficients that fall with the load, mu(F) = mu (F/F_ref)^-p."""
 
     of_load = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """The exponent."""
+        """Return the exponent."""
         del defaults
         conditions.needs_loads("load-dependent")
         meaning = f"load exponent: how friction falls with the load, mu as stated at {conditions.reference_force:g} N"
@@ -105,7 +104,6 @@ class LoadDependent(FrictionOption):
     def load_exponent(self, values: Mapping[str, Array]) -> Array:
         """P"""
         return values[LOAD_EXPONENT]
-
 
 
 class RateDependent(FrictionOption):
@@ -145,14 +143,13 @@ class RateDependent(FrictionOption):
         return rate_factor(speed, values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
 
 
-
 class StrokeDependent(FrictionOption):
     """Friction that is not the same both ways, mu (1 + d/2) pulling and mu (1 - d/2) returning: a laid rope, wear."""
 
     of_stroke = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """The difference d."""
+        """Return the difference d."""
         conditions.needs_loads("stroke-dependent")
         meaning = "stroke difference: by how much more friction there is pulling than returning, over the mean of both"
         prior = Normal(0.0, defaults.stroke_difference)
@@ -184,7 +181,7 @@ FRICTION_OPTIONS: dict[str, FrictionOption] = {
 
 
 def friction_options(text: str) -> tuple[str, ...]:
-    """The options in a text such as "drag+rate-dependent"; "capstan" has none.
+    """Return the options in a text such as "drag+rate-dependent"; "capstan" has none.
 
     Raises:
         DescriptionError: An option is unknown or named twice.
@@ -233,7 +230,7 @@ class FrictionModel:
         return self.conditions.groups if any(option.of_group for option in self._options) else ()
 
     def parameters(self, defaults: PriorDefaults) -> list[Parameter]:
-        """Parameters of all options."""
+        """Return parameters of all options."""
         return [p for option in self._options for p in option.parameters(self.conditions, defaults)]
 
     @property
@@ -241,18 +238,18 @@ class FrictionModel:
         return [FRICTION_OPTIONS[name] for name in self.options]
 
     def scale(self, values: Mapping[str, Array]) -> tuple[Array, Array, float]:
-        """Exponent p [1], drag D [N] and reference force [N] of the scale g, see `bowdenfit.physics.friction.force_scale`."""
+        """Return exponent p [1], drag D [N] and reference force [N] of the scale g; see `physics.friction.force_scale`."""
         exponent, drag = jnp.zeros(()), jnp.zeros(())
         for option in self._options:
             exponent, drag = exponent + option.load_exponent(values), drag + option.drag(values)
         return exponent, drag, self.conditions.reference_force
 
     def scaled(self, values: Mapping[str, Array], force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """The scale g of forces [1]."""
+        """Return the scale g of forces [1]."""
         return force_scale(force, *self.scale(values))
 
     def force(self, values: Mapping[str, Array], scaled: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Forces [N] at values of g."""
+        """Return forces [N] at values of g."""
         return force_from_scale(scaled, *self.scale(values))
 
     def slope(self, values: Mapping[str, Array], force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
@@ -260,7 +257,7 @@ class FrictionModel:
         return force_scale_slope(force, *self.scale(values))
 
     def shifts(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> tuple[Array, Array]:
-        """Exponent while pulling and while returning [1], of one that is the mean of both."""
+        """Return the exponent while pulling and while returning [1], of one that is the mean of both."""
         if not self.depends_on_stroke:
             return exponent, exponent
         half = sum((option.stroke_difference(values) for option in self._options), jnp.zeros(())) / 2
@@ -269,25 +266,25 @@ class FrictionModel:
     def output_force(
         self, values: Mapping[str, Array], input_force: Array, exponent: Array, stroke: Array
     ) -> Float[Array, "..."]:
-        """Force at the load side [N] while the rope slides, stroke +1 toward the motor and -1 back."""
+        """Return the force at the load side [N] while the rope slides, stroke +1 toward the motor and -1 back."""
         return self.force(values, self.scaled(values, input_force) - self._shift(values, exponent, stroke))
 
     def input_force(
         self, values: Mapping[str, Array], output_force: Array, exponent: Array, stroke: Array
     ) -> Float[Array, "..."]:
-        """Force at the motor side [N] that gives one at the load side: the inverse of `output_force`."""
+        """Return the force at the motor side [N] that gives one at the load side: the inverse of `output_force`."""
         return self.force(values, self.scaled(values, output_force) + self._shift(values, exponent, stroke))
 
     def _shift(self, values: Mapping[str, Array], exponent: Array, stroke: Array) -> Array:
-        """What friction takes off the scale g."""
+        """Return what friction takes off the scale g."""
         pulling, returning = self.shifts(values, exponent)
         return stroke * (jnp.where(stroke > 0, pulling, returning) if self.depends_on_stroke else exponent)
 
     def rate(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Factor on the friction exponent at a speed [1], 1 at the reference speed, which stands in where none is known.
+        """Return the factor on the friction exponent at a speed [1], 1 at the reference speed and where no speed is known.
 
         So coefficients are stated for the reference speed, as they are for the reference force, and what the data say of
-        them does not hang on how far friction would rise toward standstill.
+        them does not depend on how far friction would rise toward standstill.
         """
         if not self.depends_on_rate:
             return jnp.ones_like(speed)

@@ -33,7 +33,7 @@ class ContactLaw(ABC):
     friction: str
 
     def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Parameters of its own, beside the friction coefficient; named after the contact by `parameter_of`."""
+        """Return parameters of its own, beside the friction coefficient; named after the contact by `parameter_of`."""
         del defaults
         return ()
 
@@ -72,7 +72,7 @@ class Wobble(ContactLaw):
     """
 
     def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """The unintended wrap angle w."""
+        """Return the unintended wrap angle w."""
         degree = float(np.deg2rad(1.0))
         return (
             Parameter(
@@ -88,5 +88,5 @@ class Wobble(ContactLaw):
 
 
 def parameter_of(what: str, contact: str) -> str:
-    """Name of a parameter that one contact has, such as "wobble_free_sheath"."""
+    """Return the name of a parameter that one contact has, such as "wobble_free_sheath"."""
     return f"{what}_" + "_".join(contact.lower().split())

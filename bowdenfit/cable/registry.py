@@ -50,17 +50,17 @@ def check_names(description: Description) -> None:
 
 
 def load_class(class_path: str) -> Any:
-    """The class at a place such as "bowdenfit.cable.laws:Capstan"."""
+    """Return the class at a place such as "bowdenfit.cable.laws:Capstan"."""
     module, _, name = class_path.partition(":")
     return getattr(import_module(module), name)
 
 
 def coefficient_of(friction: str, group: str) -> str:
-    """Name of a group's coefficient, such as "mu[new rope]"."""
+    """Return the name of a group's coefficient, such as "mu[new rope]"."""
     return f"{friction}[{group}]"
 
 
 def split_coefficient(name: str, whole: Collection[str]) -> tuple[str, str]:
-    """The coefficient and the group of such a name; no group of one that is whole."""
+    """Return the coefficient and the group of such a name; no group of one that is whole."""
     stem, _, group = name.removesuffix("]").partition("[")
     return (name, "") if name in whole else (stem, group)

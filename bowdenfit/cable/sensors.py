@@ -12,8 +12,8 @@ from jax.scipy.stats import norm
 from jaxtyping import Float
 
 from bowdenfit.description import Description
-from bowdenfit.description.cable_parts import GAIN_ERROR as GAIN_ERROR
-from bowdenfit.description.cable_parts import RUN_SCATTER as RUN_SCATTER
+from bowdenfit.description.stated_parameters import GAIN_ERROR as GAIN_ERROR
+from bowdenfit.description.stated_parameters import RUN_SCATTER as RUN_SCATTER
 from bowdenfit.physics.distributions import (
     log_normal_cdf,
     log_student_cdf,
@@ -49,32 +49,32 @@ class LoadCells:
 
     @classmethod
     def of(cls, values: Mapping[str, Array]) -> "LoadCells":
-        """The load cells at given parameters."""
+        """Return the load cells at given parameters."""
         names = (INPUT_OFFSET, OUTPUT_OFFSET, GAIN_ERROR, DELAY_ERROR)
         return cls(*(values.get(name, 0.0) for name in names))
 
     def true_input(self, shown: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
-        """Force at the input [N] where its cell shows a force, at least `least`."""
+        """Return the force at the input [N] where its cell shows a force, at least `least`."""
         return _at_least(shown - self.input_offset, least)
 
     def true_output(self, shown: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
-        """Force at the output [N] where its cell shows a force; what the offset leaves of that is at least `least`."""
+        """Return the force at the output [N] where its cell shows a force; its offset leaves at least `least` of that."""
         return _at_least(shown - self.output_offset, least) * jnp.exp(self.gain_error)
 
     def shown_input(self, force: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """What the input's cell shows of a force [N]."""
+        """Return what the input's cell shows of a force [N]."""
         return force + self.input_offset
 
     def shown_output(self, force: Float[Array, "*batch"], least: float = -jnp.inf) -> Float[Array, "*batch"]:
-        """What the output's cell shows of a force [N], at least `least`."""
+        """Return what the output's cell shows of a force [N], at least `least`."""
         return _at_least(self.shown_change(force) + self.output_offset, least)
 
     def shown_change(self, change: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """What the output's cell shows of a change of the force [N]."""
+        """Return what the output's cell shows of a change of the force [N]."""
         return change * jnp.exp(-self.gain_error)
 
     def late(self, drift: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """What the error of the delay adds to the output, in the unit whose change in a second `drift` is."""
+        """Return what the error of the delay adds to the output, in the unit whose change in a second `drift` is."""
         return self.delay_error * drift
 
 
@@ -89,19 +89,19 @@ class NoiseLaw(Protocol):
     def log_density(
         self, x: Float[Array, "*batch"], mean: Array | float = 0.0, scale: Array | float = 1.0
     ) -> Float[Array, "*batch"]:
-        """Logarithm of the density of readings with a mean and a scale."""
+        """Return the logarithm of the density of readings with a mean and a scale."""
         ...
 
     def log_cdf(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Logarithm of the probability of a smaller standardized deviation."""
+        """Return the logarithm of the probability of a smaller standardized deviation."""
         ...
 
     def residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Residual of a standardized deviation; half its square is minus the log density, up to a constant."""
+        """Return the residual of a standardized deviation; half its square is minus the log density, up to a constant."""
         ...
 
     def bound_residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Residual sqrt(-2 log_cdf(u)) of a reading of which only an upper limit is known."""
+        """Return the residual sqrt(-2 log_cdf(u)) of a reading of which only an upper limit is known."""
         ...
 
     def draw(self, key: Array, shape: tuple[int, ...]) -> Array:
@@ -113,7 +113,7 @@ class NoiseLaw(Protocol):
         ...
 
     def meaning(self, plain: str) -> str:
-        """What a scale of this law means, from what it means when readings scatter normally."""
+        """Return what a scale of this law means, from what it means when readings scatter normally."""
         ...
 
 
@@ -124,32 +124,32 @@ class NormalNoise:
     def log_density(
         self, x: Float[Array, "*batch"], mean: Array | float = 0.0, scale: Array | float = 1.0
     ) -> Float[Array, "*batch"]:
-        """Logarithm of the normal density."""
+        """Return the logarithm of the normal density."""
         return norm.logpdf(x, mean, scale)
 
     def log_cdf(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Logarithm of the normal distribution function."""
+        """Return the logarithm of the normal distribution function."""
         return log_normal_cdf(u)
 
     def residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """The standardized deviation itself."""
+        """Return the standardized deviation itself."""
         return u
 
     def bound_residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Residual sqrt(-2 log Phi(u))."""
+        """Return the residual sqrt(-2 log Phi(u))."""
         # Beyond 30 sd the root is 0 to the last digit, and its derivative would be 0 times infinity.
         return jnp.where(u < 30.0, jnp.sqrt(-2 * log_normal_cdf(jnp.minimum(u, 29.0))), 0.0)
 
     def draw(self, key: Array, shape: tuple[int, ...]) -> Array:
-        """Standard normal draws."""
+        """Return standard normal draws."""
         return jax.random.normal(key, shape)
 
     def draw_with(self, generator: np.random.Generator, shape: int | tuple[int, ...]) -> np.ndarray:
-        """Standard normal draws, by NumPy."""
+        """Return standard normal draws, by NumPy."""
         return generator.standard_normal(shape)
 
     def meaning(self, plain: str) -> str:
-        """The meaning itself."""
+        """Return the meaning itself."""
         return plain
 
 
@@ -172,42 +172,42 @@ class StudentNoise:
     def log_density(
         self, x: Float[Array, "*batch"], mean: Array | float = 0.0, scale: Array | float = 1.0
     ) -> Float[Array, "*batch"]:
-        """Logarithm of the Student-t density."""
+        """Return the logarithm of the Student-t density."""
         return log_student_density((x - mean) / scale, self.freedom) - jnp.log(scale)
 
     def log_cdf(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Logarithm of the Student-t distribution function."""
+        """Return the logarithm of the Student-t distribution function."""
         return log_student_cdf(u, self.freedom)
 
     def residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Residual that grows with the root of the logarithm of a large deviation."""
+        """Return the residual that grows with the root of the logarithm of a large deviation."""
         return student_residual(u, self.freedom)
 
     def bound_residual(self, u: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Residual sqrt(-2 log T(u))."""
+        """Return the residual sqrt(-2 log T(u))."""
         return student_bound_residual(u, self.freedom)
 
     def draw(self, key: Array, shape: tuple[int, ...]) -> Array:
-        """Draws of the standard Student-t."""
+        """Return draws of the standard Student-t."""
         return jax.random.t(key, self.freedom, shape)
 
     def draw_with(self, generator: np.random.Generator, shape: int | tuple[int, ...]) -> np.ndarray:
-        """Draws of the standard Student-t, by NumPy."""
+        """Return draws of the standard Student-t, by NumPy."""
         return np.asarray(generator.standard_t(self.freedom, shape))
 
     def meaning(self, plain: str) -> str:
-        """The meaning, said of a scale that is not a standard deviation."""
+        """Return the meaning, said of a scale that is not a standard deviation."""
         scale = plain.replace("standard deviation of", "scale of").replace("scatter of", "scale of the scatter of")
         return f"{scale}, Student-t with {self.freedom} degrees of freedom"
 
 
 def noise_law(description: Description) -> NoiseLaw:
-    """How the readings of a cable's tables scatter, as its description says."""
+    """Return how the readings of a cable's tables scatter, as its description says."""
     return StudentNoise(description.student_degrees_of_freedom) if description.noise == "student" else NormalNoise()
 
 
 def scatter(key: Array, shape: tuple[int, ...], description: Description) -> Array:
-    """Deviations of simulated readings from what is expected of them, in units of their scale.
+    """Return deviations of simulated readings from what is expected of them, in units of their scale.
 
     Args:
         key: Random key.

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from bowdenfit.description.cable_parts import CableSettings, Contact, PreloadSettings, Route, StretchSettings, WrapAngle
+from bowdenfit.description.cable_parts import CableSettings, Contact, Route, WrapAngle
 from bowdenfit.description.defaults import PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
     ForceLimits,
@@ -16,6 +16,7 @@ from bowdenfit.description.measurements import (
     Tables,
     TableSettings,
 )
+from bowdenfit.description.stated_parameters import PreloadSettings, StretchSettings
 from bowdenfit.description.values import (
     Finite,
     FrictionSetting,
@@ -144,7 +145,7 @@ class Description(Display, Frozen):
         return self
 
     def _name_conflicts(self) -> Iterator[str]:
-        """What names contradict."""
+        """Yield what names contradict."""
         used = [c.friction for c in self.contact]
         for name in self.coefficients:
             if name in RESERVED_NAMES:
@@ -161,7 +162,7 @@ class Description(Display, Frozen):
             yield 'group names the one that predictions are for, which belongs to friction_model = "by-group"'
 
     def _setting_conflicts(self) -> Iterator[str]:
-        """What settings contradict."""
+        """Yield what settings contradict."""
         curved = [c for c in self.contact if c.wrap_angle.curve]
         if curved and self.route is None:
             yield f"the contact {curved[0].name!r} has a curve, so a [route] is needed: variable, unit, range"
@@ -228,7 +229,7 @@ class Description(Display, Frozen):
         return tuple(dict.fromkeys(c.wrap_angle.column for c in self.contact if c.wrap_angle.column))
 
     def sentences(self) -> list[str]:
-        """What the cable is."""
+        """Return what the cable is."""
         route, names = self.route, self.coefficients
         along = f"; {route.variable} {route.range[0]:g} to {route.range[1]:g} {route.unit}" if route else ""
         coefficients = f"the coefficient{'s' if len(names) > 1 else ''} {listed(names)}"
@@ -243,9 +244,9 @@ class Description(Display, Frozen):
         return rows, {c.name: c.wrap_angle.unit or "" for c in self.contact}
 
     def table(self, of: type[AnySettings]) -> AnySettings | None:
-        """What is said of the table whose kind has settings of a class; None if there is no such table."""
+        """Return what is said of the table whose kind has settings of a class; None if there is no such table."""
         return next((settings for settings in self.tables.stated.values() if type(settings) is of), None)
 
     def to_json(self) -> dict[str, Any]:
-        """The resolved description as plain data."""
+        """Return the resolved description as plain data."""
         return self.model_dump(mode="json", by_alias=True)

@@ -35,7 +35,7 @@ class Sensors(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _of_each_cell(cls, settings: Any) -> Any:
-        """A figure for both cells together is refused; folders of results stored with an empty one are read."""
+        """Return a figure for both cells together is refused; folders of results stored with an empty one are read."""
         if not isinstance(settings, dict) or "gain_error_sd" not in settings:
             return settings
         if (both := settings["gain_error_sd"]) is not None:

@@ -135,13 +135,13 @@ class Device(Frozen):
     _fitted: dict[str, Known] = PrivateAttr(default_factory=dict)
 
     def with_fitted(self, more: Mapping[str, Known]) -> "Device":
-        """The same with quantities that a fit tells [SI]."""
+        """Return the same with quantities that a fit tells [SI]."""
         device = self.model_copy()
         device._fitted = {**self._fitted, **more}
         return device
 
     def states(self, *keys: str) -> bool:
-        """Whether it says all of these."""
+        """Return whether it says all of these."""
         return not self.lacking(*keys)
 
     def lacking(self, *keys: str) -> list[str]:
@@ -196,7 +196,7 @@ class Device(Frozen):
 
 
 def missing_settings(what: str, missing: Sequence[str]) -> BowdenfitError:
-    """What to write into `device.toml`, by name, for an answer that needs it.
+    """Return what to write into `device.toml`, by name, for an answer that needs it.
 
     Args:
         what: That needs it, in words.

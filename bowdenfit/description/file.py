@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from bowdenfit.description import Description, ParameterSetting, QuantityValue, Route
-from bowdenfit.description.cable_parts import check_elastic, check_shares
+from bowdenfit.description.stated_parameters import check_elastic, check_shares
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
@@ -37,7 +37,7 @@ Place = tuple[str | int, ...]
 
 
 def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str, Any]]:
-    """Text and plain data of `cable.toml`.
+    """Return text and plain data of `cable.toml`.
 
     Args:
         path: The file.
@@ -54,7 +54,7 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str,
 
 
 def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """Plain data of a description with settings from the command line put in.
+    """Return plain data of a description with settings from the command line put in.
 
     Raises:
         DescriptionError: A setting is not of the form key=value, or its key leads nowhere.
@@ -65,7 +65,7 @@ def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
 
 
 def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Description:
-    """A description from plain data, with errors that name the key; `kinds.settings` parses those with tables.
+    """Return a description from plain data, with errors that name the key; `kinds.settings` parses those with tables.
 
     Args:
         raw: The data.
@@ -95,7 +95,7 @@ def validate(raw: Mapping[str, Any], model: type[Description], file: str) -> Des
 
 
 def _holds_large(value: Any) -> bool:
-    """Whether a whole number beyond what TOML allows stands in a value, which Python reads all the same."""
+    """Return whether a whole number beyond what TOML allows stands in a value, which Python reads all the same."""
     if isinstance(value, dict | list):
         return any(_holds_large(part) for part in (value.values() if isinstance(value, dict) else value))
     return isinstance(value, int) and not -(2**63) <= value < 2**63
@@ -180,7 +180,7 @@ def _set(raw: dict[str, Any], override: str) -> None:
 
 
 def find_placeholders(raw: Mapping[str, Any], text: str, file: str) -> dict[Place, DescriptionError]:
-    """The placeholders of the template that were left in a description, by where they stand.
+    """Return the placeholders of the template that were left in a description, by where they stand.
 
     Args:
         raw: Its plain data.
@@ -199,7 +199,7 @@ def find_placeholders(raw: Mapping[str, Any], text: str, file: str) -> dict[Plac
 
 
 def _strings(raw: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:
-    """Every text in plain data, with the keys that lead to it."""
+    """Yield every text in plain data, with the keys that lead to it."""
     if isinstance(raw, str):
         yield place, " ".join(raw.split())
     elif isinstance(raw, dict | list):

@@ -11,7 +11,7 @@ _LONGEST_NAME = 80
 
 
 def _nameable(name: str) -> str:
-    """A name that can be printed and told apart."""
+    """Return a name that can be printed and told apart."""
     if not name.strip():
         raise ValueError("the name is empty; write one that tells it from the others")
     if len(name) > _LONGEST_NAME:
@@ -42,11 +42,11 @@ class QuantityValue(Frozen):
     sd: Positive | None = None
 
     def to(self, dimension: str) -> float:
-        """Value in the internal unit of a kind of quantity."""
+        """Return the value in the internal unit of a kind of quantity."""
         return self.value * conversion_factor(self.unit, dimension)
 
     def sd_to(self, dimension: str) -> float | None:
-        """Standard deviation in the internal unit."""
+        """Return the standard deviation in the internal unit."""
         return None if self.sd is None else self.sd * conversion_factor(self.unit, dimension)
 
 
@@ -90,7 +90,7 @@ class UniformPrior(Frozen):
 
 
 def _stated(model: BaseModel) -> int:
-    """How many of a model's fields say something; a stored description writes the others as null."""
+    """Return how many of a model's fields say something; a stored description writes the others as null."""
     return sum(getattr(model, name) is not None for name in type(model).model_fields)
 
 
@@ -135,17 +135,3 @@ class FrictionSetting(ParameterSetting):
     """The same for a friction coefficient, which cannot be negative."""
 
     fixed: NonNegative | None = None
-
-
-
-
-
-
-
-
-
-
-
-
-
-

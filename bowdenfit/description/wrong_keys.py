@@ -21,7 +21,7 @@ _LARGE = 1e15  # a number that nobody measures
 def explain_validation_error(
     error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str = _INIT
 ) -> BowdenfitError:
-    """All that is wrong with the keys of a file.
+    """Return all that is wrong with the keys of a file.
 
     Args:
         error: What the model says.
@@ -41,7 +41,7 @@ def explain_validation_error(
 
 
 def _causes(error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel]) -> list[dict[str, Any]]:
-    """The errors without what others bring about: what is misspelled is not missing too, and a value has one fault."""
+    """Return the errors without what others bring about: what is misspelled is not missing too, and a value has one fault."""
     errors: list[dict[str, Any]] = [dict(fault) for fault in error.errors()]
     meant = set()
     unknown = [fault for fault in errors if fault["type"] == "extra_forbidden"]
@@ -72,7 +72,7 @@ def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
 
 
 def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str) -> str:
-    """What is wrong with one key."""
+    """Return what is wrong with one key."""
     where = [str(part) for part in error["loc"]]
     parts = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
     place = f"{file}, {'.'.join(parts)}" if where else file
@@ -93,7 +93,7 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
 
 
 def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
-    """How to write what must be a table of keys."""
+    """Return how to write what must be a table of keys."""
     value = error["input"]
     if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
         return f"a number needs its unit (found {shown(value)}); write it as {_with_unit(value, where)}."
@@ -102,7 +102,7 @@ def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
 
 
 def _with_unit(value: Any, where: Sequence[str]) -> str:
-    """A number with a unit that fits its place, as TOML."""
+    """Return a number with a unit that fits its place, as TOML."""
     number = value if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGE else 20
     key = ".".join(where)
     unit = KEYS[key].example.split('"')[1] if key in KEYS else "mm"
@@ -121,7 +121,7 @@ def _siblings(model: Any, path: Sequence[str]) -> list[str]:
 
 
 def _models_in(annotation: Any) -> Any:
-    """The first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
+    """Return the first model inside an annotation such as `tuple[Contact, ...]` or `Route | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):

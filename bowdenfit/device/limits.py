@@ -14,7 +14,7 @@ Number = float | np.ndarray
 
 
 def moves_by_itself(feed_forward: Number, friction: Number, damping: Number, dead_zone: Number) -> np.ndarray:
-    r"""Whether feeding forward keeps the device going: :math:`F_\text{cst} > T_f + F_m + b\,\delta v`.
+    r"""Return whether feeding forward keeps the device going: :math:`F_\text{cst} > T_f + F_m + b\,\delta v`.
 
     Args:
         feed_forward: F_cst [N m].

@@ -47,7 +47,7 @@ class LoopTransmission:
         return force + jnp.clip(force, -self.preload, self.preload)
 
     def twist(self, torque: Numbers) -> Numbers:
-        """The twist of a half that passes a torque [N m]: the inverse of `passed`."""
+        """Return the twist of a half that passes a torque [N m]: the inverse of `passed`."""
         return (
             jnp.where(jnp.abs(torque) < 2 * self.preload, torque / 2, torque - jnp.sign(torque) * self.preload)
             / self.stiffness

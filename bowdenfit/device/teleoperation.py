@@ -93,7 +93,7 @@ class MasterSlave:
 def free_motion_torque(
     gains: CouplingGains, rope_friction: Number, motor_friction: Number, slave_friction: Number
 ) -> Number:
-    r"""What a slow hand feels in free motion [N m].
+    r"""Return what a slow hand feels in free motion [N m].
 
     .. math:: T_h = \frac{T_f + F_m + C_4 (k_m/k_s) F_s}{1 + K_f + C_3 C_4 k_m/k_s}
 

@@ -4,6 +4,6 @@
 format of recordings is a module with `read(path)` and a line in `FORMATS`.
 """
 
-from bowdenfit.files.formats import FORMATS, checked_ending, is_ros2_folder, read_channels, read_here
+from bowdenfit.files.formats import FORMATS, check_ending, is_ros2_folder, read_channels, read_here
 
-__all__ = ["FORMATS", "checked_ending", "is_ros2_folder", "read_channels", "read_here"]
+__all__ = ["FORMATS", "check_ending", "is_ros2_folder", "read_channels", "read_here"]

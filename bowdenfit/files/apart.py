@@ -30,6 +30,7 @@ try:
 except ImportError:  # Windows, where readers have no limits
     resource = None  # type: ignore[assignment]
 
+# These limits are judged; tests/robustness/test_hostile_files.py holds honest and hostile files against them.
 _MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themselves, and what they unpack
 _SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
 _WALL = 8  # times the seconds of CPU, for machines that do much besides
@@ -40,7 +41,7 @@ LIMITS: ContextVar[float] = ContextVar("LIMITS", default=1.0)
 
 @contextmanager
 def limits_times(factor: float) -> Iterator[None]:
-    """Meanwhile, files may take so many times the memory and time that is usual for their size."""
+    """Let files take so many times the memory and time that is usual for their size, during a `with` block."""
     before = LIMITS.set(factor)
     try:
         yield
@@ -50,7 +51,7 @@ def limits_times(factor: float) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Limits:
-    """What reading a file may take.
+    """Memory and time that reading one file may take.
 
     Args:
         memory: Bytes beside what the reader has already.
@@ -61,14 +62,14 @@ class Limits:
     seconds: float
 
     @classmethod
-    def of(cls, path: Path) -> "Limits":
-        """By the size of the file, or of all in a folder, and `LIMITS`."""
+    def for_file(cls, path: Path) -> "Limits":
+        """Return the limits for a file, by its size or that of all files in a folder, times `LIMITS`."""
         files = path.rglob("*") if path.is_dir() else [path]
         size, factor = sum(file.stat().st_size for file in files if file.is_file()), LIMITS.get()
         return cls(int(factor * (_MEMORY + _MEMORY_PER_BYTE * size)), factor * (_SECONDS + _SECONDS_PER_BYTE * size))
 
 
-def read_apart(path: Path) -> ChannelFile:
+def read_isolated(path: Path) -> ChannelFile:
     """Read a file in the other process.
 
     Args:
@@ -77,12 +78,12 @@ def read_apart(path: Path) -> ChannelFile:
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
-    result: ChannelFile = call_apart(path, "bowdenfit.files:read_here")
+    result: ChannelFile = call_isolated(path, "bowdenfit.files:read_here")
     return replace(result, path=path)
 
 
-def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
-    """What a function makes of a file, in the other process.
+def call_isolated(path: Path, reader: str, *arguments: Any) -> Any:
+    """Return what a function makes of a file, in the other process.
 
     Args:
         path: The file.
@@ -93,34 +94,34 @@ def call_apart(path: Path, reader: str, *arguments: Any) -> Any:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
     refuse_special(path)
-    limits = Limits.of(path)
+    limits = Limits.for_file(path)
     with _request_lock:
         ended, content = _send_request(path, limits, reader, arguments)
     if content is None:
-        raise DatasetError(_broken(path, limits, ended))
+        raise DatasetError(_describe_crash(path, limits, ended))
     refused, result = pickle.loads(content)  # noqa: S301  (of our own process)
     if refused == _NO_MEMORY:
-        raise DatasetError(_too_much(path, limits, "memory"))
+        raise DatasetError(_describe_excess(path, limits, "memory"))
     if refused:
         raise DatasetError(refused)
     return result
 
 
 def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
-    """How the reader ended, None if it did not, and its answer, None if there is none."""
+    """Send one request; return the exit code of the reader, None if it still runs, and its answer, None if there is none."""
     request = json.dumps([str(path.resolve()), limits.memory, limits.seconds, name, arguments]).encode() + b"\n"
     for _ in range(2):  # one that had nothing to do may just have ended
-        reader = _reader()
+        reader = _start_reader()
         assert reader.stdin is not None and reader.stdout is not None  # both are pipes
         try:
             reader.stdin.write(request)
             reader.stdin.flush()
-            content, too_late = _answer(reader, _WALL * limits.seconds)
+            content, too_late = _read_answer(reader, _WALL * limits.seconds)
         except BrokenPipeError:
             content, too_late = b"", False
         if content:
             return None, content
-        if (ended := _end(reader)) != 0 or too_late:
+        if (ended := _end_reader(reader)) != 0 or too_late:
             return ended, None
     return 0, None
 
@@ -131,11 +132,11 @@ _readers: dict[
 _request_lock = threading.Lock()
 
 
-def _reader() -> "subprocess.Popen[bytes]":
-    """The process that reads, started if there is none."""
+def _start_reader() -> "subprocess.Popen[bytes]":
+    """Return the process that reads, started if there is none."""
     own = os.getpid()
     if own in _readers and _readers[own].poll() is not None:
-        _end(_readers[own])
+        _end_reader(_readers[own])
     if own not in _readers:
         command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
@@ -148,12 +149,13 @@ def _reader() -> "subprocess.Popen[bytes]":
 
 @atexit.register
 def _end_all() -> None:
+    """End the reader of this process when Python ends."""
     if os.getpid() in _readers:
-        _end(_readers[os.getpid()])
+        _end_reader(_readers[os.getpid()])
 
 
-def _end(reader: "subprocess.Popen[bytes]") -> int:
-    """End a reader; its exit code, or the signal that it was ended by."""
+def _end_reader(reader: "subprocess.Popen[bytes]") -> int:
+    """End a reader, and return its exit code, or minus the signal that it was ended by."""
     del _readers[os.getpid()]
     reader.kill()
     for stream in (reader.stdin, reader.stdout):
@@ -163,7 +165,7 @@ def _end(reader: "subprocess.Popen[bytes]") -> int:
     return reader.wait()
 
 
-def _answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bool]:
+def _read_answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bool]:
     """Return what a reader answers, empty if it ends before that is whole, and whether it was ended for taking too long."""
     assert reader.stdout is not None  # a pipe
     killer = threading.Timer(seconds, reader.kill)
@@ -178,16 +180,18 @@ def _answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, b
         killer.cancel()
 
 
-def _broken(path: Path, limits: Limits, ended: int | None) -> str:
+def _describe_crash(path: Path, limits: Limits, ended: int | None) -> str:
+    """Return what is said of a file at which the reader ended."""
     if ended in {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}:
-        return _too_much(path, limits, "time")
+        return _describe_excess(path, limits, "time")
     return (
         f"{path.name} cannot be read: the library that reads such files crashed on it; copy the file again from the "
         "acquisition computer, or export the recording as CSV."
     )
 
 
-def _too_much(path: Path, limits: Limits, what: str) -> str:
+def _describe_excess(path: Path, limits: Limits, what: str) -> str:
+    """Return what is said of a file that takes more than its limits."""
     most = f"{limits.memory / 2**20:.0f} MiB of memory" if what == "memory" else f"{limits.seconds:.0f} s"
     return (
         f"{path.name} takes more than {most} to read, far more than fits its size: it is damaged, or made to do so. Copy it "
@@ -209,15 +213,15 @@ def serve() -> None:
         if not line:
             break
         path, memory, seconds, name, arguments = json.loads(line)
-        _limit(memory, seconds)
-        content = pickle.dumps(_read(name, Path(path), arguments), protocol=5)
+        _limit_process(memory, seconds)
+        content = pickle.dumps(_call(name, Path(path), arguments), protocol=5)
         answers.write(_LENGTH.pack(len(content)) + content)
         answers.flush()
     os._exit(0)
 
 
-def _read(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:
-    """Why the file cannot be read, empty if it can; and what is made of it."""
+def _call(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:
+    """Return why the file cannot be read, empty if it can; and what is made of it."""
     module, _, function = name.partition(":")
     try:
         return "", getattr(import_module(module), function)(path, *arguments)
@@ -227,19 +231,19 @@ def _read(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:
         return _NO_MEMORY if isinstance(error.__cause__, MemoryError) else str(error), None
 
 
-def _limit(memory: int, seconds: float) -> None:
-    """Let this process take so much more than it has."""
+def _limit_process(memory: int, seconds: float) -> None:
+    """Limit this process to so much more memory [bytes] and CPU time [s] than it has used."""
     if resource is None:
         return
     used = resource.getrusage(resource.RUSAGE_SELF)
     most = int(used.ru_utime + used.ru_stime + seconds) + 1
-    for kind, value in ((resource.RLIMIT_CPU, most), (resource.RLIMIT_DATA, _data() + memory)):
+    for kind, value in ((resource.RLIMIT_CPU, most), (resource.RLIMIT_DATA, _data_bytes() + memory)):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
 
 
-def _data() -> int:
-    """Bytes of data that this process has."""
+def _data_bytes() -> int:
+    """Return bytes of data that this process has."""
     try:
         with Path("/proc/self/status").open() as status:
             return next(int(line.split()[1]) for line in status if line.startswith("VmData:")) * 1024

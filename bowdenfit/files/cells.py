@@ -45,18 +45,18 @@ class Decimals:
 
     @classmethod
     def of(cls, texts: Iterable[str], comma: bool) -> "Decimals":
-        """What the numbers of a file say about its decimal sign."""
+        """Return what the numbers of a file say about its decimal sign."""
         seen: dict[str, str] = {}
         for text in texts:
             if "," in text or "." in text:
-                plain = _plain(text.strip(" <=≤%"))
+                plain = _normalize(text.strip(" <=≤%"))
                 match = _NUMBER.fullmatch(plain) or _GROUPED.fullmatch(plain)
                 if match and match["mark"] and match.start("mark") > 0 and not _AMBIGUOUS.fullmatch(plain):
                     seen.setdefault(match["mark"], plain)
         return cls(comma, seen)
 
     def of_columns(self, columns: Sequence[Sequence[str]]) -> list["Decimals"]:
-        """Decimals of each column: with its own first whole number of three digits or more, if it has one.
+        """Return decimals of each column: with its own first whole number of three digits or more, if it has one.
 
         A column in which every number has three digits behind a mark, of which the last is 0, may hold thousands too; where
         all such numbers of the file are so round, a whole number of another column speaks for that.
@@ -71,7 +71,7 @@ class Decimals:
         return [replace(self, whole=whole) for whole in wholes]
 
     def other(self, mark: str) -> str | None:
-        """A number of the file that speaks against `mark` being decimal."""
+        """Return a number of the file that speaks against `mark` being decimal."""
         return self.seen.get("," if mark == "." else ".")
 
 
@@ -86,7 +86,7 @@ class Cell:
     decimals: Decimals = Decimals()
 
     def refuse(self, what: str) -> DatasetError:
-        """An error that names this cell."""
+        """Return an error that names this cell."""
         error = DatasetError(f"{self.file}, row {self.row}, column {shown(self.column)}: {what}")
         error.fault_key, error.row = (self.file, self.column, what.replace(self.shown, "")), self.row
         return error
@@ -102,7 +102,7 @@ class Cell:
         return self.text.strip().lower() in BLANK
 
     def number(self) -> float:
-        """The number in this cell.
+        """Return the number in this cell.
 
         Raises:
             DatasetError: The cell is blank, is text, or is not finite.
@@ -112,19 +112,19 @@ class Cell:
         return self._parse(self.text)
 
     def percentage(self) -> float | None:
-        """The number where the cell itself carries a percent sign ("78.5 %"), else None."""
+        """Return the number where the cell itself carries a percent sign ("78.5 %"), else None."""
         text = self.text.strip()
         return self._parse(text[:-1]) / 100 if text.endswith("%") else None
 
     def limit(self) -> float | None:
-        """The number behind a less-than sign ("<10"), else None."""
+        """Return the number behind a less-than sign ("<10"), else None."""
         match = _UNDETECTED.fullmatch(self.text.strip())
         return self._parse(match["limit"]) if match else None
 
     def no_sample(self, decimal: str) -> DatasetError:
-        """An error that says why this cell is no sample of a recording with this decimal mark."""
+        """Return an error that says why this cell is no sample of a recording with this decimal mark."""
         other = "," if decimal == "." else "."
-        mixed = number_of(self.text, other) is not None
+        mixed = parse_number(self.text, other) is not None
         return self.refuse(
             f"{self.shown} is not a number"
             + (f" like the others, which have a decimal {'comma' if other == '.' else 'point'}" if mixed else "")
@@ -132,7 +132,7 @@ class Cell:
         )
 
     def _parse(self, text: str) -> float:
-        plain = _plain(text)
+        plain = _normalize(text)
         if plain.lower() in NOT_FINITE:
             raise self.refuse(f"{self.shown} is not a finite number; correct the value or delete the row.")
         if _AMBIGUOUS.fullmatch(plain):
@@ -148,7 +148,7 @@ class Cell:
         return float(written)
 
     def _refuse_ambiguous(self, text: str) -> None:
-        """Three digits behind a separator are decimals only where the file leaves no doubt."""
+        """Refuse three digits behind a separator, unless the file leaves no doubt that they are decimals."""
         mark = "," if "," in text else "."
         meanings = f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}"
         if mark == "," and not self.decimals.comma:
@@ -165,34 +165,34 @@ class Cell:
             )
 
 
-def number_of(text: str, decimal: str) -> float | None:
-    """The number of a recording with one decimal mark, NaN where it is missing, None where there is text."""
-    match = _NUMBER.fullmatch(text) or _NUMBER.fullmatch(_plain(text))
+def parse_number(text: str, decimal: str) -> float | None:
+    """Return the number of a recording with one decimal mark, NaN where it is missing, None where there is text."""
+    match = _NUMBER.fullmatch(text) or _NUMBER.fullmatch(_normalize(text))
     if match:
         return float(match[0].replace(",", ".")) if match["mark"] in (None, decimal) else None
-    return math.nan if _plain(text).lower() in MISSING else None
+    return math.nan if _normalize(text).lower() in MISSING else None
 
 
-def kind_of(text: str, decimal: str) -> Kind:
-    """What stands in a cell of a recording."""
-    value = number_of(text, decimal)
+def classify_cell(text: str, decimal: str) -> Kind:
+    """Return what stands in a cell of a recording."""
+    value = parse_number(text, decimal)
     if value is not None:
         return "blank" if math.isnan(value) else "number"
     return "date" if is_date(text.strip()) else "text"
 
 
 def is_plain_number(text: str) -> bool:
-    """Whether a text is a number in any spelling, with separators of thousands where they belong."""
-    return _with_decimal_point(_plain(text)) is not None
+    """Return whether a text is a number in any spelling, with separators of thousands where they belong."""
+    return _with_decimal_point(_normalize(text)) is not None
 
 
-def _plain(text: str) -> str:
-    """A number without the finer points of typography."""
+def _normalize(text: str) -> str:
+    """Return a number without the finer points of typography."""
     return text.strip().translate(_TYPOGRAPHY)
 
 
 def _with_decimal_point(text: str) -> str | None:
-    """The number in Python's spelling, or None if it is none; separators of thousands must stand where they belong."""
+    """Return the number in Python's spelling, or None if it is none; separators of thousands must stand where they belong."""
     if _NUMBER.fullmatch(text):
         return text.replace(",", ".")
     if (fraction := _FRACTION.fullmatch(text)) and int(fraction["over"]) < int(fraction["under"]):

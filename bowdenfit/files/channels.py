@@ -1,7 +1,8 @@
 """The channels of one file, and what all readers of recordings share.
 
 A channel is a named column of numbers as the acquisition wrote it, before anybody says what it means. Readers load their
-library with `load`, refuse damaged and huge files in a sentence, and end with `channel_file`, which says what was left out.
+library with `load_library`, refuse damaged and huge files in a sentence, and end with `make_channel_file`, which says what was
+left out.
 """
 
 import importlib
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.pieces import sample
+from bowdenfit.files.pieces import subsample
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.types import Vector
 from bowdenfit.words import quoted
@@ -50,7 +51,7 @@ class Channel:
         """Samples a second, by the median step of the clock; NaN without one."""
         if self.time is None or len(self.time) < 2:
             return float("nan")
-        step = float(np.median(np.diff(sample(self.time))))
+        step = float(np.median(np.diff(subsample(self.time))))
         return 1 / step if step > 0 else float("nan")
 
 
@@ -73,8 +74,8 @@ class ChannelFile:
     account: RowAccount | None = None
 
 
-def with_unique_names(channels: Sequence[Channel]) -> tuple[Channel, ...]:
-    """Channels with numbers behind names that stand there twice: "45", "45 (2)", "45 (3)"."""
+def make_names_unique(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Return channels with numbers behind names that stand there twice: "45", "45 (2)", "45 (3)"."""
     taken = {channel.name for channel in channels}
     seen: set[str] = set()
     named = []
@@ -103,14 +104,14 @@ class UnreadNames:
         self.names.setdefault(why, []).append(name)
 
     def remarks(self) -> tuple[str, ...]:
-        """One sentence for each reason."""
+        """Return one sentence for each reason."""
         return tuple(f"Left out because {why}: {quoted(tuple(names))}." for why, names in self.names.items())
 
 
-def channel_file(
+def make_channel_file(
     path: Path, kind: str, channels: Sequence[Channel], left_out: UnreadNames, remarks: Sequence[str] = ()
 ) -> ChannelFile:
-    """The channels of a file with unique names, and the remarks on it.
+    """Return the channels of a file with unique names, and the remarks on it.
 
     Raises:
         DatasetError: There is no numeric channel at all.
@@ -121,11 +122,11 @@ def channel_file(
             f"{path.name} holds no recording that can be read: no channel with several numbers. "
             f"{' '.join((*sentences, ''))}Save the forces as plain vectors of numbers, or export the recording as CSV."
         )
-    return ChannelFile(path, kind, with_unique_names(channels), sentences)
+    return ChannelFile(path, kind, make_names_unique(channels), sentences)
 
 
-def load(module: str, kind: str) -> ModuleType:
-    """The library called `module`.
+def load_library(module: str, kind: str) -> ModuleType:
+    """Return the library called `module`.
 
     Args:
         module: Name to import, such as "openpyxl" or "pyarrow.parquet".
@@ -161,18 +162,18 @@ def refuse_damage(path: Path) -> Iterator[None]:
         ) from error
     # The libraries raise anything on damaged files: OSError, ValueError, KeyError, struct.error, zlib.error, their own.
     except Exception as error:
-        raise cut_off(path, f"{type(error).__name__}: {error}") from error
+        raise truncation_error(path, f"{type(error).__name__}: {error}") from error
 
 
-def cut_off(path: Path, seen: str) -> DatasetError:
-    """Refusal of a file that ends early or is damaged."""
+def truncation_error(path: Path, seen: str) -> DatasetError:
+    """Return the refusal of a file that ends early or is damaged."""
     words = " ".join(seen.replace(f"{path.parent}/", "").split()).rstrip(".:")
     words = words if len(words) <= 160 else f"{words[:157]}..."
     return DatasetError(f"{path.name} is cut off or damaged ({words}); copy it again from the acquisition computer.")
 
 
-def kept_of_cut(path: Path, what: str) -> str:
-    """The remark on a file that ends early, of which `what` could be read."""
+def describe_truncation(path: Path, what: str) -> str:
+    """Return the remark on a file that ends early, of which `what` could be read."""
     return (
         f"{path.name} is cut off: {what} were kept. Copy the file again from the acquisition computer if there should be "
         "more."
@@ -212,10 +213,10 @@ def refuse_larger(path: Path, most: int, remedy: str) -> None:
 
 
 def is_numeric(dtype: np.dtype[Any]) -> bool:
-    """Whether values of this type are real numbers, or true and false."""
+    """Return whether values of this type are real numbers, or true and false."""
     return dtype.kind in "fiub"
 
 
-def numbers(values: np.ndarray) -> Vector:
-    """Samples as 64-bit floats, one after the other in memory."""
+def to_floats(values: np.ndarray) -> Vector:
+    """Return samples as 64-bit floats, one after the other in memory."""
     return np.ascontiguousarray(values, dtype=np.float64).reshape(-1)

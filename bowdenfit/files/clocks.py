@@ -1,8 +1,8 @@
 """The time of each channel of a recording: from a column that is a clock, or from a stated sampling rate.
 
-Sheets have clocks beside their channels (`with_clocks`); files with groups have them in the same group or around it
-(`with_column_clocks`). A sampling rate may be a single number in the file (`with_interval`), or a line over the data
-(`with_rate`).
+Sheets have clocks beside their channels (`assign_clocks`); files with groups have them in the same group or around it
+(`assign_group_clocks`). A sampling rate may be a single number in the file (`assign_interval_times`), or a line over the data
+(`assign_rate_times`).
 """
 
 import math
@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, load
-from bowdenfit.files.pieces import last_set, rises
+from bowdenfit.files.channels import Channel, load_library
+from bowdenfit.files.pieces import last_set, never_falls
 from bowdenfit.types import Vector
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
@@ -31,7 +31,7 @@ _EPOCH_UNITS = (
     (1e14, 1e-6),
     (1e11, 1e-3),
 )  # no recording lasts 3000 years: these are dates in ns, us, ms
-_YEARS = 1e8  # [s], three years
+_YEARS = 1e8  # [s], three years: no recording lasts so long, so such numbers are dates
 _HALF_DAY, _DAY = 43200.0, 86400.0
 _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4}(?: .*)?")
 _TIME_OF_DAY = re.compile(r"\d{1,3}:\d\d(?::\d\d(?:[.,]\d+)?)?")
@@ -59,10 +59,10 @@ _PERIOD_UNITS = ("s", "ms", "us", "µs", "ns")
 _RATE_FACTORS = {"khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
-def with_clocks(
+def assign_clocks(
     channels: Sequence[Channel], groups: Callable[[str], Iterable[str]] = lambda _: ("",)
 ) -> tuple[Channel, ...]:
-    """The channels, each with the time that its clock gives.
+    """Return the channels, each with the time that its clock gives.
 
     The clock of a channel is the nearest clock to its left that has as many samples, so that sheets with a pair of
     columns for each run work; without one to the left, the nearest to the right. Clocks stay channels of their own, and
@@ -76,7 +76,7 @@ def with_clocks(
     """
     own = [next(iter(groups(channel.name)), "") for channel in channels]
     clocks = [i for i, c in enumerate(channels) if is_clock(replace(c, name=c.name.removeprefix(own[i])))]
-    seconds = {i: seconds_of(channels[i]) for i in clocks}
+    seconds = {i: clock_seconds(channels[i]) for i in clocks}
 
     def timed(position: int, channel: Channel) -> Channel:
         if channel.time is not None or position in clocks:
@@ -91,21 +91,21 @@ def with_clocks(
     return tuple(timed(i, channel) for i, channel in enumerate(channels))
 
 
-def with_column_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+def assign_group_clocks(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     """Give each channel without a time that of the nearest time channel of its group, else of the groups around it.
 
     Args:
         channels: Channels with their groups before their names, as "bench/F_in" or "rec.F_in".
     """
-    return with_clocks(channels, groups_around)
+    return assign_clocks(channels, groups_around)
 
 
-def with_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+def assign_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     """Give the channels that have no time yet that of the only time channel of the file, wherever it stands."""
     clocks = [c for c in channels if is_clock(replace(c, name=c.name.removeprefix(_group(c.name))))]
     if len(clocks) != 1:
         return tuple(channels)
-    (clock,), seconds = clocks, seconds_of(clocks[0])
+    (clock,), seconds = clocks, clock_seconds(clocks[0])
     return tuple(
         channel
         if channel is clock or channel.time is not None or len(channel.values) != len(seconds)
@@ -115,7 +115,7 @@ def with_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
 
 
 def groups_around(name: str) -> Iterator[str]:
-    """The group of a channel and those around it, to the file as a whole: "rec.run.", "rec." and "" of "rec.run.F"."""
+    """Yield the group of a channel and those around it, to the file as a whole: "rec.run.", "rec." and "" of "rec.run.F"."""
     while name:
         name = _group(name)
         yield name
@@ -123,25 +123,25 @@ def groups_around(name: str) -> Iterator[str]:
 
 
 def _group(name: str) -> str:
-    """The groups before the name."""
+    """Return the groups before the name."""
     return name.removesuffix(re.split(r"[/.](?=[^/.]+$)", name)[-1])
 
 
 def is_clock(channel: Channel) -> bool:
-    """Whether a channel is a time, by its name or by its unit.
+    """Return whether a channel is a time, by its name or by its unit.
 
     A name says so if its first or last word does, unless the unit is that of something else. A channel that only has
     a unit of time must also never run backwards.
     """
     factor = _time_factor(channel.unit)
-    forward = len(channel.values) > 1 and rises(channel.values)
+    forward = len(channel.values) > 1 and never_falls(channel.values)
     if names_time(channel.name) and (forward or not _TENSION.fullmatch(channel.name)):
         return not channel.unit or factor is not None
     return factor is not None and forward
 
 
 def names_time(heading: str) -> bool:
-    """Whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
+    """Return whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
     if _RATIO.fullmatch(heading.strip()):
         return False
     plain = heading.rpartition("/")[2].strip().lower()
@@ -153,8 +153,8 @@ def names_time(heading: str) -> bool:
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW
 
 
-def seconds_of(clock: Channel) -> Vector:
-    """The times that a clock shows, from its first where they can only be dates [s]."""
+def clock_seconds(clock: Channel) -> Vector:
+    """Return the times that a clock shows, from its first where they can only be dates [s]."""
     finite = np.isfinite(clock.values)
     lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
     largest = max(-lowest, highest)
@@ -162,20 +162,20 @@ def seconds_of(clock: Channel) -> Vector:
     if factor is None:
         factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
     if largest * factor > _YEARS:
-        return _from_first(clock.values) * factor
+        return _subtract_first(clock.values) * factor
     return clock.values if factor == 1 else clock.values * factor
 
 
 def _time_factor(unit: str) -> float | None:
-    """Factor from a unit to seconds; None if it is no unit of time."""
+    """Return the factor from a unit to seconds; None if it is no unit of time."""
     try:
         return conversion_factor("s" if unit.lower() in _SECOND_SPELLINGS else unit, "time") if unit else None
     except DatasetError:
         return None
 
 
-def without_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
-    """The channels without the blank cells below them, where runs of different length stand side by side.
+def trim_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Return the channels without the blank cells below them, where runs of different length stand side by side.
 
     All channels of one clock keep one length: that of the longest of them.
     """
@@ -185,23 +185,23 @@ def without_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     kept: list[Channel] = []
     for _, group in groupby(zip(blocks.tolist(), channels, strict=True), key=lambda pair: pair[0]):
         block = [channel for _, channel in group]
-        length = max(_filled(channel.values) for channel in block)
+        length = max(_filled_length(channel.values) for channel in block)
         kept += [replace(channel, values=channel.values[:length]) for channel in block]
     return tuple(kept)
 
 
-def _filled(values: Vector) -> int:
-    """Number of samples up to the last that is none of the blank ones."""
+def _filled_length(values: Vector) -> int:
+    """Return the number of samples up to the last that is none of the blank ones."""
     return last_set(~np.isnan(values), len(values)) + 1
 
 
 def is_date(text: str) -> bool:
-    """Whether a cell is a date with or without time, or a time of day."""
+    """Return whether a cell is a date with or without time, or a time of day."""
     return bool(_DATE.fullmatch(text) or _TIME_OF_DAY.fullmatch(text))
 
 
-def seconds_of_dates(texts: Iterable[str], source: str) -> Vector:
-    """Seconds from the first of some dates; a time of day may pass midnight.
+def parse_dates(texts: Iterable[str], source: str) -> Vector:
+    """Return seconds from the first of some dates; a time of day may pass midnight.
 
     Args:
         texts: Dates such as "2021-02-04 14:52:00.120", "04.02.2021 14:52:00,120" or "14:52:00.120"; blank is missing.
@@ -210,24 +210,24 @@ def seconds_of_dates(texts: Iterable[str], source: str) -> Vector:
     Raises:
         DatasetError: A text is no date.
     """
-    pandas = load("pandas", "CSV")
+    pandas = load_library("pandas", "CSV")
     written = pandas.Series([text.strip().replace(",", ".") for text in texts], dtype=object)
     written = written.where(written != "", None)
     first = str(next((text for text in written if text), ""))
     try:
         if _TIME_OF_DAY.fullmatch(first):
-            return _from_first(_past_midnight(_times_of_day(written)))
+            return _subtract_first(_unwrap_midnight(_times_of_day(written)))
         form = "ISO8601" if re.match(r"\d{4}-\d\d-\d\d", first) else "mixed"
         dates = pandas.to_datetime(written, format=form, dayfirst="." in first[:3], utc=True)
     except ValueError as error:
         raise DatasetError(
             f"{source}: a cell is no date or time like the others ({error}); correct it, or write the time in seconds."
         ) from None
-    return _from_first((dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy(dtype=float))
+    return _subtract_first((dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy(dtype=float))
 
 
 def _times_of_day(texts: Iterable[str | None]) -> Vector:
-    """Seconds of "14:52:00.120" or "52:00"; two numbers are hours and minutes.
+    """Return seconds of "14:52:00.120" or "52:00"; two numbers are hours and minutes.
 
     Raises:
         ValueError: A text is neither.
@@ -236,17 +236,19 @@ def _times_of_day(texts: Iterable[str | None]) -> Vector:
     return np.array([sum(float(part) * 60.0 ** (2 - i) for i, part in enumerate(row)) for row in parts], dtype=float)
 
 
-def _past_midnight(seconds: Vector) -> Vector:
+def _unwrap_midnight(seconds: Vector) -> Vector:
+    """Return times of day that go on rising past midnight: a fall by more than half a day is a new day."""
     steps = np.diff(seconds, prepend=seconds[:1])
     return seconds + _DAY * np.cumsum(steps < -_HALF_DAY)
 
 
-def _from_first(seconds: Vector) -> Vector:
+def _subtract_first(seconds: Vector) -> Vector:
+    """Return seconds from the first that is known."""
     finite = seconds[np.isfinite(seconds)]
     return seconds - finite[0] if len(finite) else seconds
 
 
-def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+def assign_interval_times(channels: Iterable[Channel], settings: Settings) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
     """Give channels without a clock the times that follow from their sampling rate, and say so.
 
     Args:
@@ -272,28 +274,28 @@ def with_interval(channels: Iterable[Channel], settings: Settings) -> tuple[tupl
 
 
 def _nearest(name: str, settings: Settings) -> tuple[float, str] | None:
-    """Seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
+    """Return seconds between samples, by the first setting of a channel itself, its group or those around it, and its name."""
     owners = (_INDEX.sub("", name), *(group[:-1] for group in groups_around(name)))
     intervals = (_interval(*setting) for owner in owners for setting in settings.get(owner, {}).items())
     return next((interval for interval in intervals if interval), None)
 
 
 def _interval(name: str, value: Any) -> tuple[float, str] | None:
-    """Seconds between samples by one setting, and its name; None if it says nothing of them."""
-    number, words = _positive(value), {_plain(name), _plain(name.rpartition(".")[2])}
+    """Return seconds between samples by one setting, and its name; None if it says nothing of them."""
+    number, words = _positive(value), {_normalize(name), _normalize(name.rpartition(".")[2])}
     if number is not None and words & _RATE_NAMES:
         return 1 / number, name
     return (number, name) if number is not None and words & _INTERVAL_NAMES else None
 
 
-def _plain(name: str) -> str:
-    """The name in lower case without what separates words and without a unit behind it."""
+def _normalize(name: str) -> str:
+    """Return the name in lower case without what separates words and without a unit behind it."""
     letters = name.lower().replace("_", "").replace(" ", "").replace("-", "").replace(".", "")
     return letters.removesuffix("hz") or letters
 
 
 def _positive(value: Any) -> float | None:
-    """The value as a number if it is one, single, finite and above 0."""
+    """Return the value as a number if it is one, single, finite and above 0."""
     array = np.asarray(value)
     if array.size != 1 or array.dtype.kind not in "fiu":
         return None
@@ -302,7 +304,7 @@ def _positive(value: Any) -> float | None:
 
 
 def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
-    """Sampling rate [Hz] that the lines over the data state, and the line; None if none does."""
+    """Return the sampling rate [Hz] that the lines over the data state, and the line; None if none does."""
     for line in lines:
         plain = " ".join(line.replace('"', " ").strip(" #%;,\t\r\n").split())
         match = _STATED_RATE.search(plain)
@@ -315,8 +317,8 @@ def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
     return None
 
 
-def with_rate(channels: Sequence[Channel], lines: Sequence[str]) -> tuple[tuple[Channel, ...], list[str]]:
-    """Channels without any clock get one from the sampling rate stated over the data, and a remark says so."""
+def assign_rate_times(channels: Sequence[Channel], lines: Sequence[str]) -> tuple[tuple[Channel, ...], list[str]]:
+    """Give channels without any clock the times by a sampling rate stated over the data, and say so in a remark."""
     if any(channel.time is not None or names_time(channel.name) for channel in channels):
         return tuple(channels), []
     stated = stated_rate(lines)

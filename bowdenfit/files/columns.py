@@ -23,7 +23,7 @@ from bowdenfit.units import (
 from bowdenfit.words import listed, quoted, shown
 
 Value = TypeVar("Value")
-_ALIKE = 0.5  # likeness from which a quantity that there is not is taken for a misspelled one
+_ALIKE = 0.5  # judged: difflib's likeness from which an unknown quantity is taken for a misspelled one
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class Column:
     known: bool = True
 
     def read_cells(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
-        """Every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
+        """Return every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
         return self.faults.read_all(read, self.cells, otherwise) if self.known else [otherwise] * len(self.cells)
 
     def value(self, cell: Cell) -> float:
-        """The number in one of the cells, in the internal unit.
+        """Return the number in one of the cells, in the internal unit.
 
         Raises:
             DatasetError: The cell is blank, is text, or is not finite.
@@ -64,7 +64,7 @@ class Column:
         return value
 
     def numbers(self) -> list[float]:
-        """All values in the internal unit; every cell must hold one, and those that hold none are noted."""
+        """Return all values in the internal unit; every cell must hold one, and those that hold none are noted."""
         return self.read_cells(self.value, nan)
 
 
@@ -74,7 +74,7 @@ def find_columns(
     sources: Mapping[str, ColumnSource] | None = None,
     unused: tuple[str, ...] = (),
 ) -> dict[str, Column]:
-    """The wanted quantities that the table has; what is wrong with a column is noted among the table's faults.
+    """Return the wanted quantities that the table has; what is wrong with a column is noted among the table's faults.
 
     That is a heading that fits two quantities, or two headings that fit one; a unit that is missing, unknown or of the wrong
     dimension; a named column that is not there, or is named for what the table cannot have.
@@ -85,9 +85,9 @@ def find_columns(
         sources: Columns the user has named explicitly; these are not searched for.
         unused: Names that the user may give a column although nothing reads it.
     """
-    sources = {name: _as_in_header(table, source) for name, source in (sources or {}).items()}
-    wrong = _wrong_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
-    by_quantity: dict[str, Column] = {name: _unknown(table, name) for name in wrong}
+    sources = {name: _match_header(table, source) for name, source in (sources or {}).items()}
+    wrong = _note_wrong_sources(table, [*(quantity.name for quantity in wanted), *unused], sources)
+    by_quantity: dict[str, Column] = {name: _missing_column(table, name) for name in wrong}
     taken = {source.name for source in sources.values()}
     headings = [("" if text in taken else text, unit) for text, unit in zip(table.header, table.units, strict=True)]
     _check_single_meaning(table, headings, wanted, sources)
@@ -96,10 +96,10 @@ def find_columns(
     for quantity in wanted:
         columns = can_be[quantity.name]
         if quantity.name in sources or columns:
-            by_quantity[quantity.name] = _unknown(table, quantity.name)
+            by_quantity[quantity.name] = _missing_column(table, quantity.name)
         with table.faults.collect():
             if len(columns) > 1:
-                raise _ambiguous(table, quantity.name, columns)
+                raise _ambiguous_column_error(table, quantity.name, columns)
             if quantity.name in sources and quantity.name not in wrong:
                 by_quantity[quantity.name] = _named_column(table, quantity, sources[quantity.name])
             elif columns:
@@ -107,13 +107,13 @@ def find_columns(
     return by_quantity
 
 
-def _unknown(table: RawTable, name: str) -> Column:
-    """What stands for a column that is wrong or missing while reading goes on."""
+def _missing_column(table: RawTable, name: str) -> Column:
+    """Return what stands for a column that is wrong or missing while reading goes on."""
     return Column(name, tuple(Cell(table.file, row[0].row, name, "") for row in table.rows), nan, None, table.faults, False)
 
 
-def _as_in_header(table: RawTable, source: ColumnSource) -> ColumnSource:
-    """A source as `read_csv` keeps headings: one space for any run of spaces; a heading may have a colon itself."""
+def _match_header(table: RawTable, source: ColumnSource) -> ColumnSource:
+    """Return a source as `read_csv` keeps headings: one space for any run of spaces; a heading may have a colon itself."""
     name = " ".join(source.name.split())
     whole = f"{name}:{source.unit}"
     return ColumnSource(name=whole) if whole in table.header else ColumnSource(name=name, unit=source.unit)
@@ -151,7 +151,7 @@ def _check_known_units(
             )
 
 
-def _ambiguous(table: RawTable, quantity: str, columns: Sequence[MatchedColumn]) -> DatasetError:
+def _ambiguous_column_error(table: RawTable, quantity: str, columns: Sequence[MatchedColumn]) -> DatasetError:
     names = [table.header[candidate.position] for candidate in columns]
     both = "both" if len(names) == 2 else "all"
     return DatasetError(
@@ -162,24 +162,24 @@ def _ambiguous(table: RawTable, quantity: str, columns: Sequence[MatchedColumn])
 
 
 def require_column(table: RawTable, columns: Mapping[str, Column], name: str, example: str) -> Column:
-    """The column called `name`; that there is none is noted among the table's faults."""
+    """Return the column called `name`; that there is none is noted among the table's faults."""
     if name in columns:
         return columns[name]
-    table.faults.faults.append(_missing(table, name, example))
-    return _unknown(table, name)
+    table.faults.faults.append(_missing_column_error(table, name, example))
+    return _missing_column(table, name)
 
 
-def _missing(table: RawTable, name: str, example: str) -> DatasetError:
+def _missing_column_error(table: RawTable, name: str, example: str) -> DatasetError:
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
     option = option_naming(name, "NAME", unit.replace("_", "*"))
     return DatasetError(
-        f"{table.file} has no column {name}{_nearest(name, table.header)}; it has {quoted(table.header)}. Name the column "
-        f"{example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
+        f"{table.file} has no column {name}{_suggest_heading(name, table.header)}; it has {quoted(table.header)}. Name the "
+        f"column {example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
 
 
 def describe_paired_headings(table: RawTable, columns: Mapping[str, Column], stated: Collection[str]) -> list[str]:
-    """What is said of headings that tell the ends of the cable only together, such as T1 and T2."""
+    """Return what is said of headings that tell the ends of the cable only together, such as T1 and T2."""
     ends = {name: columns[name].heading for name in ("input_force", "output_force") if name in columns}
     spellings = [parse_heading(heading) for name, heading in ends.items() if name not in stated]
     if len(ends) < 2 or not any(spelling and spelling.pair for spelling in spellings):
@@ -191,7 +191,7 @@ def describe_paired_headings(table: RawTable, columns: Mapping[str, Column], sta
     ]
 
 
-def _nearest(name: str, header: tuple[str, ...]) -> str:
+def _suggest_heading(name: str, header: tuple[str, ...]) -> str:
     near = difflib.get_close_matches(name, [plain_name(h) for h in header], n=1, cutoff=0.7)
     match = next((h for h in header if near and plain_name(h) == near[0]), None)
     return f" (is it {shown(match)}?)" if match else ""
@@ -202,7 +202,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
     if quantity.dimension in {"text", "ratio"} and unit is None:
         return Column(heading, cells, 1.0, None, table.faults)
     if unit is None:
-        usual = quantity.to or _usual(quantity.dimension)
+        usual = quantity.to or _usual_unit(quantity.dimension)
         raise DatasetError(
             f"{table.file}: the column {shown(heading)} does not say its unit; rename it to {quantity.name}_{usual} (or the "
             f"unit it is in), or give the unit, such as {option_naming(quantity.name, heading, usual.replace('_', '*'))}, in "
@@ -220,13 +220,13 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
     return Column(heading, cells, factor, unit, table.faults)
 
 
-def _usual(dimension: str) -> str:
+def _usual_unit(dimension: str) -> str:
     return {"force": "N", "angle": "deg", "length": "mm", "speed": "mm/s", "time": "s", "torque": "N_m"}.get(
         dimension, "mm"
     )
 
 
-def _wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> set[str]:
+def _note_wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> set[str]:
     """Quantities whose column is none of the file's, serves another already, or cannot be; what is wrong is noted.
 
     One that is misspelled is wrong under the name that is meant.

@@ -1,6 +1,6 @@
 """Recordings in CSV files and their relatives, a million rows and more.
 
-The first lines tell encoding, separator, decimal mark and headings (`start_of`). Then pandas reads all rows but the last
+The first lines tell encoding, separator, decimal mark and headings (`read_start`). Then pandas reads all rows but the last
 few, which are read cell by cell, because statistics and remarks may stand below the data and the file may break off there.
 """
 
@@ -16,51 +16,58 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import MISSING
-from bowdenfit.files.channels import ChannelFile, UnreadNames, channel_file, load, refuse_larger, refuse_too_large
-from bowdenfit.files.clocks import with_rate
+from bowdenfit.files.channels import (
+    ChannelFile,
+    UnreadNames,
+    load_library,
+    make_channel_file,
+    refuse_larger,
+    refuse_too_large,
+)
+from bowdenfit.files.clocks import assign_rate_times
 from bowdenfit.files.headings import Heading, heading_of
-from bowdenfit.files.layout import Layout, is_summary, layout_of
-from bowdenfit.files.pieces import rises
-from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT, RowAccount, account_of
+from bowdenfit.files.layout import Layout, find_layout, is_summary
+from bowdenfit.files.pieces import never_falls
+from bowdenfit.files.row_account import ABOVE, BLANK, COMMENT, RowAccount, make_account
 from bowdenfit.files.sheet_columns import (
     DATA,
     EMPTY,
     SPACE,
     SheetColumns,
     SheetRows,
-    cells_of_sheet,
-    channels_of,
-    columns_of,
+    make_channels,
+    read_cells,
+    read_columns,
 )
 from bowdenfit.files.text_file import (
     SEPARATORS,
     CsvRecord,
     Line,
     Section,
-    cells_of,
     comment_mark,
+    count_rows_before,
     declared_separator,
     first_bytes,
     first_lines,
     is_blank,
     last_lines,
     lines_between,
-    records,
-    rows_before,
-    too_many_cells,
+    refuse_long_row,
+    split_cells,
+    split_records,
 )
 
-LARGEST_BYTES = 2 << 30
-_FIRST_BYTES = 1 << 18
+LARGEST_BYTES = 2 << 30  # judged: some 80 million rows of a time and two forces, a day at 1 kHz
+_FIRST_BYTES = 1 << 18  # judged: far more than the lines over the data and `_FIRST_LINES` rows have
 _LAST_BYTES = 1 << 16
-_LAST_ROWS = 200  # with all that may stand below the data
+_LAST_ROWS = 200  # judged: with all that may stand below the data
 _FEW_BYTES = 1 << 16  # of data; cell by cell they take 0.03 s, and pandas 0.2 s to load
-_ROWS_AT_ONCE = 200_000
-_MANY_ROWS = 1 << 22
+_ROWS_AT_ONCE = 200_000  # some 10 MB of numbers a chunk, little beside what is kept
+_MANY_ROWS = 1 << 22  # from which memory counts: see `read`
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
 _CUT = "the file breaks off there"
-_FIRST_LINES = 300
-_HEADING_LINES = 12
+_FIRST_LINES = 300  # judged: in which headings and the first data must stand
+_HEADING_LINES = 12  # judged: lines over which a quoted heading may run
 # Equal readings of a file are decided by the order; "1,2" is two numbers before it is one with a decimal comma.
 _HABITS = (*((s, d) for s in SEPARATORS for d in ".," if (s, d) != (",", ",")), (",", ","))
 
@@ -112,7 +119,7 @@ def read(path: Path) -> ChannelFile:
     """
     data = first_bytes(path, _FIRST_BYTES)
     refuse_larger(path, LARGEST_BYTES, "convert it to Parquet with the needed columns only, or cut it into runs")
-    sheet = start_of(path, data)
+    sheet = read_start(path, data)
     last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)[-_LAST_ROWS:]
     cut = _is_cut(last[-51:], sheet.separator)
     stop = last[-1].start if cut else path.stat().st_size
@@ -122,18 +129,18 @@ def read(path: Path) -> ChannelFile:
     read_plain = _read_short if split - sheet.start < _FEW_BYTES else _read_long
     plain = read_plain(path, sheet, split) if split > sheet.start else {}
     quick = (sheet.start, 0) if not plain else (split, sum(map(len, next(iter(plain.values())))))
-    columns = columns_of(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
-    channels, left_out = channels_of(sheet.layout, columns.values)
-    timed, clock = with_rate(channels, sheet.metadata)
-    row = rows_before(path, stop) + 1 if cut else 0
+    columns = read_columns(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
+    channels, left_out = make_channels(sheet.layout, columns.values)
+    timed, clock = assign_rate_times(channels, sheet.metadata)
+    row = count_rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []
-    whole = channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *columns.remarks, *clock))
-    return replace(whole, account=account_of_csv(path, sheet, columns, quick, stop))
+    whole = make_channel_file(path, "CSV", timed, UnreadNames(), (*left_out, *broken, *columns.remarks, *clock))
+    return replace(whole, account=_account_rows(path, sheet, columns, quick, stop))
 
 
 def _read_short(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
-    """The same as `_long` gives of many rows, cell by cell: there are not enough for pandas, which takes longer to load."""
-    cells = cells_of_sheet(_rows(path, sheet, sheet.start, stop, None))
+    """Return what `_read_long` would of few rows, reading cell by cell, which is quicker than loading pandas."""
+    cells = read_cells(_rows(path, sheet, sheet.start, stop, None))
     letters = np.array(cells.letters)
     if cells.words or not np.all(np.isin(letters, [DATA, EMPTY, SPACE])):
         return None
@@ -143,11 +150,11 @@ def _read_short(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarra
 
 
 def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray]] | None:
-    """The pieces of each column up to a byte as pandas reads them, dates as text; None where it meets a cell that it cannot."""
-    pandas = load("pandas", "CSV")
+    """Return the pieces of each column up to a byte as pandas reads them, dates as text; None if it cannot read a cell."""
+    pandas = load_library("pandas", "CSV")
     kinds = sheet.layout.kinds
     used = [i for i, kind in enumerate(kinds) if kind != "text"]
-    rows = rows_before(path, stop) - rows_before(path, sheet.start) + 1  # at most
+    rows = count_rows_before(path, stop) - count_rows_before(path, sheet.start) + 1  # at most
     refuse_too_large(path, rows * len(used))
     filled, whole = 0, dict[int, np.ndarray]()
     dates: dict[int, list[np.ndarray]] = {i: [] for i in used if kinds[i] == "date"}
@@ -168,13 +175,13 @@ def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray
                 skipinitialspace=True,
                 encoding=sheet.encoding,
                 encoding_errors="replace",
-                **_exactly(pandas.__version__),
+                **_round_trip_option(pandas.__version__),
                 engine="c",
                 chunksize=_ROWS_AT_ONCE,
             )
             for chunk in chunks:
                 if not filled:  # joining pieces would need twice the memory
-                    whole = {i: np.empty(rows, _digits(chunk[i], rows)) for i in used if kinds[i] != "date"}
+                    whole = {i: np.empty(rows, _choose_precision(chunk[i], rows)) for i in used if kinds[i] != "date"}
                 for i, values in whole.items():
                     values[filled : filled + len(chunk)] = chunk[i]
                 for i, pieces in dates.items():
@@ -185,35 +192,35 @@ def _read_long(path: Path, sheet: Sheet, stop: int) -> dict[int, list[np.ndarray
     return {i: [values[:filled]] for i, values in whole.items()} | dates
 
 
-def _digits(first: Any, rows: int) -> type[np.floating]:
-    """How precisely a column is kept, by its first numbers: a clock always with all digits."""
-    return np.float64 if rows <= _MANY_ROWS or rises(first.to_numpy()) else np.float32
+def _choose_precision(first: Any, rows: int) -> type[np.floating]:
+    """Return how precisely a column is kept, by its first numbers: a clock always with all digits."""
+    return np.float64 if rows <= _MANY_ROWS or never_falls(first.to_numpy()) else np.float32
 
 
-def _exactly(version: str) -> dict[str, Any]:
-    """The option that makes pandas read numbers to the last bit; from 3.1 on it does so by itself."""
+def _round_trip_option(version: str) -> dict[str, Any]:
+    """Return the option that makes pandas read numbers to the last bit; from 3.1 on it does so by itself."""
     major, minor = version.split(".")[:2]
     return {"float_precision": "round_trip"} if (int(major), int(minor)) < (3, 1) else {}
 
 
 def _rows(path: Path, sheet: Sheet, start: int, stop: int, before: dict[int, list[np.ndarray]] | None) -> SheetRows:
-    """The rows of a section of the file [bytes], to be read cell by cell behind what has been read before."""
+    """Yield the rows of a section of the file [bytes], to be read cell by cell behind what has been read before."""
     spaces = "\r\n " if sheet.separator == "\t" else "\r\n\t "
 
     def cells() -> Iterator[Sequence[str] | None]:
         for text in lines_between(path, sheet.encoding, start, stop):
-            filled = [""] if is_blank(text) else cells_of(text, sheet.separator)
+            filled = [""] if is_blank(text) else split_cells(text, sheet.separator)
             yield None if comment_mark(text) else filled if text.strip(spaces) else []
 
     def number(position: int) -> int:
-        return rows_before(path, start) + position + 1
+        return count_rows_before(path, start) + position + 1
 
     return SheetRows(path.name, sheet.layout, cells(), number, sheet.decimal, True, before)
 
 
 def _is_cut(lines: Sequence[Line], separator: str) -> bool:
-    """Whether a file breaks off in the last of its lines: it has no end, and fewer cells or digits than those before."""
-    *whole, last = [cells_of(line.text, separator) for line in lines if not is_blank(line.text)] or [[]]
+    """Return whether a file breaks off in the last of its lines: it has no end, and fewer cells or digits than those before."""
+    *whole, last = [split_cells(line.text, separator) for line in lines if not is_blank(line.text)] or [[]]
     if not whole or lines[-1].ended or is_blank(lines[-1].text) or comment_mark(lines[-1].text) or is_summary(last):
         return False
     if len(last) < min(map(len, whole)):
@@ -222,8 +229,8 @@ def _is_cut(lines: Sequence[Line], separator: str) -> bool:
     return bool(ends) and (len(last[-1].strip()) < min(map(len, ends)) or last[-1].strip()[-1:] in {*"eE+-"})
 
 
-def start_of(path: Path, data: bytes) -> Sheet:
-    """What the first bytes of a file tell.
+def read_start(path: Path, data: bytes) -> Sheet:
+    """Return what the first bytes of a file tell.
 
     Raises:
         DatasetError: They are no text, or hold no numbers in columns.
@@ -234,36 +241,36 @@ def start_of(path: Path, data: bytes) -> Sheet:
     every = lines
     declared, lines = declared_separator(lines, path.name)
     texts = [line for line in lines if not comment_mark(line.text)]
-    rows = {s: list(records(texts, s, _HEADING_LINES)) for s in _separators(texts, declared)}
-    readings = [(layout_of([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
+    rows = {s: list(split_records(texts, s, _HEADING_LINES)) for s in _possible_separators(texts, declared)}
+    readings = [(find_layout([row.cells for row in rows[s]], d), s, d) for s, d in _HABITS if s in rows]
     layouts = [(layout, separator, decimal) for layout, separator, decimal in readings if layout is not None]
     if not layouts:
         raise DatasetError(
             f"{path.name} has no rows of numbers in columns; export the recording as CSV with one column for each signal."
         )
-    layout, separator, decimal = max(layouts, key=lambda reading: _worth(reading[0]))
+    layout, separator, decimal = max(layouts, key=lambda reading: _score_layout(reading[0]))
     below = rows[separator][layout.start :]
     above = [line for line in lines if line.start < below[0].start]
-    layout = _fitting(path, layout, below, separator, above)
+    layout = _fit_layout(path, layout, below, separator, above)
     over = tuple(rows[separator][i].row for i in layout.over)
-    others = {line.row: _why_above(line) for line in every if line.start < below[0].start and line.row not in over}
+    others = {line.row: _explain_row_above(line) for line in every if line.start < below[0].start and line.row not in over}
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
 
 
-def _worth(layout: Layout) -> tuple[bool, bool, int]:
-    """How much speaks for a reading: headings in words that have room for all columns, any such, and numbers."""
+def _score_layout(layout: Layout) -> tuple[bool, bool, int]:
+    """Return how much speaks for a reading: headings in words that have room for all columns, any such, and numbers."""
     named = layout.named and layout.fits
     return named and not layout.by_numbers, named, layout.score
 
 
-def _why_above(line: Line) -> tuple[str, str]:
+def _explain_row_above(line: Line) -> tuple[str, str]:
     if is_blank(line.text):
         return BLANK, ""
     return (COMMENT, "") if comment_mark(line.text) else (ABOVE, " ".join(line.text.split()))
 
 
-def _separators(lines: Sequence[Line], declared: str | None) -> list[str]:
-    """What may separate the columns; of those that stand nowhere, which all make one column, the first, and blanks."""
+def _possible_separators(lines: Sequence[Line], declared: str | None) -> list[str]:
+    """Return what may separate the columns; of those that stand nowhere, which all make one column, the first, and blanks."""
     return [
         separator
         for separator in SEPARATORS
@@ -272,30 +279,30 @@ def _separators(lines: Sequence[Line], declared: str | None) -> list[str]:
     ]
 
 
-def _fitting(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
-    """The layout with as many headings as columns; headings may stand in a comment.
+def _fit_layout(path: Path, layout: Layout, below: Sequence[CsvRecord], separator: str, above: Sequence[Line]) -> Layout:
+    """Return the layout with as many headings as columns; headings may stand in a comment.
 
     Raises:
         DatasetError: A row has more cells than there are headings.
     """
     if separator == " " and layout.named and layout.heading_cells != len(layout.kinds):
-        return _from_comment(layout, separator, above)
+        return _take_headings_from_comment(layout, separator, above)
     for row in () if layout.fits else below:
-        too_many_cells(path.name, row.row, row.cells, layout.room)
-    return layout.inside if layout.named else _from_comment(layout, separator, above)
+        refuse_long_row(path.name, row.row, row.cells, layout.room)
+    return layout.inside if layout.named else _take_headings_from_comment(layout, separator, above)
 
 
-def _from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
+def _take_headings_from_comment(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
     width = len(layout.kinds)
     for line in reversed([line for line in above if comment_mark(line.text)]):
-        cells = cells_of(line.text.strip().lstrip("#% "), separator)
+        cells = split_cells(line.text.strip().lstrip("#% "), separator)
         if len(cells) == width and all(cell.strip() for cell in cells):
             return replace(layout, named=True, headings=tuple(map(heading_of, cells)))
     return replace(layout, named=False, headings=tuple(Heading(f"column{i + 1}") for i in range(width)))
 
 
-def account_of_csv(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:
-    """The account of a file.
+def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:
+    """Return the account of a file.
 
     Args:
         path: The file.
@@ -306,19 +313,19 @@ def account_of_csv(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple
     """
     end, rows = quick
     size = path.stat().st_size
-    first = rows_before(path, sheet.start) + 1
+    first = count_rows_before(path, sheet.start) + 1
     reasons = {**sheet.above, **columns.left_out}
-    if end > sheet.start and rows_before(path, end) - first + 1 != rows:
+    if end > sheet.start and count_rows_before(path, end) - first + 1 != rows:
         texts = enumerate(lines_between(path, sheet.encoding, sheet.start, end), start=first)
         reasons |= {row: (BLANK, "") for row, text in texts if not text.strip()}
-    total = rows_before(path, size) + (0 if _ends(path, size) else 1)
+    total = count_rows_before(path, size) + (0 if _ends_with_newline(path, size) else 1)
     if stop < size:
-        reasons |= dict.fromkeys(range(rows_before(path, stop) + 1, total + 1), (_CUT, ""))
-    return account_of(path.name, total, sheet.headings, reasons, columns.beside)
+        reasons |= dict.fromkeys(range(count_rows_before(path, stop) + 1, total + 1), (_CUT, ""))
+    return make_account(path.name, total, sheet.headings, reasons, columns.beside)
 
 
-def _ends(path: Path, size: int) -> bool:
-    """Whether the last line has an end."""
+def _ends_with_newline(path: Path, size: int) -> bool:
+    """Return whether the last line has an end."""
     with path.open("rb") as file:
         file.seek(max(size - 2, 0))
         return file.read().rstrip(b"\0").endswith((b"\n", b"\r"))

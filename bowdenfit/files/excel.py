@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile, load, refuse_damage, refuse_larger
+from bowdenfit.files.channels import Channel, ChannelFile, load_library, refuse_damage, refuse_larger
 from bowdenfit.files.headings import Quantity, find_candidates
-from bowdenfit.files.layout import layout_of
-from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, account_of
-from bowdenfit.files.sheet_columns import SheetRows, channels_of, columns_of, text_of
-from bowdenfit.files.tables import RawTable, raw_table
+from bowdenfit.files.layout import find_layout
+from bowdenfit.files.row_account import ABOVE, BLANK, RowAccount, make_account
+from bowdenfit.files.sheet_columns import SheetRows, cell_text, make_channels, read_columns
+from bowdenfit.files.tables import RawTable, make_table
 from bowdenfit.files.text_file import CsvRecord, Line
 from bowdenfit.words import quoted, shown
 
 LARGEST_BYTES = 1 << 28
-_FIRST_ROWS = 300
+_FIRST_ROWS = 300  # judged: in which headings and the first data must stand
 _Cells = Sequence[Any]
 _DEFINING = (Quantity("input_force", "force"), Quantity("output_force", "force"), Quantity("efficiency", "ratio"))
 
@@ -39,13 +39,13 @@ def read(path: Path) -> ChannelFile:
         DatasetError: openpyxl is not installed; the file is missing, too large or damaged; no sheet holds columns of
             numbers, or text stands among the numbers of the only one that does.
     """
-    openpyxl = load("openpyxl", ".xlsx")
+    openpyxl = load_library("openpyxl", ".xlsx")
     refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
     channels: dict[str, tuple[Channel, ...]] = {}
     remarks: list[str] = []
     errors: list[DatasetError] = []
     accounts: list[RowAccount] = []
-    for title, rows in sheets_of(openpyxl, path):
+    for title, rows in iterate_sheets(openpyxl, path):
         try:
             channels[title], sheet_remarks, account = _read_sheet(f"{path.name}, sheet {shown(title)}", path.name, rows)
             accounts += [account] if account else []
@@ -54,14 +54,14 @@ def read(path: Path) -> ChannelFile:
             errors.append(error)
     filled = {title: of_sheet for title, of_sheet in channels.items() if of_sheet}
     if not filled:
-        raise errors[0] if errors else _without_numbers(path)
+        raise errors[0] if errors else _no_numbers_error(path)
     remarks += [f"A sheet was left out: {error}" for error in errors]
     account = accounts[0] if len(accounts) == 1 else None  # rows of several sheets have the same numbers
-    return ChannelFile(path, "Excel workbook", tuple(_named(filled)), tuple(remarks), account)
+    return ChannelFile(path, "Excel workbook", tuple(_prefix_sheets(filled)), tuple(remarks), account)
 
 
-def _named(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
-    """All channels, with the sheet before their names where there are several sheets."""
+def _prefix_sheets(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
+    """Yield all channels, with the sheet before their names where there are several sheets."""
     for title, channels in sheets.items():
         before = f"{title}/" if len(sheets) > 1 else ""
         for channel in channels:
@@ -69,7 +69,7 @@ def _named(sheets: dict[str, tuple[Channel, ...]]) -> Iterator[Channel]:
             yield replace(channel, name=before + channel.name, clock=clock)
 
 
-def _without_numbers(path: Path) -> DatasetError:
+def _no_numbers_error(path: Path) -> DatasetError:
     return DatasetError(
         f"{path.name} has no sheet with columns of numbers; if they are formulas, open the workbook in Excel and save it, so "
         "that their values stand in the file."
@@ -81,21 +81,21 @@ def _read_sheet(
 ) -> tuple[tuple[Channel, ...], list[str], RowAccount | None]:
     iterator = iter(cells)
     first = list(islice(iterator, _FIRST_ROWS))
-    layout = layout_of([[text_of(cell) for cell in row] for row in first], ".")
+    layout = find_layout([[cell_text(cell) for cell in row] for row in first], ".")
     if layout is None:
         return (), [], None
     start = layout.start
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
-    columns = columns_of(rows)
-    channels, left_out = channels_of(layout, columns.values)
+    columns = read_columns(rows)
+    channels, left_out = make_channels(layout, columns.values)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
     over = [i + 1 for i in layout.over]
-    account = account_of(file, start + columns.rows, over, above | columns.left_out, columns.beside)
+    account = make_account(file, start + columns.rows, over, above | columns.left_out, columns.beside)
     return channels, [*left_out, *columns.remarks], account
 
 
 def read_workbook(path: Path, most: int | None = None) -> RawTable:
-    """The table of a workbook; of several sheets that hold one, that whose headings say what they are.
+    """Return the table of a workbook; of several sheets that hold one, that whose headings say what they are.
 
     Args:
         path: The workbook (.xlsx or .xlsm).
@@ -104,19 +104,19 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
     Raises:
         DatasetError: It cannot be read, or holds no table, or several that could be meant.
     """
-    openpyxl = load("openpyxl", ".xlsx")
+    openpyxl = load_library("openpyxl", ".xlsx")
     refuse_larger(path, LARGEST_BYTES, "save the needed sheet as CSV")
     tables: dict[str, RawTable] = {}
     errors: list[DatasetError] = []
-    for title, rows in sheets_of(openpyxl, path):
-        cells = [[text_of(cell).strip() for cell in row] for row in islice(rows, most)]
+    for title, rows in iterate_sheets(openpyxl, path):
+        cells = [[cell_text(cell).strip() for cell in row] for row in islice(rows, most)]
         while cells and not any(cells[-1]):
             cells.pop()  # Excel keeps the format of rows that were once filled
         records = [CsvRecord(i, 0, row) for i, row in enumerate(cells, start=1)]
         lines = [Line(record.row, 0, " ".join(record.cells) + "\n") for record in records]
         try:
             if not all(record.blank for record in records):
-                tables[title] = raw_table(path.name, lines, records, ";")
+                tables[title] = make_table(path.name, lines, records, ";")
         except DatasetError as error:
             errors.append(error)
     by_headings = {title: table for title, table in tables.items() if _has_forces(table)} or tables
@@ -131,13 +131,13 @@ def read_workbook(path: Path, most: int | None = None) -> RawTable:
 
 
 def _has_forces(table: RawTable) -> bool:
-    """Whether two headings say an end of the cable each, or one an efficiency."""
+    """Return whether two headings say an end of the cable each, or one an efficiency."""
     columns = find_candidates(list(zip(table.header, table.units, strict=True)), _DEFINING)
     return bool(columns["efficiency"] or (columns["input_force"] and columns["output_force"]))
 
 
-def sheets_of(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
-    """Title and rows of each sheet; what the library cannot read becomes one sentence."""
+def iterate_sheets(openpyxl: Any, path: Path) -> Iterator[tuple[str, Iterator[_Cells]]]:
+    """Yield the title and rows of each sheet; what the library cannot read becomes one sentence."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # on styles and validations, which do not matter here
         with refuse_damage(path):

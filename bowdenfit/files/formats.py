@@ -11,7 +11,7 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.apart import read_apart
+from bowdenfit.files.apart import read_isolated
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.text_file import first_bytes
 
@@ -54,7 +54,7 @@ class Content:
         return self.remedy or f"rename it to {self.endings[0]}"
 
     def suits(self, ending: str) -> bool:
-        """Whether files with an ending may start so; those of which nobody knows how they start may start in any way."""
+        """Return whether files with an ending may start so; those of which nobody knows how they start may start in any way."""
         return ending in self.endings or not any(ending in content.endings for content in _CONTENTS)
 
 
@@ -123,27 +123,27 @@ def read_channels(path: Path) -> ChannelFile:
 
 
 def _read_uncached(path: Path) -> ChannelFile:
-    """The channels of a file that is not in memory."""
-    ending = ".bag" if is_ros2_folder(path) else checked_ending(path)
+    """Return the channels of a file that is not in memory."""
+    ending = ".bag" if is_ros2_folder(path) else check_ending(path)
     if str(FORMATS[ending]).startswith(f"{_ROOM}.") and ending not in TEXT:
-        return read_apart(path)
+        return read_isolated(path)
     return read_here(path)
 
 
 def read_here(path: Path) -> ChannelFile:
-    """The same, in this process."""
-    reader = FORMATS[".bag" if is_ros2_folder(path) else checked_ending(path)]
+    """Return all numeric channels of a recording, read in this process; see `read_channels`."""
+    reader = FORMATS[".bag" if is_ros2_folder(path) else check_ending(path)]
     result: ChannelFile = import_module(reader).read(path) if isinstance(reader, str) else reader(path)
     return result
 
 
 def is_ros2_folder(path: Path) -> bool:
-    """Whether this is the folder that ROS 2 calls a bag."""
+    """Return whether this is the folder that ROS 2 calls a bag."""
     return path.is_dir() and (path / "metadata.yaml").is_file()
 
 
-def checked_ending(path: Path) -> str:
-    """The ending of a file that is what it says.
+def check_ending(path: Path) -> str:
+    """Return the ending of a file that is what it says.
 
     Raises:
         DatasetError: Its first bytes say something else.
@@ -151,12 +151,12 @@ def checked_ending(path: Path) -> str:
     content = recognize(path, first_bytes(path, 4096))
     ending = path.suffix.lower()
     if ending not in FORMATS or not content.suits(ending):
-        raise _refusal(path, content)
+        raise _ending_error(path, content)
     return ending
 
 
-def _refusal(path: Path, content: Content) -> DatasetError:
-    """What a file really is, where its ending says something else or nothing."""
+def _ending_error(path: Path, content: Content) -> DatasetError:
+    """Return what a file really is, where its ending says something else or nothing."""
     ending, known = path.suffix, path.suffix.lower() in FORMATS
     if content is not UNKNOWN and (known or content is not PLAIN_TEXT):
         what = f"not a {ending} file but {content.what}" if known else content.what
@@ -173,21 +173,21 @@ def _refusal(path: Path, content: Content) -> DatasetError:
 
 
 def recognize(path: Path, head: bytes) -> Content:
-    """What the file is by its first bytes.
+    """Return what the file is by its first bytes.
 
     Args:
         path: The file; looked into further only where it is an archive.
         head: Its first bytes, the first 4096.
     """
     if head.startswith(b"PK\x03\x04"):
-        return _archive(path)
+        return _recognize_archive(path)
     content = next((content for start, content in _STARTS.items() if head.startswith(start)), None)
     if content is None and any(head.startswith(_HDF, at) for at in _BEHIND):
         return _STARTS[_HDF]
-    return content or _markup(head)
+    return content or _recognize_text(head)
 
 
-def _archive(path: Path) -> Content:
+def _recognize_archive(path: Path) -> Content:
     """Workbooks are ZIP archives too; an archive that was cut off has lost its list of members."""
     try:
         with zipfile.ZipFile(path) as archive:
@@ -202,7 +202,7 @@ def _archive(path: Path) -> Content:
     return _ZIP if "[Content_Types].xml" in names else _NO_WORKBOOK
 
 
-def _markup(head: bytes) -> Content:
+def _recognize_text(head: bytes) -> Content:
     """XML and web pages, or a file that is not recognized."""
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
     if text.startswith((b"<!doctype html", b"<html")):
@@ -213,7 +213,7 @@ def _markup(head: bytes) -> Content:
 
 
 def _is_utf8(head: bytes) -> bool:
-    """Whether bytes are text; a letter may be cut in two at their end."""
+    """Return whether bytes are text; a letter may be cut in two at their end."""
     try:
         head.decode()
     except UnicodeDecodeError as error:

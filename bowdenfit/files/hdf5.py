@@ -11,15 +11,15 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
     is_numeric,
-    numbers,
+    make_channel_file,
     refuse_damage,
     refuse_too_large,
+    to_floats,
 )
-from bowdenfit.files.clocks import with_column_clocks, with_interval, with_only_clock
+from bowdenfit.files.clocks import assign_group_clocks, assign_interval_times, assign_only_clock
 
-MOST_COLUMNS = 64
+MOST_COLUMNS = 64  # judged: a wider table is an image or a spectrum, no set of channels
 _LONGEST = 400  # characters of a path
 _UNITS = ("unit", "units", "Unit", "Units")
 
@@ -39,13 +39,13 @@ def read(path: Path) -> ChannelFile:
         refuse_too_large(path, sum(2 * dataset.size * max(1, len(dataset.dtype.names or ())) for dataset in chosen))
         channels = [channel for dataset in chosen for channel in _channels(dataset, left_out)]
         settings = {path: values for dataset in chosen for path, values in _settings(dataset).items()}
-    clocked, remarks = with_interval(with_column_clocks(channels), settings)
-    return channel_file(path, "HDF5", with_only_clock(clocked), left_out, remarks)
+    clocked, remarks = assign_interval_times(assign_group_clocks(channels), settings)
+    return make_channel_file(path, "HDF5", assign_only_clock(clocked), left_out, remarks)
 
 
 def _datasets(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[Any]:
-    """All data sets, in the order of the file, but for what lies elsewhere."""
-    for path, member in members(group, left_out, seen):
+    """Yield all data sets, in the order of the file, but for what lies elsewhere."""
+    for path, member in iterate_members(group, left_out, seen):
         if isinstance(member, h5py.Group):
             yield from _datasets(member, left_out, seen)
         elif isinstance(member, h5py.Dataset):
@@ -54,8 +54,8 @@ def _datasets(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[Any
             left_out.add(path, "they are types of numbers, not numbers")
 
 
-def members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[tuple[str, Any]]:
-    """Path and content of what a group holds, in the order of the file, but for links and for what lies in other files.
+def iterate_members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[tuple[str, Any]]:
+    """Yield path and content of what a group holds, in the order of the file, but for links and what lies in other files.
 
     Args:
         group: The group.
@@ -81,7 +81,7 @@ def members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterator[tuple
 
 
 def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
-    """Whether a data set is a vector or a narrow table of numbers."""
+    """Return whether a data set is a vector or a narrow table of numbers."""
     name = dataset.name.lstrip("/")
     shape = dataset.shape or ()
     numeric = is_numeric(dataset.dtype) or (dataset.dtype.names is not None and len(shape) == 1)
@@ -97,30 +97,30 @@ def _is_recording(dataset: Any, left_out: UnreadNames) -> bool:
 
 
 def _channels(dataset: Any, left_out: UnreadNames) -> Iterator[Channel]:
-    """The columns of a data set; the longer side of a table is the time."""
+    """Yield the columns of a data set; the longer side of a table is the time."""
     name, unit = dataset.name.lstrip("/"), _unit(dataset)
     values = dataset[()]
     if values.dtype.names:
         yield from _fields(name, unit, values, left_out)
     elif values.ndim == 1 or min(values.shape) == 1:
-        yield Channel(name, unit, numbers(values))
+        yield Channel(name, unit, to_floats(values))
     else:
         tall = values.shape[0] >= values.shape[1]
         for number, column in enumerate(values.T if tall else values):
-            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit, numbers(column))
+            yield Channel(f"{name}[:,{number}]" if tall else f"{name}[{number},:]", unit, to_floats(column))
 
 
 def _fields(name: str, unit: str, values: np.ndarray, left_out: UnreadNames) -> Iterator[Channel]:
-    """The numeric columns of a table whose rows are records."""
+    """Yield the numeric columns of a table whose rows are records."""
     for field in values.dtype.names or ():
         if values[field].ndim == 1 and is_numeric(values[field].dtype):
-            yield Channel(f"{name}.{field}", unit, numbers(values[field]))
+            yield Channel(f"{name}.{field}", unit, to_floats(values[field]))
         else:
             left_out.add(f"{name}.{field}", "they are text, complex numbers or objects")
 
 
 def _unit(dataset: Any) -> str:
-    """The unit that the attributes name, else nothing."""
+    """Return the unit that the attributes name, else nothing."""
     value = next((dataset.attrs[name] for name in _UNITS if name in dataset.attrs), "")
     value = value.flat[0] if isinstance(value, np.ndarray) and value.size == 1 else value
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
@@ -128,6 +128,6 @@ def _unit(dataset: Any) -> str:
 
 
 def _settings(holder: Any) -> dict[str, dict[str, Any]]:
-    """The attributes of a data set and of the groups around it, by their paths."""
+    """Return the attributes of a data set and of the groups around it, by their paths."""
     own = {holder.name.strip("/"): {str(name): holder.attrs[name] for name in holder.attrs}}
     return own if holder.name == "/" else own | _settings(holder.parent)

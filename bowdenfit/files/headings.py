@@ -17,7 +17,6 @@ from bowdenfit.units import ColumnSource, is_unit
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
-_LONGEST = 200
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 # `F_in` is no force in inches, nor `cell_A` one in ampere: behind a name only what cannot be a word counts as unit.
 _SUFFIXES = (
@@ -25,7 +24,7 @@ _SUFFIXES = (
     "cm/s rad deg degree degrees rad/s deg/s rpm s ms us ns min h sec seconds Hz"
 )
 _FORCES = {"N", "kN", "mN", "lbf", "kgf"}
-_LONGEST_HEADING = 200
+_LONGEST_HEADING = 200  # characters; judged: a longer text is a sentence, and patterns would take long over it
 
 
 @dataclass(frozen=True)
@@ -68,14 +67,14 @@ class MatchedColumn:
 
 
 def heading_of(text: str, unit: str = "") -> Heading:
-    """Name and unit in one heading: "Force (N)" is "Force" in N; `force_N` keeps its name and is in N as well.
+    """Return the name and unit in one heading: "Force (N)" is "Force" in N; `force_N` keeps its name and is in N as well.
 
     Args:
         text: Heading as written.
         unit: Unit from a line of its own under the heading; empty if there is none.
     """
     plain = " ".join(text.split())
-    if unit := without_brackets(unit):
+    if unit := strip_brackets(unit):
         return Heading(plain, unit)
     name, unit = split_brackets(plain)
     if name and unit not in {"", "-", "1"} and is_unit(unit):
@@ -84,7 +83,7 @@ def heading_of(text: str, unit: str = "") -> Heading:
 
 
 def _unit_behind(heading: str) -> str:
-    """Unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
+    """Return the unit in `input_force_N`, `velocity_mm_per_s`, "Force N" or `force_N_45deg_trial1`."""
     words = re.split(r"[\s_]+", heading)
     for start in range(1, len(words)):
         candidate = "_".join(words[start:]).replace("_per_", "/")
@@ -94,31 +93,31 @@ def _unit_behind(heading: str) -> str:
 
 
 def split_brackets(heading: str) -> tuple[str, str]:
-    """The name and what stands in brackets behind it; all of the heading where nothing does."""
-    match = _BRACKETED.match(heading[:_LONGEST])
+    """Return the name and what stands in brackets behind it; all of the heading where nothing does."""
+    match = _BRACKETED.match(heading[:_LONGEST_HEADING])
     return (match["name"], match["unit"].strip()) if match else (heading, "")
 
 
-def without_brackets(unit: str) -> str:
-    """A unit without the brackets around it."""
+def strip_brackets(unit: str) -> str:
+    """Return a unit without the brackets around it."""
     return unit.strip().strip("[]()").strip()
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Whether a row holds nothing but units, as "s;N;N" or "[s],[N]"; LVM and others leave some blank."""
-    written = [without_brackets(cell) for cell in cells if cell.strip()]
+    """Return whether a row holds nothing but units, as "s;N;N" or "[s],[N]"; LVM and others leave some blank."""
+    written = [strip_brackets(cell) for cell in cells if cell.strip()]
     return bool(written) and all(is_unit(unit) for unit in written) and not all(map(names_time, written))
 
 
 def is_number(text: str) -> bool:
-    """Whether a heading is only a number, as the wrap angle over the columns of a run."""
+    """Return whether a heading is only a number, as the wrap angle over the columns of a run."""
     return bool(_NUMBER.fullmatch(text.strip()))
 
 
 def find_candidates(
     headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], stated: Collection[str] = ()
 ) -> dict[str, list[MatchedColumn]]:
-    """The columns that can be each quantity; several where a file leaves it open.
+    """Return the columns that can be each quantity; several where a file leaves it open.
 
     The name of a quantity comes first, then other spellings of it; one that only a pair makes clear, such as T1 beside T2,
     counts where nothing clearer does and the other end is there too.
@@ -145,23 +144,23 @@ def find_candidates(
 
 
 def _is_paired(pair: str, beside: Collection[str]) -> bool:
-    """Whether the columns at the other end make clear what this one is."""
+    """Return whether the columns at the other end make clear what this one is."""
     return "number" in beside if pair == "number" else bool({*beside} - {"number"})
 
 
 def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity, str | None]]:
-    """Every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
+    """Return every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
     if len(heading) > _LONGEST_HEADING:
         return []
     name, unit = split_brackets(heading)
-    exact = [(q, unit or _suffix(name, q.name)) for q in wanted if plain_name(name) == plain_name(q.name)]
+    exact = [(q, unit or _unit_suffix(name, q.name)) for q in wanted if plain_name(name) == plain_name(q.name)]
     whole = [(q, None) for q in wanted if plain_name(heading) == plain_name(q.name)]
-    named = exact or whole or [(q, behind) for q in wanted if (behind := _suffix(heading, q.name)) is not None]
+    named = exact or whole or [(q, behind) for q in wanted if (behind := _unit_suffix(heading, q.name)) is not None]
     return [(q, unit) for q, unit in named if not (q.dimension == "text" and unit and is_unit(unit))]
 
 
-def _suffix(heading: str, name: str) -> str | None:
-    """Unit behind the name in `input_force_N` or "Input force N", case kept; None where it is no unit."""
+def _unit_suffix(heading: str, name: str) -> str | None:
+    """Return the unit behind the name in `input_force_N` or "Input force N", case kept; None where it is no unit."""
     words = re.split(r"[\s_\-]+", heading.strip())
     units = ["_".join(words[i:]) for i in range(1, len(words)) if plain_name("_".join(words[:i])) == plain_name(name)]
     if not units:
@@ -174,17 +173,17 @@ def _suffix(heading: str, name: str) -> str | None:
 
 @lru_cache(maxsize=1024)  # of each heading it is asked for every quantity
 def plain_name(heading: str) -> str:
-    """Heading in lower case with underscores for anything between words."""
+    """Return heading in lower case with underscores for anything between words."""
     return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")
 
 
 def option_naming(quantity: str, heading: str, unit: str = "", option: str = "--column") -> str:
-    """The option that names a column or channel, as it can be pasted into a shell."""
+    """Return the option that names a column or channel, as it can be pasted into a shell."""
     return f"{option} {quantity}={shlex.quote(heading + (f':{unit}' if unit else ''))}"
 
 
 def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()) -> dict[str, ColumnSource]:
-    """What the user names by options such as "input_force=ai0:lbf": the name in the file, and its unit, by quantity.
+    """Return what the user names by options such as "input_force=ai0:lbf": the name in the file, and its unit, by quantity.
 
     Args:
         texts: What stands behind the options.

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bowdenfit.files.cells import Kind, kind_of, number_of
+from bowdenfit.files.cells import Kind, classify_cell, parse_number
 from bowdenfit.files.clocks import names_time
 from bowdenfit.files.headings import Heading, heading_of, is_number, is_units_row
 from bowdenfit.types import Vector
@@ -18,8 +18,8 @@ _SUMMARY = re.compile(
     r"minimum|maximum|mittelwert|summe|anzahl|moyenne|media|standard deviation|standardabweichung)[\s:.=]*)",
     re.IGNORECASE,
 )
-_STEPS = 60  # rows that are enough to see a clock rise in even steps
-_UNEVEN = 3.0  # largest step of a clock over its smallest
+_STEPS = 60  # judged: rows that are enough to see a clock rise in even steps
+_UNEVEN = 3.0  # judged: largest step of a clock over its smallest
 
 
 @dataclass(frozen=True)
@@ -63,17 +63,17 @@ class Layout:
         return replace(self, headings=self.headings[:room], kinds=self.kinds[:room])
 
     def name(self, column: int) -> str:
-        """What a column is called, by its place where it has no heading."""
+        """Return what a column is called, by its place where it has no heading."""
         return self.headings[column].name or f"column{column + 1}"
 
 
-def layout_of(rows: Rows, decimal: str) -> Layout | None:
-    """How the first rows of a sheet are laid out; None if they hold no data.
+def find_layout(rows: Rows, decimal: str) -> Layout | None:
+    """Return how the first rows of a sheet are laid out; None if they hold no data.
 
     The data are the longest run of rows that agree on which columns are numbers. A row of whole numbers at its top
     counts as headings where no other headings stand and the clocks below it say so.
     """
-    kinds = [[kind_of(cell, decimal) for cell in row] for row in rows]
+    kinds = [[classify_cell(cell, decimal) for cell in row] for row in rows]
     start, stop, score = _longest_run(kinds, [is_summary(row) for row in rows])
     if score <= 0:
         return None
@@ -87,7 +87,7 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
     rising = [_rises(rows[start:stop], i, decimal) for i in range(width)]
     if not header:
         return Layout(start, tuple(Heading(f"column{i + 1}") for i in range(width)), columns, False, score)
-    names = _names([without_label(row) for row in header], width)
+    names = _join_headings([drop_label(row) for row in header], width)
     written = [heading_of(name, unit) for name, unit in zip(names, [*units, *[""] * width], strict=False)][:width]
     return Layout(
         start,
@@ -102,17 +102,17 @@ def layout_of(rows: Rows, decimal: str) -> Layout | None:
 
 
 def is_summary(cells: Sequence[str]) -> bool:
-    """Whether a row below the data is one of minima, averages and the like."""
+    """Return whether a row below the data is one of minima, averages and the like."""
     return any(_SUMMARY.fullmatch(cell.strip()) for cell in cells)
 
 
 def is_index(values: Vector) -> bool:
-    """Whether a column without heading only counts its rows, as pandas writes its index."""
+    """Return whether a column without heading only counts its rows, as pandas writes its index."""
     return len(values) > 1 and values[0] in (0, 1) and bool(np.all(values[1:] == values[:-1] + 1))
 
 
 def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> tuple[int, int, int]:
-    """Start, stop and score of the rows that agree on their columns and hold most numbers."""
+    """Return start, stop and score of the rows that agree on their columns and hold most numbers."""
     best, start, score = (0, 0, 0), 0, 0
     for i, row in enumerate(kinds):
         worth = sum(1 if kind in ("number", "date") else -1 for kind in row if kind != "blank")
@@ -128,7 +128,7 @@ def _longest_run(kinds: Sequence[Sequence[Kind]], summaries: Sequence[bool]) -> 
 
 
 def _below_headings(rows: Rows, kinds: Sequence[Sequence[Kind]], start: int) -> int:
-    """Where the data start that agree from `start` on: right below the headings, where only data with bad cells stand between.
+    """Return where the data start that agree from `start` on: below the headings, if only data with bad cells are between.
 
     A bad cell, a remark or the headings once more near the top would else make a heading of the row that has it.
     """
@@ -139,7 +139,7 @@ def _below_headings(rows: Rows, kinds: Sequence[Sequence[Kind]], start: int) -> 
         if not filled or (first < start and is_units_row(rows[i])):
             continue
         if any(k < len(kinds[i]) and kinds[i][k] in ("number", "date") for k in numeric):
-            if first == start and without_label(rows[i]) != list(rows[i]):
+            if first == start and drop_label(rows[i]) != list(rows[i]):
                 return start
             first = i
         elif len(filled) >= max(len(numeric), 2) and list(rows[i]) not in [list(row) for row in rows[:i]]:
@@ -156,7 +156,7 @@ def _agree(above: Sequence[Kind], below: Sequence[Kind]) -> bool:
 
 
 def _header_rows(rows: Rows, start: int, stop: int) -> tuple[list[Sequence[str]], list[str], list[int]]:
-    """The rows of headings right over the data, from above, the units below them, and the positions of all."""
+    """Return the rows of headings right over the data, from above, the units below them, and the positions of all."""
     above = [i for i in range(start) if any(cell.strip() for cell in rows[i])]
     width = sorted(map(_filled_width, rows[start:stop]))[(stop - start) // 2]
     units: list[str] = []
@@ -167,7 +167,7 @@ def _header_rows(rows: Rows, start: int, stop: int) -> tuple[list[Sequence[str]]
     header: list[Sequence[str]] = []
     below: list[int] = []
     for i in reversed(above):
-        over = [cell for cell in without_label(rows[i]) if cell.strip()]
+        over = [cell for cell in drop_label(rows[i]) if cell.strip()]
         second = bool(header) and not (len(over) > 1 and all(map(is_number, over)) and [i + 1] == below)
         if second or not _is_heading(rows[i], width):
             break
@@ -178,12 +178,12 @@ def _header_rows(rows: Rows, start: int, stop: int) -> tuple[list[Sequence[str]]
 
 
 def _is_heading(row: Sequence[str], width: int) -> bool:
-    """Whether a row can stand over that many columns: metadata have two cells, headings about as many as the data."""
+    """Return whether a row can stand over that many columns: metadata have two cells, headings about as many as the data."""
     return len(row) * 2 >= width and (width == 1 or len(row) > 1)
 
 
 def _is_over_units(row: Sequence[str], width: int) -> bool:
-    """Whether headings stand over a line of units: all words or all numbers, unlike a line such as "Rate", 1000."""
+    """Return whether headings stand over a line of units: all words or all numbers, unlike a line such as "Rate", 1000."""
     return _is_heading(row, width) and len({is_number(cell) for cell in row if cell.strip()}) == 1
 
 
@@ -202,8 +202,8 @@ def _is_numeric_heading(rows: Rows, kinds: Sequence[Sequence[Kind]], decimal: st
 
 
 def _rises(rows: Rows, column: int, decimal: str) -> bool:
-    """Whether the column rises in even steps."""
-    cells = (number_of(row[column], decimal) for row in rows[:_STEPS] if column < len(row))
+    """Return whether the column rises in even steps."""
+    cells = (parse_number(row[column], decimal) for row in rows[:_STEPS] if column < len(row))
     values = [value for value in cells if value is not None and value == value]
     steps = [after - before for before, after in pairwise(values)]
     return len(steps) > 1 and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
@@ -214,15 +214,15 @@ def _kind_of_column(kinds: Sequence[Sequence[Kind]], column: int) -> Kind:
     return max(set(filled), key=filled.count) if filled else "blank"
 
 
-def _names(header: Sequence[Sequence[str]], width: int) -> list[str]:
-    """One name a column out of one or more rows of headings."""
+def _join_headings(header: Sequence[Sequence[str]], width: int) -> list[str]:
+    """Return one name a column out of one or more rows of headings."""
     width = max(width, *map(len, header))
     padded = [[*row, *[""] * (width - len(row))] for row in header]
     return [" ".join(" ".join(cells).split()) for cells in zip(*padded, strict=True)]
 
 
-def without_label(cells: Sequence[str]) -> list[str]:
-    """A row of numbers over columns ("Angle", 45, 45, 90) without the word before it that says what they are."""
+def drop_label(cells: Sequence[str]) -> list[str]:
+    """Return a row of numbers over columns ("Angle", 45, 45, 90) without the word before it that says what they are."""
     filled = [i for i, cell in enumerate(cells) if cell.strip()]
     labeled = len(filled) > 1 and not is_number(cells[filled[0]]) and all(is_number(cells[i]) for i in filled[1:])
     if labeled and not names_time(cells[filled[0]]):
@@ -231,7 +231,7 @@ def without_label(cells: Sequence[str]) -> list[str]:
 
 
 def pair_clocks(headings: Sequence[Heading], rising: Sequence[bool], numeric: Sequence[bool]) -> tuple[Heading, ...]:
-    """Names for the nameless clocks of sheets that have one heading for each pair of time and force.
+    """Return names for the nameless clocks of sheets that have one heading for each pair of time and force.
 
     The heading stands over the force, over the time (as a merged cell does), or over both.
 

@@ -6,11 +6,11 @@ from xml.etree.ElementTree import Element, XMLParser
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.channels import Channel, ChannelFile, UnreadNames, channel_file, refuse_damage, refuse_larger
-from bowdenfit.files.clocks import with_clocks
+from bowdenfit.files.channels import Channel, ChannelFile, UnreadNames, make_channel_file, refuse_damage, refuse_larger
+from bowdenfit.files.clocks import assign_clocks
 from bowdenfit.types import Vector
 
-LARGEST_BYTES = 512 * 1024**2
+LARGEST_BYTES = 512 * 1024**2  # judged: XML takes several times its size in memory
 
 
 def read(path: Path) -> ChannelFile:
@@ -27,7 +27,7 @@ def read(path: Path) -> ChannelFile:
     """
     refuse_larger(path, LARGEST_BYTES, "export the run as CSV from Logger Pro")
     with refuse_damage(path):
-        root = _parsed(path)
+        root = _parse(path)
     columns = [(name, column) for name, run in _runs(root) for column in run.iter("DataColumn")]
     several = len({name for name, _ in columns}) > 1
     cells = [_cells(column) for _, column in columns]
@@ -38,11 +38,11 @@ def read(path: Path) -> ChannelFile:
         for (run, c), v in zip(columns, cells, strict=True)
         if np.isfinite(v).any()
     ]
-    return channel_file(path, "Logger Pro", with_clocks(channels), UnreadNames())
+    return make_channel_file(path, "Logger Pro", assign_clocks(channels), UnreadNames())
 
 
-def _parsed(path: Path) -> Element:
-    """The document; declarations of entities, which no such file needs, are refused."""
+def _parse(path: Path) -> Element:
+    """Return the document; declarations of entities, which no such file needs, are refused."""
     data = path.read_bytes()
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
         raise DatasetError(
@@ -67,7 +67,7 @@ def _cells(column: Element) -> Vector:
 
 
 def _number(text: str) -> float:
-    """A number; anything else, such as the mark of a crossed-out cell, is a missing sample."""
+    """Return a number; anything else, such as the mark of a crossed-out cell, is a missing sample."""
     try:
         return float(text)
     except ValueError:

@@ -17,16 +17,16 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
     is_numeric,
-    numbers,
+    make_channel_file,
     refuse_damage,
     refuse_too_large,
+    to_floats,
 )
-from bowdenfit.files.clocks import with_column_clocks, with_interval, with_only_clock
-from bowdenfit.files.hdf5 import members
+from bowdenfit.files.clocks import assign_group_clocks, assign_interval_times, assign_only_clock
+from bowdenfit.files.hdf5 import iterate_members
 
-MOST_COLUMNS = 64
+MOST_COLUMNS = 64  # judged: a wider matrix is an image or a spectrum, no set of channels
 _TEXT = "they are text"
 _CELLS = "they are cells or arrays of structures (save them as vectors of numbers)"
 _OBJECTS = (
@@ -39,7 +39,7 @@ _COMPRESSED = 15  # type number of a compressed element
 
 @dataclass(frozen=True)
 class _Variables:
-    """What was found in a file.
+    """Variables of one file, sorted into channels, settings and what is neither.
 
     Args:
         channels: Vectors, and the columns of narrow matrices.
@@ -60,7 +60,7 @@ class _Variables:
         elif values.ndim > 2 or (values.ndim == 2 and min(values.shape) > MOST_COLUMNS):
             self.left_out.add(name, f"they have more than two dimensions or {MOST_COLUMNS} columns")
         else:
-            self.channels.extend(Channel(label, "", numbers(column)) for label, column in _columns(name, values))
+            self.channels.extend(Channel(label, "", to_floats(column)) for label, column in _columns(name, values))
 
 
 def read(path: Path) -> ChannelFile:
@@ -76,12 +76,12 @@ def read(path: Path) -> ChannelFile:
         modern = file.read(520).endswith(b"\x89HDF\r\n\x1a\n")
     with refuse_damage(path):
         variables = _read_hdf5(path) if modern else _read_classic(path)
-    clocked, remarks = with_interval(with_column_clocks(variables.channels), variables.settings)
-    return channel_file(path, "MATLAB", with_only_clock(clocked), variables.left_out, remarks)
+    clocked, remarks = assign_interval_times(assign_group_clocks(variables.channels), variables.settings)
+    return make_channel_file(path, "MATLAB", assign_only_clock(clocked), variables.left_out, remarks)
 
 
 def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """A vector, or the columns (or rows, if these are longer) of a matrix, with their names."""
+    """Yield a vector, or the columns (or rows, if these are longer) of a matrix, with their names."""
     if values.ndim == 1 or min(values.shape) == 1:
         yield name, values
         return
@@ -91,7 +91,7 @@ def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _read_classic(path: Path) -> _Variables:
-    """Files of MATLAB 4 to 7.2, which SciPy reads."""
+    """Read a file of MATLAB 4 to 7.2, by SciPy."""
     variables = _Variables()
     with warnings.catch_warnings():
         # Names that occur twice, and objects without a name: the numbers are read all the same.
@@ -106,7 +106,7 @@ def _read_classic(path: Path) -> _Variables:
 
 
 def _is_wanted(name: str, kind: str, left_out: UnreadNames) -> bool:
-    """Whether a variable may hold recordings, by its class."""
+    """Return whether a variable may hold recordings, by its class."""
     if name == "__function_workspace__":
         return False
     if kind in (*_NUMERIC, "struct"):
@@ -140,7 +140,7 @@ def _sort_in_structures(name: str, value: np.ndarray, variables: _Variables) -> 
 
 
 def _n_numbers(path: Path, listing: list[tuple[str, tuple[int, ...], str]]) -> int:
-    """How many numbers the variables hold: by their shapes, and structures by their size when unpacked."""
+    """Return how many numbers the variables hold: by their shapes, and structures by their size when unpacked."""
     plain = sum(math.prod(shape) for _, shape, kind in listing if kind in _NUMERIC)
     structures = sum(
         size // BYTES_PER_SAMPLE
@@ -151,7 +151,7 @@ def _n_numbers(path: Path, listing: list[tuple[str, tuple[int, ...], str]]) -> i
 
 
 def _element_bytes(path: Path) -> list[int]:
-    """Size of each variable of a MATLAB 5 file when unpacked, by the headers alone; nothing for MATLAB 4."""
+    """Return the size of each variable of a MATLAB 5 file when unpacked, by the headers alone; nothing for MATLAB 4."""
     with path.open("rb") as file:
         head = file.read(128)
         if not head.startswith(b"MATLAB 5"):
@@ -161,31 +161,31 @@ def _element_bytes(path: Path) -> list[int]:
         while len(tag := file.read(8)) == 8:
             kind, size = (int(number) for number in np.frombuffer(tag, dtype=f"{order}u4"))
             start = file.tell()
-            sizes.append(_unpacked(file.read(64), order) if kind == _COMPRESSED else size)
+            sizes.append(_unpacked_size(file.read(64), order) if kind == _COMPRESSED else size)
             file.seek(start + size)
     return sizes
 
 
-def _unpacked(start: bytes, order: str) -> int:
-    """Size of a compressed element, which stands at its start."""
+def _unpacked_size(start: bytes, order: str) -> int:
+    """Return the size of a compressed element, which stands at its start."""
     tag = zlib.decompressobj().decompress(start, 8)
     return int(np.frombuffer(tag, dtype=f"{order}u4")[1]) if len(tag) == 8 else 0
 
 
 def _read_hdf5(path: Path) -> _Variables:
-    """Files of MATLAB 7.3, which are HDF5 with all arrays transposed."""
+    """Read a file of MATLAB 7.3, which is HDF5 with all arrays transposed."""
     variables = _Variables()
     with h5py.File(path, "r") as file:
-        stored = list(_stored(file, variables.left_out, set()))
+        stored = list(_iterate_stored(file, variables.left_out, set()))
         refuse_too_large(path, 2 * sum(dataset.size for _, dataset in stored))
         for name, dataset in stored:
             variables.add(name, np.zeros(0) if "MATLAB_empty" in dataset.attrs else dataset[()].T)
     return variables
 
 
-def _stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """The numeric variables of a group and of the structures in it, with their names."""
-    for path, member in members(group, left_out, seen):
+def _iterate_stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the numeric variables of a group and of the structures in it, with their names."""
+    for path, member in iterate_members(group, left_out, seen):
         key = path.rpartition("/")[2]
         name, kind = f"{prefix}{key}", _class(member)
         if key.startswith("#"):
@@ -197,7 +197,7 @@ def _stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "")
         elif "MATLAB_sparse" in member.attrs:
             left_out.add(name, "they are sparse")
         elif isinstance(member, h5py.Group):
-            yield from _stored(member, left_out, seen, f"{name}.")
+            yield from _iterate_stored(member, left_out, seen, f"{name}.")
         elif kind == "char":
             left_out.add(name, _TEXT)
         elif is_numeric(member.dtype) and kind in ("", *_NUMERIC):
@@ -207,6 +207,6 @@ def _stored(group: Any, left_out: UnreadNames, seen: set[int], prefix: str = "")
 
 
 def _class(member: Any) -> str:
-    """The class that MATLAB noted on a variable; empty for fields without a note."""
+    """Return the class that MATLAB noted on a variable; empty for fields without a note."""
     noted = member.attrs.get("MATLAB_class", b"")
     return noted.decode("ascii", "replace") if isinstance(noted, bytes) else str(noted)

@@ -15,14 +15,14 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
-    cut_off,
+    describe_truncation,
     is_numeric,
-    kept_of_cut,
-    load,
-    numbers,
+    load_library,
+    make_channel_file,
     refuse_damage,
     refuse_too_large,
+    to_floats,
+    truncation_error,
 )
 
 _MASTERS = (2, 3)  # master and virtual master
@@ -36,10 +36,10 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: The file is damaged, too large or without numeric channels, or asammdf is not installed.
     """
-    asammdf = load("asammdf", "MDF4")
+    asammdf = load_library("asammdf", "MDF4")
     left_out = UnreadNames()
-    with refuse_damage(path), _opened(asammdf, path) as file:
-        places = _places(file, left_out)
+    with refuse_damage(path), _open(asammdf, path) as file:
+        places = _find_channels(file, left_out)
         refuse_too_large(path, sum(2 * _n_records(file, group) for group, _ in places))
         names = _names(file, places)
         read_one = [_channel(file, *place, names[place], left_out) for place in places]
@@ -48,14 +48,14 @@ def read(path: Path) -> ChannelFile:
     channels = [channel for channel in read_one if channel is not None]
     kept = max((len(channel.values) for channel in channels), default=0)
     if places and expected and not kept and not left_out.names:
-        raise cut_off(path, "it ends before the first whole record")
-    remarks = [kept_of_cut(path, f"{kept} of its {expected} records")] if 0 < kept < expected else []
-    return channel_file(path, kind, channels, left_out, remarks)
+        raise truncation_error(path, "it ends before the first whole record")
+    remarks = [describe_truncation(path, f"{kept} of its {expected} records")] if 0 < kept < expected else []
+    return make_channel_file(path, kind, channels, left_out, remarks)
 
 
 @contextmanager
-def _opened(asammdf: Any, path: Path) -> Iterator[Any]:
-    """The file, closed afterwards.
+def _open(asammdf: Any, path: Path) -> Iterator[Any]:
+    """Yield the file, closed afterwards.
 
     A file that its logger never finalized has to be named: the library repairs a copy of it. Any other is handed over
     open, so that it is surely closed when the library fails.
@@ -63,14 +63,14 @@ def _opened(asammdf: Any, path: Path) -> Iterator[Any]:
     with path.open("rb") as stream:
         source = path if stream.read(5) == b"UnFin" else stream
         stream.seek(0)
-        with _half_read_dropped():
+        with _drop_half_read():
             file = asammdf.MDF(source, process_bus_logging=False)
         with file:
             yield file
 
 
 @contextmanager
-def _half_read_dropped() -> Iterator[None]:
+def _drop_half_read() -> Iterator[None]:
     """Drop what the library holds of a file that it could not open; its finalizer fails then, and would print so."""
     hook = sys.unraisablehook
     try:
@@ -84,8 +84,8 @@ def _half_read_dropped() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _places(file: Any, left_out: UnreadNames) -> list[tuple[int, int]]:
-    """Group and index of each channel that may be a recording."""
+def _find_channels(file: Any, left_out: UnreadNames) -> list[tuple[int, int]]:
+    """Return the group and index of each channel that may be a recording."""
     return [
         (group, index)
         for group, content in enumerate(file.groups)
@@ -95,7 +95,7 @@ def _places(file: Any, left_out: UnreadNames) -> list[tuple[int, int]]:
 
 
 def _may_be_recorded(file: Any, group: int, channel: Any, left_out: UnreadNames) -> bool:
-    """Whether a channel holds samples of its own."""
+    """Return whether a channel holds samples of its own."""
     kind = getattr(channel, "channel_type", 0)
     if kind in _MASTERS and group in file.masters_db:
         return False
@@ -109,12 +109,12 @@ def _may_be_recorded(file: Any, group: int, channel: Any, left_out: UnreadNames)
 
 
 def _n_records(file: Any, group: int) -> int:
-    """Number of samples of each channel of a group, as the file says."""
+    """Return the number of samples of each channel of a group, as the file says."""
     return int(file.groups[group].channel_group.cycles_nr)
 
 
 def _names(file: Any, places: list[tuple[int, int]]) -> dict[tuple[int, int], str]:
-    """The name of each channel, with that of its group before it where several groups have such a channel."""
+    """Return the name of each channel, with that of its group before it where several groups have such a channel."""
     plain = {(group, index): file.groups[group].channels[index].name for group, index in places}
     count = Counter(plain.values())
     return {
@@ -123,28 +123,28 @@ def _names(file: Any, places: list[tuple[int, int]]) -> dict[tuple[int, int], st
 
 
 def _group_name(file: Any, group: int) -> str:
-    """The name that the acquisition gave a group, else its number."""
+    """Return the name that the acquisition gave a group, else its number."""
     return str(getattr(file.groups[group].channel_group, "acq_name", "") or f"group {group + 1}")
 
 
 def _channel(file: Any, group: int, index: int, name: str, left_out: UnreadNames) -> Channel | None:
-    """One channel, or None if it is no column of numbers; samples that the logger called invalid are NaN."""
+    """Return one channel, or None if it is no column of numbers; samples that the logger called invalid are NaN."""
     # "Ignoring" the bits hands them over; otherwise the library drops these samples, and channels lose their alignment.
     signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
     samples = signal.samples
     if samples.dtype.names or samples.ndim != 1 or not is_numeric(samples.dtype):
         left_out.add(name, "they are text, structures or arrays")
         return None
-    values = numbers(samples)
+    values = to_floats(samples)
     if signal.invalidation_bits is not None:
         values = np.where(np.asarray(signal.invalidation_bits, dtype=bool), np.nan, values)
     clock = _clock(file, group)
-    time = numbers(signal.timestamps) if clock else None
+    time = to_floats(signal.timestamps) if clock else None
     return Channel(name, (signal.unit or "").strip(), values, time, clock)
 
 
 def _clock(file: Any, group: int) -> str:
-    """Name of the master channel of a group, if it counts time."""
+    """Return the name of the master channel of a group, if it counts time."""
     index = file.masters_db.get(group)
     if index is None:
         return ""

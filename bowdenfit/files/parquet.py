@@ -9,13 +9,13 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
-    load,
+    load_library,
+    make_channel_file,
+    make_names_unique,
     refuse_damage,
     refuse_too_large,
-    with_unique_names,
 )
-from bowdenfit.files.clocks import with_clocks
+from bowdenfit.files.clocks import assign_clocks
 from bowdenfit.files.headings import Heading, heading_of
 from bowdenfit.types import Vector
 from bowdenfit.words import shown
@@ -37,8 +37,8 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: pyarrow is not installed; the file is missing, damaged or too large, or holds no numbers.
     """
-    pyarrow = load("pyarrow", "Parquet")
-    parquet = load("pyarrow.parquet", "Parquet")
+    pyarrow = load_library("pyarrow", "Parquet")
+    parquet = load_library("pyarrow.parquet", "Parquet")
     with refuse_damage(path), parquet.ParquetFile(path) as file:
         fields = list(file.schema_arrow)
         used = [field for field in fields if _is_readable(pyarrow, field.type)]
@@ -52,7 +52,7 @@ def read(path: Path) -> ChannelFile:
         for field in fields
         if not _is_readable(pyarrow, field.type)
     ]
-    return channel_file(path, "Parquet", with_clocks(with_unique_names(channels)), UnreadNames(), remarks)
+    return make_channel_file(path, "Parquet", assign_clocks(make_names_unique(channels)), UnreadNames(), remarks)
 
 
 def _is_readable(pyarrow: Any, kind: Any) -> bool:
@@ -62,7 +62,7 @@ def _is_readable(pyarrow: Any, kind: Any) -> bool:
 
 
 def _values(pyarrow: Any, column: Any) -> Vector:
-    """Numbers of a column, NaN where it has none; times in seconds."""
+    """Return numbers of a column, NaN where it has none; times in seconds."""
     kind = column.type
     if pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind):
         ticks = column.cast(pyarrow.int64())

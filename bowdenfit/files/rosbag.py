@@ -12,13 +12,13 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
-    load,
+    load_library,
+    make_channel_file,
     refuse_damage,
     refuse_too_large,
 )
 
-MOST_ELEMENTS = 64
+MOST_ELEMENTS = 64  # judged: a longer array is an image or a scan, no set of channels
 _HEADER = "header"
 _COMPARABLE = 3600 * 10**9  # [ns]; clocks that differ by more do not count from the same moment
 _Step = str | int
@@ -31,11 +31,11 @@ class _Leaf:
     steps: tuple[_Step, ...]
 
     def name(self, topic: str) -> str:
-        """The name of its channel, as "/force_in.wrench.force.x" or "/joints.effort[0]"."""
+        """Return the name of its channel, as "/force_in.wrench.force.x" or "/joints.effort[0]"."""
         return topic + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in self.steps)
 
     def value(self, message: Any) -> float:
-        """The number; NaN where the array of this message is shorter than that of the first."""
+        """Return the number; NaN where the array of this message is shorter than that of the first."""
         for step in self.steps:
             if isinstance(step, str):
                 message = getattr(message, step)
@@ -74,7 +74,7 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: The bag is damaged, too large or without numeric fields, or rosbags is not installed.
     """
-    highlevel, typesys = load("rosbags.highlevel", "ROS bag"), load("rosbags.typesys", "ROS bag")
+    highlevel, typesys = load_library("rosbags.highlevel", "ROS bag"), load_library("rosbags.typesys", "ROS bag")
     left_out = UnreadNames()
     fallback = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with refuse_damage(path), highlevel.AnyReader([path], default_typestore=fallback) as reader:
@@ -83,17 +83,17 @@ def read(path: Path) -> ChannelFile:
         topics = [_topic(reader, name, leaves[name]) for name in leaves]
         described = all(connection.msgdef.data for connection in reader.connections)
     remarks = () if described else ("The bag does not describe its messages; those of ROS 2 Humble were assumed.",)
-    return channel_file(path, "ROS bag", list(_channels(topics)), left_out, remarks)
+    return make_channel_file(path, "ROS bag", list(_channels(topics)), left_out, remarks)
 
 
 def _messages(reader: Any, topic: str) -> Iterator[tuple[int, Any]]:
-    """Time of receipt [ns] and content of each message of a topic."""
+    """Yield the time of receipt [ns] and content of each message of a topic."""
     for connection, received, raw in reader.messages(connections=reader.topics[topic].connections):
         yield received, reader.deserialize(raw, connection.msgtype)
 
 
 def _leaves_of(reader: Any, topic: str, left_out: UnreadNames) -> tuple[_Leaf, ...]:
-    """Which numbers the messages of a topic have, by the first of them."""
+    """Return which numbers the messages of a topic have, by the first of them."""
     if not any(connection.msgtype in reader.typestore.fielddefs for connection in reader.topics[topic].connections):
         left_out.add(topic, "the bag does not describe their messages")
         return ()
@@ -105,7 +105,7 @@ def _leaves_of(reader: Any, topic: str, left_out: UnreadNames) -> tuple[_Leaf, .
 
 
 def _numeric_steps(value: Any) -> Iterator[tuple[_Step, ...]]:
-    """The ways to all numbers in a message, leaving out its header and long arrays."""
+    """Yield the ways to all numbers in a message, leaving out its header and long arrays."""
     if isinstance(value, (bool, int, float, np.number, np.bool_)):
         yield ()
     elif isinstance(value, (np.ndarray, list, tuple)):
@@ -119,7 +119,7 @@ def _numeric_steps(value: Any) -> Iterator[tuple[_Step, ...]]:
 
 
 def _topic(reader: Any, name: str, leaves: tuple[_Leaf, ...]) -> _Topic:
-    """All numbers of one topic, message by message."""
+    """Return all numbers of one topic, message by message."""
     columns = tuple(array("d") for _ in leaves)
     received, stamped = array("q"), array("q")
     for moment, message in _messages(reader, name):
@@ -134,13 +134,13 @@ def _topic(reader: Any, name: str, leaves: tuple[_Leaf, ...]) -> _Topic:
 
 
 def _stamp(message: Any) -> int:
-    """The stamp in the header of a message [ns]; 0 without one."""
+    """Return the stamp in the header of a message [ns]; 0 without one."""
     stamp = getattr(getattr(message, _HEADER, None), "stamp", None)
     return 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
 def _channels(topics: list[_Topic]) -> Iterator[Channel]:
-    """The channels of all topics, in seconds from the first message of the bag."""
+    """Yield the channels of all topics, in seconds from the first message of the bag."""
     first: dict[str, int] = {}
     for topic in topics:
         first[topic.clock] = min(int(topic.nanoseconds.min()), first.get(topic.clock, 2**63 - 1))

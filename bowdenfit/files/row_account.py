@@ -77,10 +77,10 @@ class RowAccount:
         return f"beside the table: {texts}"
 
 
-def account_of(
+def make_account(
     file: str, rows: int, headings: Iterable[int], reasons: Mapping[int, tuple[str, str]], beside: Iterable[tuple[int, str]]
 ) -> RowAccount:
-    """The account of a file of which some rows are not read.
+    """Return the account of a file of which some rows are not read.
 
     Args:
         file: Its name.

@@ -1,7 +1,7 @@
 """From the rows of a sheet, whatever program wrote it, to channels.
 
-`cells_of_sheet` reads cell by cell and notes a letter for what each row holds; `columns_of` decides by these letters where
-the data end and what is a remark; `channels_of` names the columns and gives them their clocks.
+`read_cells` reads cell by cell and notes a letter for what each row holds; `read_columns` decides by these letters where
+the data end and what is a remark; `make_channels` names the columns and gives them their clocks.
 """
 
 import math
@@ -14,18 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from bowdenfit.files.cells import Cell, kind_of, number_of
-from bowdenfit.files.channels import Channel, with_unique_names
-from bowdenfit.files.clocks import seconds_of_dates, with_clocks, without_tails
+from bowdenfit.files.cells import Cell, classify_cell, parse_number
+from bowdenfit.files.channels import Channel, make_names_unique
+from bowdenfit.files.clocks import assign_clocks, parse_dates, trim_tails
 from bowdenfit.files.headings import heading_of
 from bowdenfit.files.layout import Layout, is_index, is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
-from bowdenfit.files.text_file import too_many_cells
+from bowdenfit.files.text_file import refuse_long_row
 from bowdenfit.types import Vector
 from bowdenfit.words import few, shown
 
-_MOST_SUMMARY_ROWS = 40
-_MOST_ROWS_AFTER_BLANK = 10
+_MOST_SUMMARY_ROWS = 40  # judged: rows of statistics below the data
+_MOST_ROWS_AFTER_BLANK = 10  # judged: rows behind a blank one that are an evaluation rather than data
 _BLOCK_OF_WORDS = re.compile(rb"(?<=[^ ])(?: +[wm#]+)+$")
 _LAST_FEW = re.compile(rb"([^ ]+) +([^ ]{1,%d})" % _MOST_ROWS_AFTER_BLANK)
 
@@ -92,8 +92,8 @@ class SheetColumns:
     rows: int
 
 
-def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple[Channel, ...], list[str]]:
-    """The channels of a sheet with their clocks, and remarks on the columns left out.
+def make_channels(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple[Channel, ...], list[str]]:
+    """Return the channels of a sheet with their clocks, and remarks on the columns left out.
 
     Args:
         layout: Its headings.
@@ -114,19 +114,19 @@ def channels_of(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple
             kept.append(Channel(layout.name(i), heading.unit, values))
     if not layout.named:
         remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
-    named = with_unique_names(kept)
-    return with_clocks(without_tails(named)) if named else (), remarks
+    named = make_names_unique(kept)
+    return assign_clocks(trim_tails(named)) if named else (), remarks
 
 
-def columns_of(sheet: SheetRows) -> SheetColumns:
-    """The numbers of each column, and what was left out below the data, between the rows and beside them.
+def read_columns(sheet: SheetRows) -> SheetColumns:
+    """Return the numbers of each column, and what was left out below the data, between the rows and beside them.
 
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
-    kinds, cells = sheet.layout.kinds, cells_of_sheet(sheet)
+    kinds, cells = sheet.layout.kinds, read_cells(sheet)
     stop = _data_end(bytes(cells.letters))
-    left_out, beside = _left_out(sheet, cells, stop), []
+    left_out, beside = _explain_left_out(sheet, cells, stop), []
     for position, column, text in cells.words:
         if position >= stop:
             break
@@ -148,21 +148,21 @@ def columns_of(sheet: SheetRows) -> SheetColumns:
         whole = np.concatenate([*pieces, remaining])
         pieces.clear()
         if i in cells.dates:
-            columns[i] = seconds_of_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
+            columns[i] = parse_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
     return SheetColumns(
-        columns, _remarks(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters)
+        columns, _describe_left_out(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters)
     )
 
 
-def _left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:
-    """Why rows are not read, by their numbers; remarks between the rows are marked as such in the letters."""
+def _explain_left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:
+    """Return why rows are not read, by their numbers; remarks between the rows are marked as such in the letters."""
     of_row: dict[int, list[tuple[int, str]]] = {}
     for position, column, text in cells.words:
         if column < len(sheet.layout.kinds):
-            of_row.setdefault(position, []).append((column, text_of(text)))
+            of_row.setdefault(position, []).append((column, cell_text(text)))
     left_out: dict[int, tuple[str, str]] = {}
     for position, letter in enumerate(cells.letters):
         text_of_row = " ".join(text for _, text in of_row.get(position, ()))
@@ -172,14 +172,14 @@ def _left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple
             left_out[sheet.number(position)] = BLANK, ""
         elif position >= stop:
             left_out[sheet.number(position)] = BELOW, text_of_row
-        elif letter == WORDS and (why := _why_words(sheet, of_row.get(position, []))):
+        elif letter == WORDS and (why := _explain_words(sheet, of_row.get(position, []))):
             left_out[sheet.number(position)] = why, text_of_row
             cells.letters[position] = REMARK
     return left_out
 
 
-def _why_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:
-    """Why a row without numbers is no bad sample: it has one remark alone, or the headings again; empty where it is one."""
+def _explain_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:
+    """Return why a row without numbers is no bad sample, one remark alone or the headings again; empty where it is one."""
     if len(words) == 1 and len(sheet.layout.kinds) > 1:
         return BETWEEN
     again = all(heading_of(text).name == sheet.layout.headings[column].name for column, text in words)
@@ -187,20 +187,20 @@ def _why_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:
 
 
 def _remark_beside(sheet: SheetRows, row: int, cells: Sequence[str]) -> str:
-    """The words behind the last column.
+    """Return the words behind the last column.
 
     Raises:
         DatasetError: Numbers stand there.
     """
     width = len(sheet.layout.kinds)
     behind = [cell.strip() for cell in cells[width:] if cell.strip()]
-    if any(kind_of(cell, sheet.decimal) != "text" for cell in behind):
-        too_many_cells(sheet.place, row, cells, width)
+    if any(classify_cell(cell, sheet.decimal) != "text" for cell in behind):
+        refuse_long_row(sheet.place, row, cells, width)
     return " ".join(behind)
 
 
 def _data_end(letters: bytes) -> int:
-    """Position of the row behind the data, by a letter for each row.
+    """Return the position of the row behind the data, by a letter for each row.
 
     Below the data stand statistics, words alone, a block in whose every row are words, or a few last rows after a blank.
     """
@@ -212,7 +212,7 @@ def _data_end(letters: bytes) -> int:
     return last.end(1) if last and last.end(1) > 2 * len(last[2]) + 2 else len(data)
 
 
-def _remarks(
+def _describe_left_out(
     sheet: SheetRows,
     letters: bytearray,
     left_out: Mapping[int, tuple[str, str]],
@@ -234,8 +234,8 @@ def _remarks(
     return sentences + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])
 
 
-def cells_of_sheet(sheet: SheetRows) -> SheetCells:
-    """All cells of a sheet."""
+def read_cells(sheet: SheetRows) -> SheetCells:
+    """Return all cells of a sheet."""
     kinds = sheet.layout.kinds
     numbers = {i: array("d") for i, kind in enumerate(kinds) if kind in ("number", "blank")}
     cells = SheetCells(numbers, {i: [] for i, kind in enumerate(kinds) if kind == "date"}, [], bytearray())
@@ -246,39 +246,39 @@ def cells_of_sheet(sheet: SheetRows) -> SheetCells:
         known = len(cells.words)
         for i, column in cells.numbers.items():
             cell = filled[i] if i < len(filled) else None
-            column.append(cell if type(cell) in (float, int) else _number(cells, position, i, cell, sheet.decimal))
+            column.append(cell if type(cell) in (float, int) else _read_number(cells, position, i, cell, sheet.decimal))
         for i, texts in cells.dates.items():
-            texts.append(text_of(filled[i]) if i < len(filled) else "")
-            if kind_of(texts[-1], sheet.decimal) == "text":
+            texts.append(cell_text(filled[i]) if i < len(filled) else "")
+            if classify_cell(texts[-1], sheet.decimal) == "text":
                 cells.words.append((position, i, texts[-1]))
-        cells.letters.append(_letter(row, sheet, len(cells.words) > known))
+        cells.letters.append(_row_letter(row, sheet, len(cells.words) > known))
     return cells
 
 
-def _number(cells: SheetCells, row: int, column: int, cell: object, decimal: str) -> float:
-    value = number_of(text_of(cell), decimal)
+def _read_number(cells: SheetCells, row: int, column: int, cell: object, decimal: str) -> float:
+    value = parse_number(cell_text(cell), decimal)
     if value is None:
-        cells.words.append((row, column, text_of(cell)))
+        cells.words.append((row, column, cell_text(cell)))
     return math.nan if value is None else value
 
 
-def _letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
-    """What a row holds; statistics bear a label in a column that holds no words in the data."""
+def _row_letter(row: Sequence[Any] | None, sheet: SheetRows, worded: bool) -> int:
+    """Return what a row holds; statistics bear a label in a column that holds no words in the data."""
     if row is None:
         return REMARKED
     if all(cell is None or cell == "" for cell in row):
         return EMPTY if sheet.of_text and row else SPACE
     if not worded:
         return DATA
-    texts, kinds = [text_of(cell) for cell in row], sheet.layout.kinds
+    texts, kinds = [cell_text(cell) for cell in row], sheet.layout.kinds
     if is_summary([text for i, text in enumerate(texts) if i >= len(kinds) or kinds[i] != "text"]):
         return SUMMARY
-    kinds_of_cells = {kind_of(text, sheet.decimal) for text in texts}
+    kinds_of_cells = {classify_cell(text, sheet.decimal) for text in texts}
     return MIXED if len(kinds) == 1 or kinds_of_cells & {"number", "date"} else WORDS
 
 
-def text_of(cell: object) -> str:
-    """A cell as text: dates as ISO dates, true and false as words."""
+def cell_text(cell: object) -> str:
+    """Return a cell as text: dates as ISO dates, true and false as words."""
     if isinstance(cell, str):
         return cell
     if isinstance(cell, timedelta):

@@ -81,7 +81,7 @@ class Spelling:
 
 
 def parse_heading(heading: str, unit: str = "") -> Spelling | None:
-    """The quantity that a heading means, if its words are those of one; None where a word is not known.
+    """Return the quantity that a heading means, if its words are those of one; None where a word is not known.
 
     Args:
         heading: As written, with or without its unit.
@@ -125,7 +125,7 @@ def implied_angle_unit(heading: str) -> str:
 
 
 def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:
-    """Name and unit of a heading, in every way that it may be divided, the likeliest first; the unit is one that is known."""
+    """Yield name and unit of a heading, in every way that it may be divided, the likeliest first; units are known ones."""
     bracketed = next((match for match in _BRACKETED.finditer(heading) if is_unit(match["unit"].strip())), None)
     if bracketed:
         yield heading.replace(bracketed[0], " "), bracketed["unit"].strip()
@@ -142,7 +142,7 @@ def _divided(heading: str, unit: str) -> Iterable[tuple[str, str]]:
 
 
 def _known(parts: list[str]) -> bool:
-    """Whether the words before a unit say a quantity, so that not every last word is looked up among all units."""
+    """Return whether the words before a unit say a quantity, so that not every last word is looked up among all units."""
     name = " ".join(parts)
     plain = _words(name)
     is_named = " ".join(plain) in _QUANTITIES | _GUESSES
@@ -150,7 +150,7 @@ def _known(parts: list[str]) -> bool:
 
 
 def _end_of(words: Iterable[str], unit: str) -> tuple[str, str] | None:
-    """Which end of the cable the words of a force name, and what pair they need; None if they name none."""
+    """Return which end of the cable the words of a force name, and what pair they need; None if they name none."""
     roles = {_ROLES.get(word) for word in _split(words)}
     if None in roles or not ("force" in roles or unit):
         return None
@@ -169,26 +169,26 @@ def _may_be_force(unit: str) -> bool:
 
 
 def without_accents(text: str) -> str:
-    """Letters without what stands above or below them."""
+    """Return letters without what stands above or below them."""
     letters = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
     return "".join(letter for letter in letters if not unicodedata.combining(letter))
 
 
 def _folded(text: str) -> str:
-    """In lower case, without accents, one space or underscore between words."""
+    """Return a text in lower case, without accents, one space or underscore between words."""
     plain = without_accents(text.replace("θ", "theta").replace("η", "eta")).lower()
     return " ".join(re.sub(r"[^\w]+", " ", plain).split())
 
 
 def _words(name: str) -> list[str]:
-    """Words of a heading: "InputForce" has two, and "Load cell" says no load."""
+    """Return words of a heading: "InputForce" has two, and "Load cell" says no load."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
     plain = _folded(apart).replace("_", " ").replace("load cell", "cell")
     return re.sub(r"\b([ft]) ([io])\b", r"\1\2", plain).split()
 
 
 def _split(words: Iterable[str]) -> Iterable[str]:
-    """Words with symbols such as Fin, and German compounds such as Eingangskraft, taken apart."""
+    """Yield words with symbols such as Fin, and German compounds such as Eingangskraft, taken apart."""
     for word in words:
         symbol, compound = _SYMBOL.fullmatch(word), _COMPOUND.fullmatch(word)
         if symbol:

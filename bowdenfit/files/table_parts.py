@@ -11,13 +11,13 @@ from functools import lru_cache
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK, is_plain_number
-from bowdenfit.files.headings import is_units_row, without_brackets
+from bowdenfit.files.headings import is_units_row, strip_brackets
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
-from bowdenfit.files.text_file import SEPARATORS, CsvRecord, cells_of
+from bowdenfit.files.text_file import SEPARATORS, CsvRecord, split_cells
 from bowdenfit.words import shown
 
-_NEAR_TOP = 60  # rows in which headings are looked for
+_NEAR_TOP = 60  # judged: rows in which headings are looked for
 
 
 @dataclass(frozen=True)
@@ -43,27 +43,27 @@ class TableParts:
     beside: tuple[tuple[int, str], ...] = ()
 
 
-def parts_of(rows: Sequence[CsvRecord], file: str) -> TableParts:
-    """The parts of a table, by all rows of a file that are no comments.
+def split_table(rows: Sequence[CsvRecord], file: str) -> TableParts:
+    """Return the parts of a table, by all rows of a file that are no comments.
 
     Raises:
         DatasetError: Rows of numbers stand above the headings.
     """
-    gap = _gap(rows)
-    parts = _parts([replace(row, cells=row.cells[:gap]) for row in rows], file)
+    gap = _find_gap(rows)
+    parts = _split_columns([replace(row, cells=row.cells[:gap]) for row in rows], file)
     if gap is None:
         return parts
     whole = {row.row: row.cells for row in rows}
     if any(map(str.strip, whole[parts.header.row][gap : gap + 1])):
-        return _parts(rows, file)  # a column that nothing was written into
+        return _split_columns(rows, file)  # a column that nothing was written into
     used = [row.row for row in (*parts.headings, *parts.body)]
     beside = [(row, " ".join(filter(None, map(str.strip, whole[row][gap:])))) for row in used]
     return replace(parts, beside=tuple((row, text) for row, text in beside if text))
 
 
-def _gap(rows: Sequence[CsvRecord]) -> int | None:
-    """The first empty column behind the table, where what stands behind it are remarks rather than columns of numbers."""
-    measured = [row for row in rows if words_and_numbers(row)[1] > 1]
+def _find_gap(rows: Sequence[CsvRecord]) -> int | None:
+    """Return the first empty column behind the table, where remarks rather than columns of numbers stand behind it."""
+    measured = [row for row in rows if count_words_and_numbers(row)[1] > 1]
     width = max((len(row.cells) for row in measured), default=0)
     empty = [all(i >= len(row.cells) or not row.cells[i].strip() for row in measured) for i in range(width)]
     start = next((i for i, blank in enumerate(empty) if not blank), 0)
@@ -74,53 +74,53 @@ def _gap(rows: Sequence[CsvRecord]) -> int | None:
     return gap if 2 * behind < len(measured) else None
 
 
-def _parts(rows: Sequence[CsvRecord], file: str) -> TableParts:
+def _split_columns(rows: Sequence[CsvRecord], file: str) -> TableParts:
     filled = [row for row in rows if not row.blank]
     at = _header_position(filled)
     over, below = [filled[at]], at + 1
     units: list[str] = []
     if below < len(filled) and is_units(filled[below]):
-        units = [without_brackets(cell) for cell in filled[below].cells]
+        units = [strip_brackets(cell) for cell in filled[below].cells]
         over.append(filled[below])
     names = [" ".join(cell.split()) for cell in filled[at].cells]
     if at and _is_over(filled[at - 1], names):
-        names = _joined(filled[at - 1].cells, names)
+        names = _join_groups(filled[at - 1].cells, names)
         over.insert(0, filled[at - 1])
     reasons = {row.row: ABOVE for row in filled[:at] if row not in over}
     _check_above(filled[:at], sum(map(bool, names)), filled[at], file)
-    body, left_out = readings([row for row in rows if row.row > over[-1].row], filled[at], file)
+    body, left_out = select_readings([row for row in rows if row.row > over[-1].row], filled[at], file)
     return TableParts(tuple(over), filled[at], tuple(names), tuple(units), tuple(body), reasons | left_out)
 
 
 def _header_position(filled: Sequence[CsvRecord]) -> int:
-    """Which of the rows holds the headings: that of words alone over most numbers; the first where there is none."""
+    """Return which of the rows holds the headings: that of words alone over most numbers; the first where there is none."""
     widest = max((len([cell for cell in row.cells if cell.strip()]) for row in filled), default=0)
     least = 2 if widest > 1 else 1
     best, most, current = 0, 0, -1
     score = 0
     for i, row in enumerate(filled):
         words = i < _NEAR_TOP and is_words(row, least)
-        if words and not (i == current + 1 and current >= 0 and is_units(row)) and not _again(row, filled, current):
+        if words and not (i == current + 1 and current >= 0 and is_units(row)) and not _repeats_headings(row, filled, current):
             current, score = i, 0
         elif current >= 0:
-            score += words_and_numbers(row)[1]
+            score += count_words_and_numbers(row)[1]
             if score > most:
                 best, most = current, score
     return best
 
 
-def _again(row: CsvRecord, filled: Sequence[CsvRecord], current: int) -> bool:
+def _repeats_headings(row: CsvRecord, filled: Sequence[CsvRecord], current: int) -> bool:
     return current >= 0 and row.cells == filled[current].cells
 
 
 def _is_over(above: CsvRecord, names: Sequence[str]) -> bool:
-    """Whether a row is a first row of headings over others that need it, because two of them are the same."""
+    """Return whether a row is a first row of headings over others that need it, because two of them are the same."""
     written = [name.lower() for name in names if name]
     return len(set(written)) < len(written) and is_words(above, 1) and len(above.cells) > 1
 
 
-def _joined(above: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Headings with the group before them that stands over the first of its columns, as merged cells are exported.
+def _join_groups(above: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return headings with the group before them that stands over the first of its columns, as merged cells are exported.
 
     A column that has a heading in the upper row alone, such as the time beside groups of runs, keeps that.
     """
@@ -142,7 +142,7 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
         DatasetError: There is such a row.
     """
     for row in above:
-        words, numbers = words_and_numbers(row)
+        words, numbers = count_words_and_numbers(row)
         if numbers >= max(columns, 2) and not words:
             raise DatasetError(
                 f"{file}, row {row.row}: numbers stand there ({shown(row.cells[0])}, ...) above the headings in row "
@@ -150,18 +150,18 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
             )
 
 
-_MOST_STATISTICS = 8  # rows of statistics that may stand below text columns
-_FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.05  # rows below words, and of those above, from which they may belong to the table
+_MOST_STATISTICS = 8  # judged: rows of statistics that may stand below text columns
+_FEWEST_ALIKE, _SHARE_ALIKE = 2, 0.05  # judged: rows below words, and share of those above, from which they may be data
 _STATISTICS, _INSIDE = "statistics below the table", "statistics between the rows"
 
 
-def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[list[CsvRecord], dict[int, str]]:
-    """The rows of readings below the headings, and why the others are none.
+def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[list[CsvRecord], dict[int, str]]:
+    """Return the rows of readings below the headings, and why the others are none.
 
     Raises:
         DatasetError: A row that would be left out looks like a reading.
     """
-    stop = _other_table(rows, header, file)
+    stop = _find_next_table(rows, header, file)
     numeric = _numeric_columns(rows[:stop])
     agree = [_agrees(row, numeric) for row in rows[:stop]]
     if not any(agree):
@@ -174,7 +174,7 @@ def readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> tuple[l
     for i, row in enumerate(rows):
         if row.blank:
             continue
-        why = _inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
+        why = _explain_row_inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
         if why:
             _refuse_reading(row, header, numeric, file)
             left_out[row.row] = why
@@ -194,7 +194,7 @@ def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: 
         return
     width = len([cell for cell in header.cells if cell.strip()])
     for separator in SEPARATORS:
-        cells = cells_of(filled[0].strip().strip('"'), separator)
+        cells = split_cells(filled[0].strip().strip('"'), separator)
         numbers = sum(map(is_measured, cells))
         if len(cells) == width > 1 and numbers >= max(len(numeric), 1):
             raise DatasetError(
@@ -204,8 +204,8 @@ def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: 
             )
 
 
-def _other_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:
-    """Position of the first row of several words behind a blank one, where the table ends; the number of rows if none.
+def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:
+    """Return the position of the first row of several words behind a blank one, where the table ends; else the number of rows.
 
     Raises:
         DatasetError: So many rows that fit the table follow that they may belong to it.
@@ -224,15 +224,15 @@ def _other_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int
                     "that row with #, and if they are another table, put it into a file of its own."
                 )
             return i
-        seen = seen or words_and_numbers(row)[1] > 0
+        seen = seen or count_words_and_numbers(row)[1] > 0
     return len(rows)
 
 
 def _numeric_columns(rows: Sequence[CsvRecord]) -> set[int]:
-    """Columns that hold more numbers than words."""
+    """Return columns that hold more numbers than words."""
     balance: dict[int, int] = {}
     for row in rows:
-        if words_and_numbers(row)[1]:
+        if count_words_and_numbers(row)[1]:
             for i, cell in enumerate(row.cells):
                 if cell.strip() and cell.strip().lower() not in BLANK:
                     balance[i] = balance.get(i, 0) + (1 if is_measured(cell) else -1)
@@ -240,24 +240,24 @@ def _numeric_columns(rows: Sequence[CsvRecord]) -> set[int]:
 
 
 def _agrees(row: CsvRecord, numeric: set[int]) -> bool:
-    """Whether a row has numbers where the table has them, and no words there."""
+    """Return whether a row has numbers where the table has them, and no words there."""
     cells = [row.cells[i] for i in numeric if i < len(row.cells) and row.cells[i].strip().lower() not in BLANK]
     return bool(cells) and 2 * len(cells) >= len(numeric) and all(map(is_measured, cells))
 
 
 def _filled(row: CsvRecord, numeric: set[int]) -> int:
-    """How many of the columns of numbers have one in a row."""
+    """Return how many of the columns of numbers have one in a row."""
     return sum(i < len(row.cells) and is_measured(row.cells[i]) for i in numeric)
 
 
 def _misfits(row: CsvRecord, numeric: set[int]) -> bool:
-    """Whether a row holds a reading among words, as one with a bad cell does, and no statistics."""
+    """Return whether a row holds a reading among words, as one with a bad cell does, and no statistics."""
     numbers = any(is_measured(row.cells[i]) for i in numeric if i < len(row.cells) and row.cells[i].strip())
     return numbers and not is_summary(row.cells)
 
 
 def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) -> int:
-    """Where statistics begin that stand at the end behind a blank row, each under a name of its own; else `end`."""
+    """Return where statistics begin that stand at the end behind a blank row, each under a name of its own; else `end`."""
     start = next((i for i in range(end - 1, -1, -1) if rows[i].blank), -1) + 1
     last = rows[start:end]
     labels = [
@@ -267,9 +267,9 @@ def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) ->
     return start if is_block and all(is_summary(row.cells) for row in last) else end
 
 
-def _inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
-    """Why a row among the readings is none; empty where it is one."""
-    words, numbers = words_and_numbers(row)
+def _explain_row_inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
+    """Return why a row among the readings is none; empty where it is one."""
+    words, numbers = count_words_and_numbers(row)
     if not numbers and (row.cells == header.cells or is_units(row)):
         return AGAIN
     if not numbers and words == 1 and len(numeric) > 1:
@@ -283,12 +283,12 @@ _TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
 
 @lru_cache(1 << 14)  # it is asked of every cell again and again, and many cells hold the same
 def is_measured(text: str) -> bool:
-    """Whether a cell holds what a table measures: a number, a percentage, or a limit such as <10."""
+    """Return whether a cell holds what a table measures: a number, a percentage, or a limit such as <10."""
     return is_plain_number(text.strip().rstrip("%").lstrip("<≤="))
 
 
-def numbers_found(rows: Sequence[CsvRecord], separator: str) -> int:
-    """How many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
+def count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
+    """Return how many cells hold numbers, less those in which two numbers stand together: the most for the right separator.
 
     Blanks, which separate words too, count for less by every word between them.
     """
@@ -301,19 +301,19 @@ def numbers_found(rows: Sequence[CsvRecord], separator: str) -> int:
     return total
 
 
-def words_and_numbers(row: CsvRecord) -> tuple[int, int]:
-    """How many cells hold words, and how many numbers; marks for nothing are neither."""
+def count_words_and_numbers(row: CsvRecord) -> tuple[int, int]:
+    """Return how many cells hold words, and how many numbers; marks for nothing are neither."""
     filled = [cell for cell in row.cells if cell.strip()]
     numbers = sum(map(is_measured, filled))
     return sum(cell.strip().lower() not in BLANK for cell in filled) - numbers, numbers
 
 
 def is_words(row: CsvRecord, least: int = 2) -> bool:
-    """Whether a row can be one of headings: nothing but words."""
-    words, numbers = words_and_numbers(row)
+    """Return whether a row can be one of headings: nothing but words."""
+    words, numbers = count_words_and_numbers(row)
     return not numbers and words >= least
 
 
 def is_units(row: CsvRecord) -> bool:
-    """Whether it holds nothing but units."""
-    return not words_and_numbers(row)[1] and is_units_row(row.cells)
+    """Return whether it holds nothing but units."""
+    return not count_words_and_numbers(row)[1] and is_units_row(row.cells)

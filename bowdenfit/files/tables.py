@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError, Faults
-from bowdenfit.files.apart import LIMITS, call_apart
+from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
-from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, checked_ending, recognize
-from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, account_of
-from bowdenfit.files.table_parts import TableParts, is_measured, numbers_found, parts_of
+from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
+from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
+from bowdenfit.files.table_parts import TableParts, count_numbers, is_measured, split_table
 from bowdenfit.files.text_file import (
     SEPARATORS,
     CsvRecord,
@@ -19,15 +19,15 @@ from bowdenfit.files.text_file import (
     first_bytes,
     first_lines,
     is_blank,
-    records,
-    too_few_cells,
-    too_many_cells,
+    refuse_long_row,
+    short_row_error,
+    split_records,
 )
 from bowdenfit.inputs import refuse_special
 from bowdenfit.words import shown
 
 WORKBOOKS = (".xlsx", ".xlsm")
-_FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18
+_FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18  # judged: rows by which the separator is chosen, and bytes that hold as many
 _LARGEST = 40e6  # bytes; some fifty times as many are needed to read them
 _SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
@@ -78,8 +78,8 @@ def read_table(path: Path, most: int | None = None) -> RawTable:
     refuse_special(path)
     if path.suffix.lower() not in WORKBOOKS:
         return read_csv(path, most)
-    checked_ending(path)
-    table: RawTable = call_apart(path, "bowdenfit.files.excel:read_workbook", most)
+    check_ending(path)
+    table: RawTable = call_isolated(path, "bowdenfit.files.excel:read_workbook", most)
     return table
 
 
@@ -109,8 +109,8 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
         all_lines = all_lines[:-1]
     declared, lines = declared_separator(all_lines, name)
     lines = [line for line in lines if comment_mark(line.text) != "#"]  # % may be a heading
-    separator = declared or max(SEPARATORS, key=lambda candidate: _fitness(lines, candidate))
-    rows = list(records(lines, separator, len(lines)))
+    separator = declared or max(SEPARATORS, key=lambda candidate: _score_separator(lines, candidate))
+    rows = list(split_records(lines, separator, len(lines)))
     for row in rows:
         if not row.closed:
             raise DatasetError(
@@ -119,11 +119,11 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
             )
     if all(row.blank for row in rows):
         raise DatasetError(f"{name} is empty; it needs one header row and the measurements below it.")
-    return raw_table(name, all_lines, rows, separator)
+    return make_table(name, all_lines, rows, separator)
 
 
 def _refuse_large(path: Path) -> None:
-    """Refuse what no table of readings is, before it fills the memory.
+    """Refuse a file that is too large for a table of readings, before it fills the memory.
 
     Raises:
         DatasetError: The file is too large.
@@ -136,8 +136,8 @@ def _refuse_large(path: Path) -> None:
         )
 
 
-def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
-    """The table that the rows of a file make.
+def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
+    """Return the table that the rows of a file make.
 
     Args:
         name: Of the file.
@@ -148,7 +148,7 @@ def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separ
     Raises:
         DatasetError: See `read_csv`.
     """
-    parts = parts_of(rows, name)
+    parts = split_table(rows, name)
     header = _header(parts, name)
     if not parts.body:
         raise DatasetError(
@@ -165,19 +165,19 @@ def raw_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separ
     return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
 
 
-def _fitness(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
-    """How well a separator splits the first rows: into most numbers and fewest words, equally many cells, and most of them.
+def _score_separator(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
+    """Return how well a separator splits the first rows: most numbers, fewest words, equally many cells, most cells.
 
     Blanks, which stand in headings too, separate columns only where nothing else does.
     """
-    rows = [row for row in records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
+    rows = [row for row in split_records(lines[:_FIRST_ROWS], separator, _FIRST_ROWS) if not row.blank]
     widths = [len(row.cells) for row in rows] or [0]
     alike = widths[0] > 1 and len(set(widths)) == 1 and all(row.closed for row in rows)
-    return numbers_found(rows, separator), separator != " ", alike, widths[0]
+    return count_numbers(rows, separator), separator != " ", alike, widths[0]
 
 
 def _header(parts: TableParts, file: str) -> tuple[str, ...]:
-    """The headings, without the empty ones behind the last."""
+    """Return the headings, without the empty ones behind the last."""
     header, row = parts.names, parts.headings[0].row
     while not header[-1]:
         header = header[:-1]
@@ -198,12 +198,12 @@ def _header(parts: TableParts, file: str) -> tuple[str, ...]:
 
 
 def _column(rows: Sequence[CsvRecord], position: int) -> list[str]:
-    """Texts of one column, of the rows that reach it."""
+    """Return texts of one column, of the rows that reach it."""
     return [row.cells[position] for row in rows if position < len(row.cells)]
 
 
 def _fewest_cells(rows: Sequence[CsvRecord], width: int) -> int:
-    """Number of cells that a row must have: up to the last column in which any row has a number."""
+    """Return the number of cells that a row must have: up to the last column in which any row has a number."""
     return max((i + 1 for row in rows for i, cell in enumerate(row.cells[:width]) if is_measured(cell)), default=0)
 
 
@@ -211,9 +211,9 @@ def _cells(
     file: str, header: tuple[str, ...], row: CsvRecord, decimals: Sequence[Decimals], fewest: int
 ) -> tuple[Cell, ...]:
     if any(map(is_measured, _behind(row, len(header)))):
-        too_many_cells(file, row.row, row.cells, len(header))
+        refuse_long_row(file, row.row, row.cells, len(header))
     if len(row.cells) < fewest:
-        raise too_few_cells(file, row.row, row.cells, header)
+        raise short_row_error(file, row.row, row.cells, header)
     padded = row.cells + [""] * (len(header) - len(row.cells))
     return tuple(
         Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals[i])
@@ -222,7 +222,7 @@ def _cells(
 
 
 def _behind(row: CsvRecord, width: int) -> list[str]:
-    """What stands in cells behind the last column."""
+    """Return what stands in cells behind the last column."""
     return [cell.strip() for cell in row.cells[width:] if cell.strip()]
 
 
@@ -243,4 +243,4 @@ def _account(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], parts:
             reasons[row.row] = parts.left_out[row.row], " ".join(filter(None, map(str.strip, row.cells)))
     beside = [(row.row, " ".join(text)) for row in parts.body if (text := _behind(row, width))]
     over = [row.row for row in parts.headings]
-    return account_of(name, len(lines), over, reasons, (*parts.beside, *beside))
+    return make_account(name, len(lines), over, reasons, (*parts.beside, *beside))

@@ -12,16 +12,16 @@ from bowdenfit.files.channels import (
     Channel,
     ChannelFile,
     UnreadNames,
-    channel_file,
-    cut_off,
+    describe_truncation,
     is_numeric,
-    kept_of_cut,
-    load,
-    numbers,
+    load_library,
+    make_channel_file,
     refuse_damage,
     refuse_too_large,
+    to_floats,
+    truncation_error,
 )
-from bowdenfit.files.clocks import with_column_clocks, with_only_clock
+from bowdenfit.files.clocks import assign_group_clocks, assign_only_clock
 
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 _WAVEFORM = "wf_increment"
@@ -36,7 +36,7 @@ def read(path: Path) -> ChannelFile:
     Raises:
         DatasetError: The file is damaged, too large or without numeric channels, or npTDMS is not installed.
     """
-    nptdms = load("nptdms", "TDMS")
+    nptdms = load_library("nptdms", "TDMS")
     # By its stream, without its name: by name npTDMS would believe an index beside it, which may be of an older file.
     with refuse_damage(path), _quiet(), path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
         stored = [channel for group in file.groups() for channel in group.channels()]
@@ -50,16 +50,16 @@ def read(path: Path) -> ChannelFile:
         if not lengths[channel.path]:
             left_out.add(_name(channel), "they are empty")
     if incomplete and not channels:
-        raise cut_off(path, "it ends before the first whole sample")
+        raise truncation_error(path, "it ends before the first whole sample")
     kept = max((len(channel.values) for channel in channels), default=0)
-    remarks = [kept_of_cut(path, f"the {kept} whole samples before the end")] if incomplete else []
-    return channel_file(path, "TDMS", with_only_clock(with_column_clocks(channels)), left_out, remarks)
+    remarks = [describe_truncation(path, f"the {kept} whole samples before the end")] if incomplete else []
+    return make_channel_file(path, "TDMS", assign_only_clock(assign_group_clocks(channels)), left_out, remarks)
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the library's own warnings off the terminal; what they say becomes a remark."""
-    manager = load("nptdms.log", "TDMS").log_manager
+    manager = load_library("nptdms.log", "TDMS").log_manager
     level = manager.log_level
     manager.set_level(logging.CRITICAL)
     try:
@@ -69,12 +69,12 @@ def _quiet() -> Iterator[None]:
 
 
 def _name(channel: Any) -> str:
-    """Group and channel, as "bench/F_in"."""
+    """Return the group and channel, as "bench/F_in"."""
     return f"{channel.group_name}/{channel.name}"
 
 
 def _is_recording(channel: Any, left_out: UnreadNames) -> bool:
-    """Whether this channel holds numbers; times of the day count as such."""
+    """Return whether this channel holds numbers; times of the day count as such."""
     if not (is_numeric(channel.dtype) or channel.dtype.kind == "M"):
         left_out.add(_name(channel), "they are text or complex numbers")
         return False
@@ -82,7 +82,7 @@ def _is_recording(channel: Any, left_out: UnreadNames) -> bool:
 
 
 def _whole_lengths(channels: list[Any], status: Any) -> dict[str, int]:
-    """How many samples to take of each channel.
+    """Return how many samples to take of each channel.
 
     A file that ends in the middle of a chunk has more samples of its first channels than of its last; channels of one
     group that were meant to be equally long are cut to the shortest, so that they stay side by side.
@@ -100,25 +100,25 @@ def _whole_lengths(channels: list[Any], status: Any) -> dict[str, int]:
 
 
 def _channel(channel: Any, length: int) -> Channel:
-    """One channel with the time of its waveform, if it has one."""
+    """Return one channel with the time of its waveform, if it has one."""
     raw = channel[:length]
     unit = _unit(channel.properties)
     if raw.dtype.kind == "M":
         return Channel(_name(channel), "s", _seconds(raw))
-    time = numbers(channel.time_track()[:length]) if _has_waveform(channel.properties) else None
-    return Channel(_name(channel), unit, numbers(raw), time, "" if time is None else _WAVEFORM)
+    time = to_floats(channel.time_track()[:length]) if _has_waveform(channel.properties) else None
+    return Channel(_name(channel), unit, to_floats(raw), time, "" if time is None else _WAVEFORM)
 
 
 def _has_waveform(properties: Mapping[str, Any]) -> bool:
-    """Whether the channel says how its samples follow each other in time."""
+    """Return whether the channel says how its samples follow each other in time."""
     return properties.get(_WAVEFORM, 0) > 0 and "wf_start_offset" in properties
 
 
 def _unit(properties: Mapping[str, Any]) -> str:
-    """The unit of a channel, by the first property that has one."""
+    """Return the unit of a channel, by the first property that has one."""
     return next((str(properties[name]).strip() for name in _UNITS if properties.get(name)), "")
 
 
 def _seconds(dates: np.ndarray) -> np.ndarray:
-    """Dates as seconds from the first."""
+    """Return dates as seconds from the first."""
     return (dates - dates[0]) / np.timedelta64(1, "s")

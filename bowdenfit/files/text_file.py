@@ -16,7 +16,7 @@ from bowdenfit.words import shown
 
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
 _COMMENT = re.compile(r"\s*\"?\s*(?P<mark>#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", re.IGNORECASE)
-_PIECE = 1 << 24
+_PIECE = 1 << 24  # bytes at once, little beside the memory of any computer
 # Marks without width that spreadsheets and chat programs leave in cells: two labels that look alike would be two.
 _INVISIBLE = dict.fromkeys(map(ord, "\xad\u200b\u200c\u200d\u200e\u200f\u2060\u202a\u202b\u202c\u202d\u202e\ufeff"))
 
@@ -51,7 +51,7 @@ class Section(io.RawIOBase):
         self._left = stop - start
 
     def readable(self) -> bool:
-        """Streams for reading say so."""
+        """Return True: this is a stream for reading."""
         return True
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
@@ -68,7 +68,7 @@ class Section(io.RawIOBase):
 
 
 def first_bytes(path: Path, most: int = -1) -> bytes:
-    """The first bytes of a file, or all of them.
+    """Return the first bytes of a file, or all of them.
 
     Raises:
         DatasetError: The file is missing, a folder, empty, or cannot be read.
@@ -99,7 +99,7 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
 
 
 def first_lines(data: bytes, name: str, whole: bool, most: int | None = None) -> tuple[str, list[Line]]:
-    """The encoding of a text and its lines, or the first of them, by its first bytes or, if `whole`, all of them.
+    """Return the encoding of a text and its lines, or the first of them, by its first bytes or, if `whole`, all of them.
 
     Raises:
         DatasetError: It is no text.
@@ -109,9 +109,9 @@ def first_lines(data: bytes, name: str, whole: bool, most: int | None = None) ->
 
 
 def last_lines(path: Path, encoding: str, start: int, most: int) -> list[Line]:
-    """Lines from `start` to the end of a file, or the last of them if these are more than `most` bytes.
+    """Return lines from `start` to the end of a file, or the last of them if these are more than `most` bytes.
 
-    Their rows count from the first of them; `rows_before` gives what to add.
+    Their rows count from the first of them; `count_rows_before` gives what to add.
     """
     skipped = max(start, (path.stat().st_size - most) // 2 * 2 + start % 2)
     with path.open("rb") as file:
@@ -121,13 +121,13 @@ def last_lines(path: Path, encoding: str, start: int, most: int) -> list[Line]:
 
 
 def lines_between(path: Path, encoding: str, start: int, stop: int) -> Iterator[str]:
-    """Lines of a section of a file [bytes], one after the other."""
+    """Yield lines of a section of a file [bytes], one after the other."""
     with io.BufferedReader(Section(path, start, stop), 1 << 20) as stream:
         yield from io.TextIOWrapper(stream, encoding=encoding, errors="replace")
 
 
-def rows_before(path: Path, stop: int) -> int:
-    """Number of ends of lines in the first `stop` bytes."""
+def count_rows_before(path: Path, stop: int) -> int:
+    """Return the number of ends of lines in the first `stop` bytes."""
     feeds = returns = 0
     with path.open("rb") as file:
         while stop > 0 and (data := file.read(min(_PIECE, stop))):
@@ -136,12 +136,12 @@ def rows_before(path: Path, stop: int) -> int:
 
 
 def is_blank(line: str) -> bool:
-    """Whether a line holds nothing but separators."""
+    """Return whether a line holds nothing but separators."""
     return not line.strip(" \t\r\n;,|\"'")
 
 
 def comment_mark(line: str) -> str:
-    """The mark (# or %) that makes a line a comment, else nothing; a row of data may begin with Excel's #N/A."""
+    """Return the mark (# or %) that makes a line a comment, else nothing; a row of data may begin with Excel's #N/A."""
     match = _COMMENT.match(line)
     return match["mark"] if match else ""
 
@@ -163,7 +163,7 @@ def _encoding(data: bytes, name: str, whole: bool) -> tuple[str, int]:
 
 
 def _lines(data: bytes, encoding: str, start: int, most: int | None = None) -> list[Line]:
-    """Lines of a piece of a file that starts there [bytes], or the first of them; the first is called row 1."""
+    """Return lines of a piece of a file that starts there [bytes], or the first of them; the first is called row 1."""
     if encoding.startswith("utf-16"):
         texts = list(io.StringIO(data.decode(encoding, errors="replace"), newline=""))[:most]
         lengths = [len(text.encode(encoding, errors="replace")) for text in texts]
@@ -207,7 +207,7 @@ class CsvRecord:
 
 
 def declared_separator(lines: list[Line], name: str) -> tuple[str | None, list[Line]]:
-    """The separator that a first line `sep=;` declares, as Excel writes it, and the lines below it.
+    """Return the separator that a first line `sep=;` declares, as Excel writes it, and the lines below it.
 
     Raises:
         DatasetError: It declares what separates nothing.
@@ -224,19 +224,19 @@ def declared_separator(lines: list[Line], name: str) -> tuple[str | None, list[L
     return separator, lines[first + 1 :]
 
 
-def records(lines: Sequence[Line], separator: str, most: int) -> Iterator[CsvRecord]:
-    """Each record of some lines; a quoted cell may run over up to `most` of them."""
+def split_records(lines: Sequence[Line], separator: str, most: int) -> Iterator[CsvRecord]:
+    """Yield each record of some lines; a quoted cell may run over up to `most` of them."""
     i = 0
     while i < len(lines):
         following = (lines[k].text.rstrip("\r\n") + "\n" for k in range(i, min(i + most, len(lines))))
         whole = _whole_record(following, separator)
-        count, cells = whole or (1, cells_of(lines[i].text, separator))
+        count, cells = whole or (1, split_cells(lines[i].text, separator))
         yield CsvRecord(lines[i].row, lines[i].start, cells, whole is not None)
         i += count
 
 
-def cells_of(line: str, separator: str) -> list[str]:
-    """Cells of one line."""
+def split_cells(line: str, separator: str) -> list[str]:
+    """Return cells of one line."""
     if separator == " ":
         return [cell.strip('"') for cell in line.split()]
     try:
@@ -246,9 +246,9 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def _whole_record(lines: Iterator[str], separator: str) -> tuple[int, list[str]] | None:
-    """How many lines the first record has, and its cells; None if a quotation mark stays open or a cell is too long."""
+    """Return how many lines the first record has, and its cells; None if a quotation mark stays open or a cell is too long."""
     if separator == " ":
-        return 1, cells_of(next(lines), separator)
+        return 1, split_cells(next(lines), separator)
     reader = csv.reader(chain(lines, [_END]), delimiter=separator, skipinitialspace=True)
     try:
         cells = next(reader)
@@ -257,7 +257,7 @@ def _whole_record(lines: Iterator[str], separator: str) -> tuple[int, list[str]]
     return None if cells and _END in cells[-1] else (reader.line_num, cells)
 
 
-def too_many_cells(file: str, row: int, cells: Sequence[str], width: int) -> None:
+def refuse_long_row(file: str, row: int, cells: Sequence[str], width: int) -> None:
     """Check that nothing stands beyond the columns that the headings, or the rows above, have.
 
     Raises:
@@ -274,7 +274,7 @@ def too_many_cells(file: str, row: int, cells: Sequence[str], width: int) -> Non
         raise error
 
 
-def too_few_cells(file: str, row: int, cells: Sequence[str], header: Sequence[str]) -> DatasetError:
+def short_row_error(file: str, row: int, cells: Sequence[str], header: Sequence[str]) -> DatasetError:
     """Return the refusal of a row that ends before a column in which other rows have numbers."""
     error = DatasetError(
         f"{file}, row {row}: {len(cells)} cell{'s' if len(cells) > 1 else ''} where the headings have {len(header)}: the "

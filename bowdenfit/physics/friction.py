@@ -32,7 +32,7 @@ def friction_exponent(
 
 
 def transmission_efficiency(friction_exponent: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-    r"""Return output force over input force while the rope slides toward the motor.
+    r"""Return the output force over input force while the rope slides toward the motor.
 
     .. math:: \eta = \exp(-\Lambda)
 

@@ -147,7 +147,7 @@ def side_tensions(
     friction_exponent: Float[Array, "*#batch"],
     stroke: Float[Array, "*#batch"],
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-    r"""Return mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
+    r"""Return the mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
 
     With :math:`a = (1 - e^{-s\Lambda})/(s\Lambda)` for the pulling side and b, the same of :math:`-s`, for the other:
     :math:`\bar T_1 = a (2 P + b F_\text{in})/(a + b)` and :math:`\bar T_2 = 2 P - \bar T_1` while that is positive;

@@ -96,7 +96,7 @@ def tension_from_extension(
 
 @tension_from_extension.defjvp
 def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Array, Array]:
-    """The implicit function's derivative: what e(T; k, d, T_c) lacks of the wanted extension, over its slope."""
+    """Return the implicit function's derivative: what e(T; k, d, T_c) lacks of the wanted extension, over its slope."""
     extended, *rope = primals
     tension = tension_from_extension(extended, *rope)
     _, by_rope = jax.jvp(lambda *at: extension(tension, *at), tuple(rope), tuple(tangents[1:]))

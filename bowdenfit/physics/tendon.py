@@ -103,7 +103,7 @@ class Tendon:
     rope: RopeStretch
 
     def sliding(self, travel: Array, stroke: Array) -> tuple[Array, Array]:
-        """Return force at the motor and mean tension [N] while all of the rope slides.
+        """Return the force at the motor and mean tension [N] while all of the rope slides.
 
         Args:
             travel: Displacement from that without force [mm].
@@ -115,7 +115,7 @@ class Tendon:
         return force, share * force
 
     def sliding_after_turn(self, turn: Turn, travel: Array, stroke: Array) -> tuple[Array, Array]:
-        """Return force and mean tension [N] after a reversal, before and after the slip front has crossed the rope."""
+        """Return the force and mean tension [N] after a reversal, before and after the slip front has crossed the rope."""
         moved = jnp.maximum(stroke * (travel - turn.travel), 0.0)
         mean = self.rope.tension(self.rope.extension(turn.mean) + stroke * moved)
         before = _safe_root(turn.force)

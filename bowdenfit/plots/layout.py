@@ -295,7 +295,7 @@ def ticks(
         return candidates[(candidates >= low) & (candidates <= high)], float(candidates[1] - candidates[0])
 
     def apart(values: np.ndarray, texts: list[str]) -> bool:
-        """Whether numbers keep apart that are moved inwards at the ends of the axis."""
+        """Return whether numbers keep apart that are moved inwards at the ends of the axis."""
         share = LEAST_SPACE / room(texts)  # of the axis that a number takes
         positions = np.clip((values - low) / (high - low), share / 2 - over, 1 - share / 2 + over)
         return bool(np.all(np.diff(positions) >= share))

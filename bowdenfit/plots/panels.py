@@ -50,7 +50,7 @@ def span(values: Iterable[np.ndarray], room: float = 0.05) -> tuple[float, float
 
 
 def share_limits(spans: Sequence[tuple[float, float]]) -> bool:
-    """Whether ranges are so much alike that each can be read on an axis that shows them all."""
+    """Return whether ranges are so much alike that each can be read on an axis that shows them all."""
     low, high = min(s[0] for s in spans), max(s[1] for s in spans)
     return high - low <= ALIKE * min(s[1] - s[0] for s in spans)
 

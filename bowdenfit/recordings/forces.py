@@ -7,7 +7,7 @@ import numpy as np
 from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
-from bowdenfit.files.pieces import same
+from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import RATE, TORQUES, WANTED, converted, find_channel, stated_unit
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
@@ -21,7 +21,7 @@ _DATES = 1e8  # numbers from here on are dates, of which the unit is plain
 def to_recording(
     file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys, *, is_loop: bool
 ) -> tuple[RawRecording, str]:
-    """A recording from the channels of a file.
+    """Return a recording from the channels of a file.
 
     Args:
         file: What was read.
@@ -53,7 +53,7 @@ def to_recording(
     }
     clocks = {q: _clock(file, by_quantity[q], by_quantity.get("time"), sources.get("time")) for q in by_quantity if q != "time"}
     known = {len(clock): clock for clock in clocks.values()}
-    clocks = {q: known[len(clock)] if same(known[len(clock)], clock) else clock for q, clock in clocks.items()}
+    clocks = {q: known[len(clock)] if have_same_numbers(known[len(clock)], clock) else clock for q, clock in clocks.items()}
     for quantity, values in forces.items():
         _same_length(file, by_quantity[quantity], values, clocks[quantity])
     velocity, unit = _velocity(file, by_quantity.get("velocity"), sources.get("velocity"))
@@ -80,7 +80,7 @@ def _torques(
     pulleys: Pulleys,
     is_loop: bool,
 ) -> dict[str, Channel]:
-    """Channels of torque in the place of forces, by the force that each becomes."""
+    """Return channels of torque in the place of forces, by the force that each becomes."""
     torques = {}
     for quantity in TORQUES:
         force = quantity.name.replace("torque", "force")
@@ -102,7 +102,7 @@ def _torques(
 def _from_torque(
     file: ChannelFile, channel: Channel, force: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys
 ) -> np.ndarray:
-    """Forces [N] from the torques of a pulley and its radius."""
+    """Return forces [N] from the torques of a pulley and its radius."""
     end = force.removesuffix("_force")
     torques = converted(file, channel, f"{end}_torque", sources.get(f"{end}_torque"), "torque")
     return pulleys.forces(torques, end, file.path.name)
@@ -110,7 +110,7 @@ def _from_torque(
 
 def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
     """Refuse one channel, or a copy of it, in the place of both forces."""
-    if not same(one.values, other.values):
+    if not have_same_numbers(one.values, other.values):
         return
     what = "the same channel" if one is other else f"copies of each other, {shown(other.name)} having the same numbers"
     raise DatasetError(
@@ -128,7 +128,7 @@ def _missing(file: ChannelFile, quantity: str) -> DatasetError:
 
 
 def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: ColumnSource | None) -> np.ndarray:
-    """Time of each sample of a channel [s]."""
+    """Return the time of each sample of a channel [s]."""
     hertz = _rate(file, source)
     if hertz is not None:
         return np.arange(len(channel.values)) / hertz
@@ -144,7 +144,7 @@ def _clock(file: ChannelFile, channel: Channel, time: Channel | None, source: Co
 
 
 def _rate(file: ChannelFile, source: ColumnSource | None) -> float | None:
-    """The sampling rate that the user gives in the place of a clock [1/s]."""
+    """Return the sampling rate that the user gives in the place of a clock [1/s]."""
     rate = RATE.fullmatch(source.name.strip()) if source is not None else None
     if rate is None:
         return None

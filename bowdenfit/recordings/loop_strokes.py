@@ -31,12 +31,12 @@ _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction o
 _SIGNIFICANT = 4.5  # what a cost must grow by, in independent blocks, where something that is told is left out: 3 sd
 _CLEAR_OF_NOISE = 5.0  # standard deviations by which an output that moves must change
 _OPPOSITE = -0.5  # correlation of the two forces below which one of them has its sign turned round
-_LEAST = 1e-9
+_LEAST = 1e-9  # that keeps a division finite
 _LIMITS = np.array([[0.0, 0.0, -np.inf], [np.inf, 10.0, np.inf]])  # of loss, exponent and center
 
 
 def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Vector]:
-    """Output force while moving forward and while moving back [N]; see `bowdenfit.physics.loop.loop_band`.
+    """Return the output force while moving forward and while moving back [N]; see `bowdenfit.physics.loop.loop_band`.
 
     Args:
         force: Input force, of either sign [N].
@@ -48,7 +48,7 @@ def loop_limits(force: Vector, loss: float, exponent: float) -> tuple[Vector, Ve
 
 
 def fit_force_loop(force_in: Vector, force_out: Vector, taut: bool = True, slack: bool = True) -> Hysteresis:
-    """The loop's play operator that follows the output force best, with loss, friction exponent and center free.
+    """Return the loop's play operator that follows the output force best, with loss, friction exponent and center free.
 
     Args:
         force_in, force_out: Forces, of either sign [N].
@@ -91,12 +91,12 @@ class LoopStrokes:
 
     @staticmethod
     def contact(loop: Hysteresis, velocity: Vector) -> Labels:
-        """Contact of each block, as the operator has it."""
+        """Return the contact of each block, as the operator has it."""
         del velocity
         return loop.state
 
     def usable(self, blocks: Blocks) -> Flags:
-        """Blocks inside the range of the load cells."""
+        """Return blocks inside the range of the load cells."""
         return ~blocks.saturated
 
     def refuse(self, loop: Hysteresis, velocity: Vector, file: str, name: str, by_hand: Sequence[Phase]) -> None:
@@ -110,7 +110,7 @@ class LoopStrokes:
     def estimate(
         self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str
     ) -> tuple[float, float, float, tuple[str, ...]]:
-        """Exponent, center, the force lost while both sides are taut, and remarks.
+        """Return exponent, center, the force lost while both sides are taut, and remarks.
 
         Exponent and loss are NaN where the recording by itself does not tell them: without load beyond the taut branch only
         the loss is told, and the exponent is that of the stated preload.
@@ -124,7 +124,7 @@ class LoopStrokes:
 
 
 def _starts(x: Vector, y: Vector, scale: float) -> list[np.ndarray]:
-    """Where the fit may begin: loss over scale, exponent, center over scale."""
+    """Return where the fit may begin: loss over scale, exponent, center over scale."""
     share = min(scale / max(float(np.abs(x).max()), scale), _LARGEST_SHARE)
     largest = -np.log1p(-share)
     low, high = np.quantile(x - y, (0.05, 0.95))
@@ -148,7 +148,7 @@ def _deviation(
 
 
 def _residuals(x: Vector, moved: Vector, y: Vector, scale: float, noise: float, p: np.ndarray) -> Deviations:
-    """Deviations in units of their noise and what is known beforehand of the center, with slopes by all parameters.
+    """Return deviations in units of their noise and what is known beforehand of the center, with slopes by all parameters.
 
     Args:
         x, moved, y: Input force as read and as it likely was, and output force [N].
@@ -170,13 +170,13 @@ def _residuals(x: Vector, moved: Vector, y: Vector, scale: float, noise: float, 
 
 
 def _noise(force_in: Vector, force_out: Vector) -> float:
-    """Standard deviation of a block's deviation while the loop moves [N]."""
+    """Return the standard deviation of a block's deviation while the loop moves [N]."""
     level = float(np.quantile(np.abs(force_in), 0.9))
     return float(np.hypot(max(white_noise(force_in), 1e-6 * level), max(white_noise(force_out), 1e-6 * level))) or 1e-12
 
 
 def _identified(fit: Hysteresis, correlation: float) -> tuple[float, float]:
-    """Loss and exponent, each NaN where the recording is followed as well without it."""
+    """Return the loss and exponent, each NaN where the recording is followed as well without it."""
     enough = _SIGNIFICANT * correlation / len(fit.force_in)
     loss_identified = fit_force_loop(fit.force_in, fit.force_out, taut=False).cost - fit.cost > enough
     exponent_identified = fit_force_loop(fit.force_in, fit.force_out, slack=False).cost - fit.cost > enough

@@ -13,7 +13,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.headings import Quantity, find_candidates, meanings, parse_sources
-from bowdenfit.files.pieces import sample
+from bowdenfit.files.pieces import subsample
 from bowdenfit.units import ChannelSource, ColumnSource, contradiction, conversion_factor
 from bowdenfit.words import quoted, shown
 
@@ -30,7 +30,7 @@ _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
 
 
 def rows_where(file: ChannelFile, where: Mapping[str, float]) -> ChannelFile:
-    """The part of a file in which channels have the given values, as where recordings stand one below the other.
+    """Return the part of a file in which channels have the given values, as where recordings stand one below the other.
 
     Args:
         file: What was read.
@@ -51,7 +51,7 @@ def rows_where(file: ChannelFile, where: Mapping[str, float]) -> ChannelFile:
 
 
 def _rows(channel: Channel, chosen: np.ndarray) -> Channel:
-    """The chosen rows of a channel; one of another length is left as it is."""
+    """Return the chosen rows of a channel; one of another length is left as it is."""
     if len(channel.values) != len(chosen):
         return channel
     time = None if channel.time is None else channel.time[chosen]
@@ -59,7 +59,7 @@ def _rows(channel: Channel, chosen: np.ndarray) -> Channel:
 
 
 def find_channel(file: ChannelFile, quantity: Quantity, sources: Mapping[str, ColumnSource]) -> Channel | None:
-    """The channel of a quantity: the one the user names, or the only one whose name says so."""
+    """Return the channel of a quantity: the one the user names, or the only one whose name says so."""
     source = sources.get(quantity.name)
     if source is not None:
         if quantity.name == "time" and RATE.fullmatch(source.name.strip()):
@@ -81,7 +81,7 @@ def find_channel(file: ChannelFile, quantity: Quantity, sources: Mapping[str, Co
 
 
 def _says(channel: Channel, quantity: Quantity) -> bool:
-    """Whether the name of a channel, or the last part of its path, is that of the quantity."""
+    """Return whether the name of a channel, or the last part of its path, is that of the quantity."""
     names = (channel.name, _PATH.split(channel.name)[-1])
     return any(meanings(name, (quantity,)) for name in names if name)
 
@@ -105,7 +105,7 @@ def _named(file: ChannelFile, quantity: str, name: str) -> Channel:
 
 
 def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None) -> tuple[float, str]:
-    """Sign and unit of a channel, as the user says, else the file, else the channel's name."""
+    """Return the sign and unit of a channel, as the user says, else the file, else the channel's name."""
     named = [
         unit for q in (*WANTED, *TORQUES) if q.name == quantity for _, unit in meanings(channel.name, (q,)) if unit
     ]
@@ -129,7 +129,7 @@ def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: Colu
 def converted(
     file: ChannelFile, channel: Channel, quantity: str, source: ColumnSource | None, dimension: str
 ) -> np.ndarray:
-    """Values of a channel in the internal unit."""
+    """Return values of a channel in the internal unit."""
     sign, unit = stated_unit(file, channel, quantity, source)
     try:
         return _times(_of_counts(channel, source), sign * conversion_factor(unit, dimension))
@@ -138,12 +138,12 @@ def converted(
 
 
 def _times(values: np.ndarray, factor: float) -> np.ndarray:
-    """Values in another unit; the same array in the same."""
+    """Return values in another unit; the same array in the same."""
     return values if factor == 1 else values * factor
 
 
 def _of_counts(channel: Channel, source: ColumnSource | None) -> np.ndarray:
-    """What a channel says, by the gain and the offset that the user gives it."""
+    """Return what a channel says, by the gain and the offset that the user gives it."""
     if not isinstance(source, ChannelSource):
         return channel.values
     return source.gain * (channel.values - source.offset)
@@ -152,7 +152,7 @@ def _of_counts(channel: Channel, source: ColumnSource | None) -> np.ndarray:
 def steady_value(
     file: ChannelFile, quantity: Quantity, source: ColumnSource | None, convert: Callable[[str], float]
 ) -> tuple[float, float, float] | None:
-    """The middle value of a channel, and the range of nearly all of its values; None where the file has no such channel.
+    """Return the middle value of a channel, and the range of nearly all of its values; None where the file has no such channel.
 
     Args:
         file: What was read.
@@ -177,7 +177,7 @@ def steady_value(
         values = _of_counts(channel, source) * convert(unit)
     except DatasetError as error:
         raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {error}.") from None
-    some = sample(values)
+    some = subsample(values)
     finite = some[np.isfinite(some)]
     if not len(finite):
         raise DatasetError(f"{file.path.name}: the channel {shown(channel.name)} has no number in it; name another.")
@@ -186,7 +186,7 @@ def steady_value(
 
 
 def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
-    """Channels named on the command line, such as "input_force=ai0:lbf" or "time=1000Hz".
+    """Return channels named on the command line, such as "input_force=ai0:lbf" or "time=1000Hz".
 
     Raises:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
@@ -195,7 +195,7 @@ def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
 
 
 def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
-    """Names and units of the quantities in a pattern such as "{at}mm_{velocity:r/min}rpm".
+    """Return names and units of the quantities in a pattern such as "{at}mm_{velocity:r/min}rpm".
 
     Raises:
         DatasetError: A name stands there twice.
@@ -212,7 +212,7 @@ def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:
 
 
 def match_name(pattern: str, path: Path) -> dict[str, tuple[str, str]]:
-    """What a file's name says by a pattern such as "{at}mm_{velocity:r/min}rpm": text and unit by quantity.
+    """Return what a file's name says by a pattern such as "{at}mm_{velocity:r/min}rpm": text and unit by quantity.
 
     Raises:
         DatasetError: The name does not follow the pattern.

@@ -26,7 +26,7 @@ from bowdenfit.words import percent
 
 _FIT_BLOCKS = 1000  # more than these say no more about the loop
 _GAIN_SD = 0.02  # how far two load cells may disagree before the loop is believed to be off center
-_LEAST_EXPONENT = 1e-3
+_LEAST_EXPONENT = 1e-3  # judged: least friction exponent that a fit starts from
 _LIMITS = np.array([[1e-9, -np.inf, 0.0], [np.inf] * 3])  # of exponent, center and drag
 _CLEAR_OF_NOISE = 5.0  # a force below this many standard deviations of its noise may be that of a slack rope
 _CLEARLY = 0.5  # a fit the other way round must leave less than this fraction of the deviations to be believed
@@ -41,7 +41,7 @@ _CHANGES = 3.0  # spread of the input, in units of its noise, from which the out
 
 
 def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
-    """The play operator that follows the output force best, with friction exponent, center and drag free.
+    """Return the play operator that follows the output force best, with friction exponent, center and drag free.
 
     Args:
         force_in: Input force, all above 0 [N].
@@ -79,7 +79,7 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
 
 
 def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
-    """Half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
+    """Return half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
     pull, back = ratio[state == PULL], ratio[state == RETURN]
     if not len(pull) or not len(back):
         one = pull if len(pull) else -back
@@ -104,7 +104,7 @@ def _follow(
 def _residuals(
     force_in: Vector, likely: Vector, force_out: Vector, noise: tuple[float, float], level: float, p: np.ndarray
 ) -> Deviations:
-    """Deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
+    """Return deviations in units of their noise and what is known beforehand of center and drag, with slopes by all parameters.
 
     Args:
         force_in, likely, force_out: Forces [N].
@@ -127,7 +127,7 @@ def _residuals(
 
 
 def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
-    """Contact of each block, where the recording has no reversal also by other signs that the rope slides.
+    """Return the contact of each block, where the recording has no reversal also by other signs that the rope slides.
 
     Friction lets the output rise while the input does only if the rope slides; and where the motor moves, the rope slides
     whatever the forces do, even if they stay the same.
@@ -150,7 +150,7 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
 
 
 def _rises(force: Vector) -> Flags:
-    """Where a force is clearly higher after a block than before it."""
+    """Return where a force is clearly higher after a block than before it."""
     n, window = len(force), max(_WINDOW, len(force) // _SHARE)
     if n <= 2 * window:
         return np.zeros(n, dtype=bool)
@@ -183,7 +183,7 @@ class RopeStrokes:
     )
 
     def usable(self, blocks: Blocks) -> Flags:
-        """Where both forces stand clear of their noise, so that their logarithms say something; not chosen by that noise."""
+        """Return where both forces are clear of their noise, so that their logarithms say something; not chosen by noise."""
         forces = (blocks.input_force, blocks.output_force)
         return ~blocks.saturated & np.all(
             [smooth_input(force) > _CLEAR_OF_NOISE * white_noise(force) for force in forces], axis=0
@@ -245,7 +245,7 @@ class RopeStrokes:
     def estimate(
         self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str
     ) -> tuple[float, float, float, tuple[str, ...]]:
-        """Exponent and center by the medians of the two branches, drag, and remarks."""
+        """Return the exponent and center by the medians of the two branches, drag, and remarks."""
         del correlation
         ratio = np.log(loop.force_in / loop.force_out)
         return *_plain_loop(ratio, state), loop.lost, _remarks(name, strokes, loop)

@@ -15,7 +15,7 @@ from bowdenfit.recordings.recording import PULL, RETURN, SWITCH, Blocks, Strokes
 from bowdenfit.recordings.rope_strokes import RopeStrokes, refuse_dead
 from bowdenfit.types import Flags, Labels, Vector
 
-_FEWEST = 10  # blocks
+_FEWEST = 10  # judged: blocks in which strokes can be found
 _STILL = 0.05  # fraction of the typical speed below which the rope is taken to stand still
 _STEADY = 0.2  # relative change of speed from one block to the next up to which a block is of one speed
 _SIGNS: dict[str, int] = {"pull": PULL, "return": RETURN, "hold": SWITCH, "ignore": SWITCH}
@@ -25,7 +25,7 @@ _ROPE = RopeStrokes()
 def find_strokes(
     blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase] = (), cable: RopeStrokes | LoopStrokes = _ROPE
 ) -> Strokes:
-    """The phases of a recording, from the contact state of the play operator and, where recorded, the velocity.
+    """Return the phases of a recording, from the contact state of the play operator and, where recorded, the velocity.
 
     Args:
         blocks: The prepared recording.
@@ -68,7 +68,7 @@ def find_strokes(
 
 
 def cable_of(description: Description) -> RopeStrokes | LoopStrokes:
-    """What the strokes of a cable are found by; of a loop with the preload that is stated for all wrap angles."""
+    """Return what the strokes of a cable are found by; of a loop with the preload that is stated for all wrap angles."""
     if description.cable.kind != "loop":
         return RopeStrokes(description.sensors.gain_sd or 0.0, description.fits_offsets)
     stated = description.preload.value
@@ -82,7 +82,7 @@ def _toward_motor(velocity: Vector, state: Labels) -> Vector:
 
 
 def _moving_steadily(velocity: Vector, state: Labels) -> Flags:
-    """Where the rope moves the way its contact says, and steadily; everywhere without a velocity.
+    """Return where the rope moves the way its contact says, and steadily; everywhere without a velocity.
 
     While the motor speeds up or slows down, a block is of several speeds, and at the slow end of a stroke the rope may stand
     already.
@@ -97,7 +97,7 @@ def _moving_steadily(velocity: Vector, state: Labels) -> Flags:
 
 
 def _inside_sliding(state: Labels) -> Flags:
-    """Blocks whose neighbors on both sides are in the same contact: where one phase meets the next, a block is both."""
+    """Return blocks whose neighbors on both sides are in the same contact: where one phase meets the next, a block is both."""
     same = np.diff(state) == 0
     return (state != SWITCH) & np.append(True, same) & np.append(same, True)
 
@@ -124,7 +124,7 @@ def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase]
 
 
 def correlation_time(deviation: Vector) -> float:
-    """Integrated autocorrelation time of a series in steps, at least 1: how many of its values say as much as one.
+    """Return the integrated autocorrelation time of a series in steps, at least 1: how many of its values say as much as one.
 
     The sum of autocorrelations in pairs, until a pair is no longer positive.
 

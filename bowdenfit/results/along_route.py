@@ -119,7 +119,7 @@ class RouteDraws(Display):
     mounted: np.ndarray
 
     def sentences(self) -> list[str]:
-        """Number of draws and grid points."""
+        """Return the number of draws and grid points."""
         return [f"{', '.join(self.curves)} of {len(self.choices)} draws at {len(self.grid)} values of the route."]
 
     def _table(self) -> Rows:

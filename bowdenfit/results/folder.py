@@ -83,12 +83,12 @@ def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
 
 
 def is_empty(folder: Path) -> bool:
-    """Whether nothing lies in a folder, or nothing but what is left of writing that was ended."""
+    """Return whether nothing lies in a folder, or nothing but what is left of writing that was ended."""
     return all(_is_partial(path) for path in _contents(folder))
 
 
 def holds_only_run_files(folder: Path, names: Collection[str]) -> bool:
-    """Whether nothing lies in a folder but what a run of some kind writes, whole or not, and notes (*.md).
+    """Return whether nothing lies in a folder but what a run of some kind writes, whole or not, and notes (*.md).
 
     Args:
         folder: The folder, which may be missing.

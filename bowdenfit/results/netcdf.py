@@ -118,7 +118,7 @@ def _members(group: h5py.Group) -> list[str]:
 
 
 def _is_label(member: h5py.Dataset) -> bool:
-    """Whether a dataset labels a dimension of others."""
+    """Return whether a dataset labels a dimension of others."""
     return bool(h5py.h5ds.is_scale(member.id))
 
 

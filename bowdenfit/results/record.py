@@ -83,7 +83,7 @@ class Draws(Display):
         return self.z.reshape(-1, self.z.shape[-1])
 
     def sentences(self) -> list[str]:
-        """Number of draws, and their effective sample size."""
+        """Return the number of draws, and their effective sample size."""
         worst = max((d.r_hat for d in self.diagnostics.values()), default=float("nan"))
         return [
             f"{self.z[..., 0].size} draws of {few(self.values, 4)} by {self.sampler}; smallest effective sample size "
@@ -112,7 +112,7 @@ class Provenance(Display):
     created: str = ""
 
     def sentences(self) -> list[str]:
-        """The seed, and what computed."""
+        """Return the seed, and what computed."""
         return [f"Seed {self.seed}; {', '.join(f'{name} {version}' for name, version in self.versions.items())}."]
 
     def _table(self) -> Rows:

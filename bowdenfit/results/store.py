@@ -206,7 +206,7 @@ def _as_walkers(groups: Groups) -> Groups:
 
 
 def _variable_attributes(fit: Record) -> dict[str, dict[str, str]]:
-    """Unit, symbol and meaning of every variable in the posterior."""
+    """Return unit, symbol and meaning of every variable in the posterior."""
     route = fit.dataset.description.route
     labels = {p.name: {"units": p.unit, "symbol": p.symbol, "long_name": p.meaning} for p in fit.model.space.free}
     labels |= {name: {"units": unit, "symbol": symbol} for name, (unit, symbol) in derived_units(fit.model).items()}

@@ -15,7 +15,7 @@ from three_columns import INPUT, OUTPUT, TIME, check
 from bowdenfit.errors import DatasetError
 from bowdenfit.files import channels, csv_recording, excel, parquet, read_channels
 from bowdenfit.files.channels import Channel
-from bowdenfit.files.clocks import with_clocks
+from bowdenfit.files.clocks import assign_clocks
 
 OF_LABORATORIES = sorted(p for p in (Path(__file__).parent / "corpus").iterdir() if p.suffix in {".csv", ".tsv", ".txt"})
 
@@ -352,10 +352,10 @@ def test_each_channel_takes_the_nearest_clock_to_its_left_of_its_length():
         channel("c", 3),
         channel("d", 5),
     ]
-    timed = with_clocks(given_)
+    timed = assign_clocks(given_)
     assert [c.clock for c in timed] == ["", "time", "", "t", "time", ""]
     np.testing.assert_array_equal(timed[1].time, [0, 0.001, 0.002])
-    assert with_clocks(timed) == timed
+    assert assign_clocks(timed) == timed
 
 
 @pytest.mark.parametrize(
@@ -364,7 +364,7 @@ def test_each_channel_takes_the_nearest_clock_to_its_left_of_its_length():
      ("temperature", "", False), ("T", "", True), ("trial", "", False), ("time", "samples", False)],
 )  # fmt: skip
 def test_clocks_are_known_by_name_or_unit(name, unit, is_clock):
-    timed = with_clocks([Channel(name, unit, np.arange(3.0)), Channel("force", "N", np.ones(3))])
+    timed = assign_clocks([Channel(name, unit, np.arange(3.0)), Channel("force", "N", np.ones(3))])
     assert (timed[1].time is not None) == is_clock
 
 

@@ -7,7 +7,7 @@ from pydantic import model_validator
 from typing_extensions import override
 
 from bowdenfit.description import Description, Finite, Table
-from bowdenfit.description.cable_parts import PRELOAD
+from bowdenfit.description.stated_parameters import PRELOAD
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns

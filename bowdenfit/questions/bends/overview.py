@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from bowdenfit.description.cable_parts import PRELOAD
+from bowdenfit.description.stated_parameters import PRELOAD
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, has_elastic_answers

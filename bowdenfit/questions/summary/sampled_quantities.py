@@ -39,7 +39,7 @@ class SampledQuantity:
 
 def sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
     """The sampled parameters, of the given roles in the given order, or all; none without draws."""
-    from bowdenfit.description.cable_parts import RUN_SCATTER
+    from bowdenfit.description.stated_parameters import RUN_SCATTER
 
     if fit.sampled is None:
         return []

@@ -36,7 +36,7 @@ from bowdenfit.recordings.preparation.noise import estimate_tare, noise_about_tr
 from bowdenfit.recordings.recording import Account, Blocks, FlaggedSamples, RawRecording
 from bowdenfit.types import Vector
 
-_SHOWN_FLAGS = 300
+_SHOWN_FLAGS = 300  # flagged samples of a kind that a figure shows
 _USUAL_BLOCK = 0.05
 NO_DELAY_OF_LOOPS = (
     "How much later the output channel is than the input channel is not estimated for a loop, whose forces pass through zero. "
@@ -94,7 +94,7 @@ class Inspected:
 
 
 def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
-    """The steps before averaging, so that several recordings can be given one delay; see `prepare`."""
+    """Return the steps before averaging, so that several recordings can be given one delay; see `prepare`."""
     remarks = check_recording(raw)
     cleaned = _clean(raw, settings)
     together = _together(raw, cleaned, settings, 0.0)
@@ -102,7 +102,7 @@ def inspect_recording(raw: RawRecording, settings: Preparation) -> Inspected:
 
 
 def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | None = None) -> tuple[Blocks, Account]:
-    """The steps after the delay is known; see `prepare`.
+    """Return the steps after the delay is known; see `prepare`.
 
     Args:
         inspected: The recording.
@@ -167,7 +167,7 @@ def _tare(file: str, name: str, channel: Sampled, settings: Preparation) -> tupl
 
 
 def _together(raw: RawRecording, cleaned: _Cleaned, settings: Preparation, delay: float) -> CommonClock:
-    """Both channels on the clock of the one with more samples, the output shifted back by the delay."""
+    """Return both channels on the clock of the one with more samples, the output shifted back by the delay."""
     if len(cleaned.input.time) >= len(cleaned.output.time):
         time = cleaned.input.time
         (input_force, input_fault), (output_force, output_fault) = (
@@ -192,9 +192,9 @@ def _velocity(raw: RawRecording, time: Vector) -> Vector:
     if there.sum() < 2:
         return np.broadcast_to(np.nan, len(time))
     clock = spread_repeated(raw.velocity_time)
-    if there.all() and pieces.same(clock, time):
+    if there.all() and pieces.have_same_numbers(clock, time):
         return raw.velocity
-    return pieces.interpolated(time, clock, raw.velocity, there, outside=np.nan)
+    return pieces.interpolate(time, clock, raw.velocity, there, outside=np.nan)
 
 
 def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
@@ -209,7 +209,7 @@ def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
 
 
 def _stated_block(settings: Preparation) -> float:
-    """Length of a block [s], 0 for none."""
+    """Return the length of a block [s], 0 for none."""
     return settings.block.to("time") if isinstance(settings.block, QuantityValue) else 0.0
 
 
@@ -223,7 +223,7 @@ def _require_some_good(raw: RawRecording, common: CommonClock) -> None:
 
 
 def _noise(channel: Sampled, bandwidth: float) -> float:
-    """Standard deviation of a single sample, from the channel on its own clock [N]."""
+    """Return the standard deviation of a single sample, from the channel on its own clock [N]."""
     stretch = max(4, round(1 / (2 * bandwidth * step_of(channel.time))))
     return noise_about_trend(pieces.Filled(channel.force, channel.fault == GOOD), stretch)
 
@@ -231,7 +231,7 @@ def _noise(channel: Sampled, bandwidth: float) -> float:
 def _samples_of_block(
     inspected: Inspected, common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float]
 ) -> int:
-    """Samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
+    """Return samples of a block of the common clock, 0 for no blocks; a slower channel counts with fewer samples."""
     raw, cleaned, settings = inspected.raw, inspected.cleaned, inspected.settings
     if settings.block == "auto":
         thinned = [step_of(channel.time) / common.step for channel in (cleaned.input, cleaned.output)]
@@ -243,7 +243,7 @@ def _samples_of_block(
 
 
 def _flagged(common: CommonClock) -> FlaggedSamples:
-    """The samples left out, evenly thinned to a few hundred of each kind, in order of time."""
+    """Return the samples left out, evenly thinned to a few hundred of each kind, in order of time."""
     chosen = []
     for kind in range(GOOD + 1, NO_OVERLAP):
         where = np.flatnonzero(common.fault == kind)

@@ -16,18 +16,18 @@ from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, KINDS, SATURAT
 from bowdenfit.recordings.recording import Blocks
 from bowdenfit.types import ChosenVector, Flags, Labels, OtherVector, Positions, Vector
 
-MOST_BLOCKS = 4000
-FEWEST_BLOCKS = 200
-_NOISE_IN_BAND = 0.1
-_BLOCKS_OF_PERIOD, _LEAST_OF_PERIOD = 16, 11
-_LONGEST_SEGMENT = 8192
+MOST_BLOCKS = 4000  # judged: the play operator is a loop over them in every step of a sampler
+FEWEST_BLOCKS = 200  # judged: that are left, where the recording has as many samples
+_NOISE_IN_BAND = 0.1  # judged: noise of a mean over half the friction band
+_BLOCKS_OF_PERIOD, _LEAST_OF_PERIOD = 16, 11  # judged: blocks that show a stroke each way, usually and at the least
+_LONGEST_SEGMENT = 8192  # judged: samples of a periodogram
 _MOST_OF_MOTION = 1 << 17  # samples that the main motion is looked for in: else segments would be shorter than its period
 _PERIODS = 4  # of the main motion in a segment, at the most: more of them show equal cycles as lines with nothing in between
-_SHORTEST_SEGMENT = 64
+_SHORTEST_SEGMENT = 64  # judged: samples, enough for some half octaves
 _CLEAR = 10  # times the floor: the highest of some thousand frequencies of noise is three times as high
-_BINS_PER_OCTAVE = 2
-_NOISE_TO_SIGNAL = 1.0
-_COHERENT = 1 / (1 + _NOISE_TO_SIGNAL) ** 2
+_BINS_PER_OCTAVE = 2  # judged
+_NOISE_TO_SIGNAL = 1.0  # at the bandwidth, by definition
+_COHERENT = 1 / (1 + _NOISE_TO_SIGNAL) ** 2  # squared coherence of two channels that both have this much noise
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class CommonClock:
     fault: Labels
 
     def part(self, some: slice) -> "CommonClock":
-        """A piece of it, in double precision."""
+        """Return a piece of it, in double precision."""
         input_, output, velocity = (
-            pieces.numbers(column, some) for column in (self.input_force, self.output_force, self.velocity)
+            pieces.to_floats(column, some) for column in (self.input_force, self.output_force, self.velocity)
         )
         return CommonClock(self.time[some], self.step, input_, output, velocity, self.fault[some])
 
@@ -61,7 +61,7 @@ class CommonClock:
 def choose_block_samples(
     common: CommonClock, bandwidth: float, main: float, noise: tuple[float, float], loop: bool = False
 ) -> int:
-    """Samples of a block, chosen from the data.
+    """Return samples of a block, chosen from the data.
 
     Half a period of the bandwidth; longer where the noise of a mean would be more than a tenth of the friction band; never so
     long that a period of the main motion has fewer than 16 or that fewer than 200 are left, and at least so long that there
@@ -110,9 +110,9 @@ def _span(common: CommonClock) -> float:
 
 
 def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -> int:
-    """Samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
+    """Return samples over which the noise of how far the forces are apart comes down to a tenth of half the friction band."""
     evenly = slice(None, None, -(-len(common.time) // pieces.PLENTY))
-    input_, output = (pieces.numbers(force, evenly) for force in (common.input_force, common.output_force))
+    input_, output = (pieces.to_floats(force, evenly) for force in (common.input_force, common.output_force))
     good = (common.fault[evenly] == GOOD) & (loop | ((input_ > 0) & (output > 0)))
     if not good.any():
         return 1
@@ -125,7 +125,7 @@ def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -
 
 
 def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
-    """Means of the good samples over equal stretches of time, and where every sample went.
+    """Return means of the good samples over equal stretches of time, and where every sample went.
 
     A block of whose readings more than half are at the end of a load cell's range is marked, and holds the means of those;
     its other samples count as saturated too, since they are the lower half of the noise.
@@ -154,7 +154,7 @@ def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str,
 
 
 def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Positions, int]:
-    """The block of each sample from one on, as far as whole blocks go in a piece, and where they end."""
+    """Return the block of each sample from one on, as far as whole blocks go in a piece, and where they end."""
     length = pieces.PIECE
     while True:
         stop = min(start + length, len(common.time))
@@ -169,7 +169,7 @@ def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Positi
 
 
 def _saturated_blocks(fault: Labels, place: Labels) -> Flags:
-    """Which samples are in blocks more than half of whose readings are at the end of the range."""
+    """Return which samples are in blocks more than half of whose readings are at the end of the range."""
     block = place - place[0]
     readings = np.bincount(block, weights=fault < DROPOUT)
     return (2 * np.bincount(block, weights=fault == SATURATED, minlength=len(readings)) > readings)[block]
@@ -185,7 +185,7 @@ def _swept(fault: Labels, place: Labels) -> Labels:
 def _means(
     common: CommonClock, place: Labels, chosen: Flags
 ) -> tuple[Positions, ChosenVector, ChosenVector, ChosenVector, Positions]:
-    """Number of each block with chosen samples, the means of the two forces and the velocity, and the counts."""
+    """Return the number of each block with chosen samples, the means of the two forces and the velocity, and the counts."""
     where = np.flatnonzero(chosen)
     starts = np.flatnonzero(np.append(True, np.diff(place[where]) > 0)) if len(where) else np.zeros(0, dtype=int)
     count = np.diff(np.append(starts, len(where)))
@@ -195,7 +195,7 @@ def _means(
 
 
 def estimate_bandwidth(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:
-    """Frequency up to which the forces move together [Hz].
+    """Return the frequency up to which the forces move together [Hz].
 
     The lower of two estimates, each a signal-to-noise ratio of 1. The first is where the spectra have come down to twice
     the floor of their top octave, for the channel that reaches it later; a hum common to both does not deceive it. The
@@ -231,15 +231,15 @@ def estimate_bandwidth(input_force: Series, output_force: Series, rate: float, m
 
 
 def main_frequency(input_force: Series, output_force: Series, rate: float) -> float:
-    """Frequency at which the forces move most [Hz]; 0 where they hardly move more than their noise does.
+    """Return the frequency at which the forces move most [Hz]; 0 where they hardly move more than their noise does.
 
     Power counts by the root of its frequency: a drift three times as large as cycles a hundred times as fast is not taken for
     the motion, and neither is a hum of 50 Hz a fifth as large as cycles of 10 s.
 
     Args:
-        input_force: See `bandwidth_of`.
-        output_force: See `bandwidth_of`.
-        rate: See `bandwidth_of`.
+        input_force: See `estimate_bandwidth`.
+        output_force: Likewise.
+        rate: Likewise.
     """
     joined = -(-len(input_force) // _MOST_OF_MOTION)
     slow_in, slow_out = (_joined(force, joined) for force in (input_force, output_force))
@@ -252,7 +252,7 @@ def main_frequency(input_force: Series, output_force: Series, rate: float) -> fl
 
 
 def _joined(values: Series, samples: int) -> OtherVector:
-    """Means of so many samples each, as a channel would have that is so much slower."""
+    """Return means of so many samples each, as a channel would have that is so much slower."""
     if samples == 1:
         return values[: len(values)]
     whole, at_once = len(values) // samples, max(pieces.PIECE // samples, 1)
@@ -266,7 +266,7 @@ def _segment(samples: int) -> int:
 
 
 def _spectra(input_force: Series, output_force: Series, segment: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Welch's mean periodograms of the input, of the output, and across, from half-overlapping Hann segments."""
+    """Return Welch's mean periodograms of the input, of the output, and across, from half-overlapping Hann segments."""
     bins, count = segment // 2 + 1, 0
     sums = np.zeros(bins), np.zeros(bins), np.zeros(bins, dtype=complex)
     for x, y in zip(*(_transforms(force, segment) for force in (input_force, output_force)), strict=True):
@@ -277,9 +277,9 @@ def _spectra(input_force: Series, output_force: Series, segment: int) -> tuple[n
 
 
 def _transforms(values: Series, segment: int) -> Iterator[np.ndarray]:
-    """Spectra of all segments, so many at once as fill a piece."""
+    """Yield spectra of all segments, so many at once as fill a piece."""
     samples, hop = len(values), segment // 2
-    mean = sum(float(np.sum(values[part], dtype=float)) for part in pieces.parts(samples)) / samples
+    mean = sum(float(np.sum(values[part], dtype=float)) for part in pieces.split_pieces(samples)) / samples
     window = np.hanning(segment + 1)[:-1]
     at_once, all_of_them = max((pieces.PIECE - segment) // hop + 1, 1), (samples - segment) // hop + 1
     for first in range(0, all_of_them, at_once):
@@ -292,7 +292,7 @@ def _transforms(values: Series, segment: int) -> Iterator[np.ndarray]:
 def _first_below(
     power: np.ndarray, starts: np.ndarray, top: np.ndarray, lower: np.ndarray, rate: float, main: float
 ) -> float:
-    """Lower edge of the first half octave above the main motion whose median power is down to twice the top octave's [Hz]."""
+    """Return the lower edge [Hz] of the first half octave above the main motion with median power of twice the top's."""
     medians = np.array([np.median(part) for part in np.split(power, starts[1:])])
     quiet = medians < (1 + 1 / _NOISE_TO_SIGNAL) * float(np.median(power[top]))
     quiet &= lower > main

@@ -3,15 +3,15 @@
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.pieces import numbers, parts, sample
+from bowdenfit.files.pieces import split_pieces, subsample, to_floats
 from bowdenfit.recordings.recording import RawRecording
 from bowdenfit.types import OtherVector, Vector
 
-_MISSING_CODE = 10.0  # times all other forces: -9999 and the like; no load cell overshoots so far twice to the same digit
-FEWEST_SAMPLES = 20
-LARGEST_FORCE = 1e6
+_MISSING_CODE = 10.0  # judged, times all other forces: -9999 and the like; no load cell overshoots so twice to the same digit
+FEWEST_SAMPLES = 20  # judged: fewer are a table
+LARGEST_FORCE = 1e6  # N, far beyond any Bowden cable
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what is still a recording
-_MOST_REPEATED = 0.5
+_MOST_REPEATED = 0.5  # judged: share of times that stand there twice, from which the clock is not one of samples
 
 
 def check_recording(raw: RawRecording) -> tuple[str, ...]:
@@ -57,8 +57,8 @@ def check_sign(file: str, name: str, force: Vector) -> None:
     low, high = _range(force)
     _refuse_missing_code(file, name, force, low, high)
     largest, loaded, below = max(abs(low), abs(high)), 0, 0
-    for part in parts(len(force)):
-        some = numbers(force, part)
+    for part in split_pieces(len(force)):
+        some = to_floats(force, part)
         under_load = some[np.isfinite(some) & (np.abs(some) > 0.2 * largest)]
         loaded, below = loaded + len(under_load), below + int(np.count_nonzero(under_load < 0))
     negative = below / max(loaded, 1)
@@ -78,8 +78,8 @@ def _refuse_missing_code(file: str, name: str, force: Vector, low: float, high: 
     """
     extreme = low if abs(low) > abs(high) else high
     count, others = 0, 0.0
-    for part in parts(len(force)):
-        some = numbers(force, part)
+    for part in split_pieces(len(force)):
+        some = to_floats(force, part)
         is_extreme = some == extreme
         count += int(np.count_nonzero(is_extreme))
         left = np.abs(some[np.isfinite(some) & ~is_extreme])
@@ -108,14 +108,14 @@ def _check_lengths(file: str, name: str, time: OtherVector, values: Vector) -> N
 
 def _check_clock(file: str, name: str, time: Vector) -> None:
     missing = next(
-        (p.start + int(np.argmin(ok)) for p in parts(len(time)) if not (ok := np.isfinite(time[p])).all()), None
+        (p.start + int(np.argmin(ok)) for p in split_pieces(len(time)) if not (ok := np.isfinite(time[p])).all()), None
     )
     if missing is not None:
         raise DatasetError(
             f"{file}: the time of {name} is missing at sample {missing + 1}; every sample needs a time. "
             "Delete that row, or export the recording again."
         )
-    steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in parts(len(time)))
+    steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in split_pieces(len(time)))
     at = next((start + int(np.argmax(back)) for start, back in steps if back.any()), None)
     if at is not None:
         raise DatasetError(
@@ -143,7 +143,7 @@ def _check_forces(file: str, name: str, force: Vector) -> None:
             f"{file}: {name} reads {low:.6g} N in every sample; the usual cause is a load cell that was dead or "
             "unplugged, or another channel than meant. Map the right channel, or leave the recording out."
         )
-    some = sample(force)
+    some = subsample(force)
     typical = float(np.median(np.abs(some[np.isfinite(some)]))) if np.isfinite(some).any() else max(-low, high)
     if typical > LARGEST_FORCE:
         raise DatasetError(
@@ -174,12 +174,12 @@ def _repeated(name: str, time: Vector) -> str:
 
 
 def _share_repeated(time: Vector) -> float:
-    repeated = sum(int(np.count_nonzero(np.diff(time[p.start : p.stop + 1]) == 0)) for p in parts(len(time)))
+    repeated = sum(int(np.count_nonzero(np.diff(time[p.start : p.stop + 1]) == 0)) for p in split_pieces(len(time)))
     return repeated / (len(time) - 1) if len(time) > 1 else 0.0
 
 
 def _range(force: Vector) -> tuple[float, float]:
-    """The lowest and the highest reading [N]."""
-    pieces = (numbers(force, part) for part in parts(len(force)))
+    """Return the lowest and the highest reading [N]."""
+    pieces = (to_floats(force, part) for part in split_pieces(len(force)))
     ends = [(float(np.min(some)), float(np.max(some))) for piece in pieces if len(some := piece[np.isfinite(piece)])]
     return min(low for low, _ in ends), max(high for _, high in ends)

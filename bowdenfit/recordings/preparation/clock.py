@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.files.pieces import parts, rises, same, sample
+from bowdenfit.files.pieces import have_same_numbers, never_falls, split_pieces, subsample
 from bowdenfit.types import Flags, Labels, OtherLabels, OtherVector, Vector
 
-GAP_STEPS = 5
+GAP_STEPS = 5  # judged: usual steps, from which on a step is a gap
 GOOD, SPIKE, SATURATED, DROPOUT, QUIET, NO_OVERLAP = range(6)
 KINDS = ("used", "spike", "saturated", "dropout", "quiet", "no overlap")
 
@@ -30,10 +30,10 @@ class Sampled:
 
 
 def step_of(time: Vector) -> float:
-    """Time between samples [s]: the mean step, gaps left out."""
-    longest = GAP_STEPS * np.median(np.diff(sample(time)))
+    """Return the time between samples [s]: the mean step, gaps left out."""
+    longest = GAP_STEPS * np.median(np.diff(subsample(time)))
     total, count = 0.0, 0
-    for part in parts(len(time) - 1):
+    for part in split_pieces(len(time) - 1):
         steps = np.diff(time[part.start : part.stop + 1])
         usual = steps[steps <= longest]
         total, count = total + float(np.sum(usual)), count + len(usual)
@@ -41,19 +41,19 @@ def step_of(time: Vector) -> float:
 
 
 def gaps_of(time: Vector) -> Flags:
-    """Whether the clock jumps by more than five steps after each sample; never after the last."""
+    """Return whether the clock jumps by more than five steps after each sample; never after the last."""
     longest, gaps = GAP_STEPS * step_of(time), np.zeros(len(time), dtype=bool)
-    for part in parts(len(time) - 1):
+    for part in split_pieces(len(time) - 1):
         gaps[part] = np.diff(time[part.start : part.stop + 1]) > longest
     return gaps
 
 
 def spread_repeated(time: Vector) -> Vector:
-    """The clock with repeated times spread evenly up to the next different time, so that it increases strictly [s]."""
-    if rises(time, strictly=True):
+    """Return the clock with repeated times spread evenly up to the next different time, so that it increases strictly [s]."""
+    if never_falls(time, strictly=True):
         return time
     spread_out = np.empty(len(time))
-    for part in parts(len(time)):
+    for part in split_pieces(len(time)):
         begin = int(np.searchsorted(time, time[part.start], side="left"))
         end = int(np.searchsorted(time, time[part.stop - 1], side="right"))
         times = time[begin : end + 1]
@@ -69,8 +69,8 @@ def spread_repeated(time: Vector) -> Vector:
 
 
 def _last_step(time: Vector, last: int) -> float:
-    """How long the last of repeated times lasts, which begins at a sample: as its samples do elsewhere."""
-    some = sample(time)
+    """Return how long the last of repeated times lasts, which begins at a sample: as its samples do elsewhere."""
+    some = subsample(time)
     starts = np.flatnonzero(np.append(True, np.diff(some) > 0))
     return float(np.median(np.diff(some[starts]) / np.diff(starts))) * (len(time) - last)
 
@@ -86,11 +86,11 @@ def read_at(channel: Sampled, time: OtherVector, late: float = 0.0) -> tuple[Oth
     Returns:
         Readings [N], and faults: `NO_OVERLAP` where the channel was not sampled, `DROPOUT` inside its gaps.
     """
-    if late == 0 and same(time, channel.time):
+    if late == 0 and have_same_numbers(time, channel.time):
         return channel.force, channel.fault
     tolerance = 1e-9 * step_of(channel.time)
     force, fault = np.empty(len(time), dtype=channel.force.dtype), np.empty(len(time), dtype=channel.fault.dtype)
-    for part in parts(len(time)):
+    for part in split_pieces(len(time)):
         force[part], fault[part] = _read_piece(channel, time[part] + late, tolerance)
     return force, fault
 

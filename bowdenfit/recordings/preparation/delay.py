@@ -34,16 +34,16 @@ from bowdenfit.recordings.preparation.segments import (
 )
 from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Vector
 
-RANGE = 0.25
-COMMON_ERROR = 0.0015
-_FRICTIONS = np.linspace(0.3, 1.2, 10)
-_COARSE_ROWS = 3
-_ROUNDS = 2
-_SOME_DRAG = 0.1  # of the typical force
-_AS_WELL = 1.2
-_MOST_RATIO = 10.0
-_MOVES = 0.05  # of the time
-_MOST_STEPS = 3
+RANGE = 0.25  # [s]; judged: filters and buses delay by less, and more would reach over whole strokes
+COMMON_ERROR = 0.0015  # [s]; what is left over the 24 simulated benches (scripts/check_recordings.py simulates others)
+_FRICTIONS = np.linspace(0.3, 1.2, 10)  # of half the width of the loop, which delay and noise make wider: the start of a search
+_COARSE_ROWS = 3  # judged: stretches that the coarse search looks at
+_ROUNDS = 2  # judged: of delay and rests in turn
+_SOME_DRAG = 0.1  # of the typical force; judged: the drag at which a second search starts
+_AS_WELL = 1.2  # judged: ratio of sums of squares up to which two drags describe a recording as well
+_MOST_RATIO = 10.0  # judged: log ratio of the sensors beyond any gain
+_MOVES = 0.05  # of the time; judged: how long the rope must slide each way
+_MOST_STEPS = 3  # judged: Gauss-Newton steps from a start close by
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _undetermined(why: str) -> Delay:
 
 
 def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, float]:
-    """Exponent, ratio, delay and drag, and the standard error of the delay but for what all recordings have in common.
+    """Return exponent, ratio, delay and drag, and the standard error of the delay but for what all recordings have in common.
 
     A drag looks like a delay where the force changes at a constant rate: it is looked for from none and from some of it, and
     where both explain the recording about as well, how far they are apart is an error.
@@ -125,7 +125,7 @@ def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, flo
 
 
 def _slides_both_ways(segments: Segments, point: ChosenVector) -> bool:
-    """Whether the rope slides, for more than moments, toward the motor and back."""
+    """Return whether the rope slides, for more than moments, toward the motor and back."""
     seen, exponent = with_drag(segments, float(point[3])), float(point[0])
     output = play_along_rows(seen.x, starts(seen, float(point[1])), point[:1])[0]
     stands, side = sides(seen, output, exponent)
@@ -134,7 +134,7 @@ def _slides_both_ways(segments: Segments, point: ChosenVector) -> bool:
 
 
 def _by_noise(segments: Segments, residuals: ChosenVector) -> float:
-    """Time in which the force moves by as much as the model is off, or noise is [s].
+    """Return the time in which the force moves by as much as the model is off, or noise is [s].
 
     Noise that stays alike, and what the model leaves out, shift the delay by that much; the curvature does not know.
     """
@@ -147,7 +147,7 @@ def _by_noise(segments: Segments, residuals: ChosenVector) -> float:
 
 
 def _inner(segments: Segments) -> Matrix:
-    """Weights without the ends of the segments, where shifted points would be missing."""
+    """Return weights without the ends of the segments, where shifted points would be missing."""
     edge = min(round(RANGE / segments.step) + 1, segments.x.shape[1] // 4)
     weight = segments.weight.copy()
     weight[:, :edge] = 0
@@ -156,7 +156,7 @@ def _inner(segments: Segments) -> Matrix:
 
 
 def _usable(segments: Segments) -> Labels:
-    """Segments with good readings between their ends."""
+    """Return segments with good readings between their ends."""
     return np.flatnonzero((_inner(segments) > USED).any(axis=1))
 
 
@@ -183,7 +183,7 @@ def _coarse(every: Segments) -> Vector:
 
 
 def _touched(segments: Segments, point: OtherVector) -> Segments:
-    """Weight only where the model knows the output: since it first touched the band in a segment."""
+    """Return the weight only where the model knows the output: since it first touched the band in a segment."""
     output = play_along_rows(segments.x, starts(segments, float(point[1])), np.array([point[0]]))[0]
     _, side = sides(segments, output, float(point[0]))
     known = shift_rows((side != 0).astype(float), float(point[2]) / segments.step) == 1

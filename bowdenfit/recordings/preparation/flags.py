@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from bowdenfit.description import Preparation
-from bowdenfit.files.pieces import first_set, interpolated, last_set, parts, same, sample
+from bowdenfit.files.pieces import first_set, have_same_numbers, interpolate, last_set, split_pieces, subsample
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, gaps_of, step_of
 from bowdenfit.recordings.preparation.delay import RANGE
 from bowdenfit.recordings.preparation.noise import noise_of, quantum_of
 from bowdenfit.types import ChosenFlags, ChosenVector, Flags, Labels, OtherVector, Positions, Vector
 
-_SPIKE_SDS = 8.0
-_HALF_WINDOW = 5
-_LONGEST_SPIKE = 3
-_SHORTEST_RUN = 10
-_PROBABILITY = 1e-6
-_CLOSED = 1
+_SPIKE_SDS = 8.0  # judged: one normal sample in 10^15 is so far off
+_HALF_WINDOW = 5  # judged: samples on each side of the running median
+_LONGEST_SPIKE = 3  # samples; judged: what is longer may be motion
+_SHORTEST_RUN = 10  # judged: equal samples from which a run may be a frozen channel
+_PROBABILITY = 1e-6  # that quantised noise makes such a run in a recording; judged
+_CLOSED = 1  # samples between two at the end of the range that count as there too
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class EqualRuns:
     typical: int
 
     def covered(self, chosen: ChosenFlags, samples: int) -> Flags:
-        """Samples that lie in the chosen stretches."""
+        """Return samples that lie in the chosen stretches."""
         return _from_to(self.start[chosen], self.start[chosen] + self.length[chosen], samples)
 
 
@@ -45,7 +45,7 @@ def runs_of(values: OtherVector) -> EqualRuns:
     """Split into stretches of equal successive values; each missing value is a stretch of its own."""
     run_start, counts = 0, dict[int, int]()
     starts, lengths = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
-    for part in parts(len(values)):
+    for part in split_pieces(len(values)):
         some = values[part.start : part.stop + 1]
         ends = part.start + 1 + np.flatnonzero(some[1:] != some[:-1])
         ends = np.append(ends, len(values)) if part.stop == len(values) else ends
@@ -81,7 +81,7 @@ def flag_samples(
     """
     finite = np.isfinite(force)
     other = _beside(time, other_time, other_force)
-    some = sample(other_force)
+    some = subsample(other_force)
     other_noise = resolution(some[np.isfinite(some)])
     off = spikes(force)
     lag = round(RANGE / step_of(time))
@@ -100,23 +100,25 @@ def flag_samples(
 
 
 def _beside(time: Vector, other_time: OtherVector, other_force: OtherVector) -> Vector:
-    """The force of the other channel at the times of one."""
+    """Return the force of the other channel at the times of one."""
     there = np.isfinite(other_force)
-    return other_force if there.all() and same(time, other_time) else interpolated(time, other_time, other_force, there)
+    if there.all() and have_same_numbers(time, other_time):
+        return other_force
+    return interpolate(time, other_time, other_force, there)
 
 
 def _without(force: Vector, off: Flags) -> Vector:
-    """A force with nothing in the place of some samples."""
+    """Return a force with nothing in the place of some samples."""
     return np.where(off, np.array(np.nan, dtype=force.dtype), force) if off.any() else force
 
 
 def resolution(force: Vector) -> float:
-    """Smallest change of a channel that means motion [N]: six standard deviations of its noise and two of its steps."""
+    """Return the smallest change of a channel that means motion [N]: six standard deviations of noise and two of its steps."""
     return 6 * noise_of(force) + 2 * quantum_of(force)
 
 
 def frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
-    """Samples that repeat one value for so long that quantisation cannot explain it, while the other channel moves.
+    """Return samples that repeat one value for so long that quantisation cannot explain it, while the other channel moves.
 
     How long is too long follows from the noise: where it covers at least a third of a quantisation step, the chance of
     so many repeats is below one in a million. A channel with less noise is never called frozen, because a force that
@@ -129,7 +131,7 @@ def frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
 def saturation(
     force: Vector, other: Vector, other_resolution: float, limits: tuple[float, float] | None, lag: int
 ) -> tuple[tuple[float, float], Flags]:
-    """Samples at the end of the load cell's range, and the ends [N]; infinite where none was stated or seen.
+    """Return samples at the end of the load cell's range, and the ends [N]; infinite where none was stated or seen.
 
     With limits stated, everything within a quantisation step of them. Without, the largest or smallest value of the
     channel where it is held for longer than noise allows, or where the largest is held while the other force goes on
@@ -166,12 +168,12 @@ def _longest_by_noise(force: Vector, runs: EqualRuns) -> float:
 
 def _sampled(force: Vector) -> ChosenVector:
     """Plenty of the readings of a channel."""
-    some = sample(force)
+    some = subsample(force)
     return some[np.isfinite(some)]
 
 
 def _long_while_moving(force: Vector, other: Vector, other_resolution: float, runs: EqualRuns) -> ChosenFlags:
-    """Which of the runs are longer than chance makes them, while the other force changes by more than its resolution."""
+    """Return which of the runs are longer than chance makes them, while the other force changes by more than its resolution."""
     chosen = runs.length >= _longest_by_noise(force, runs)
     for i in np.flatnonzero(chosen).tolist():
         inside = other[runs.start[i] : runs.start[i] + runs.length[i]]
@@ -186,7 +188,7 @@ def _range_of(force: Vector) -> tuple[float, float]:
 
 
 def _rises_at(value: float, other: Vector, runs: EqualRuns, lag: int) -> float:
-    """How far the other force rises at most while a channel rests at a value, after the first `lag` samples."""
+    """Return how far the other force rises at most while a channel rests at a value, after the first `lag` samples."""
     chosen = (runs.value == value) & (runs.length > max(lag, _SHORTEST_RUN))
     parts = [other[s + lag : s + n] for s, n in zip(runs.start[chosen], runs.length[chosen], strict=True)]
     return max((float(part.max() - part[0]) for part in parts), default=0.0)
@@ -202,7 +204,7 @@ def _closed(flags: Flags) -> Flags:
 
 
 def _from_to(start: Positions, end: Positions, samples: int) -> Flags:
-    """Samples from any start up to its end."""
+    """Return samples from any start up to its end."""
     edges = np.zeros(samples + 1, dtype=np.int8)
     edges[start] += 1  # neither any start nor any end is there twice
     edges[end] -= 1
@@ -210,7 +212,7 @@ def _from_to(start: Positions, end: Positions, samples: int) -> Flags:
 
 
 def spikes(force: Vector) -> Flags:
-    """One to three successive samples more than eight standard deviations off the running median of eleven.
+    """Return one to three successive samples more than eight standard deviations off the running median of eleven.
 
     Quick motion is no spike: the distance allowed grows with the typical step between the neighbors, and more than three
     successive samples are left alone.
@@ -221,7 +223,7 @@ def spikes(force: Vector) -> Flags:
     values, (low, high) = _sampled(force), _range_of(force)
     within = values[(values > low) & (values < high)]  # clipped stretches would hide the noise
     noise = math.hypot(noise_of(within), quantum_of(values) / math.sqrt(12))
-    for part in parts(len(force)):
+    for part in split_pieces(len(force)):
         start, stop = _with_neighbors(there, part)
         where = start + np.flatnonzero(there[start:stop])
         positions = (
@@ -234,7 +236,7 @@ def spikes(force: Vector) -> Flags:
 
 
 def _with_neighbors(there: Flags, part: slice) -> tuple[int, int]:
-    """A piece, and so many good samples on both sides that its spikes are those of the whole."""
+    """Return a piece, and so many good samples on both sides that its spikes are those of the whole."""
     start, stop = part.start, part.stop
     for _ in range(2 * _HALF_WINDOW + 2 * _LONGEST_SPIKE):
         start, stop = max(last_set(there, start), 0), min(first_set(there, stop) + 1, len(there))
@@ -254,7 +256,7 @@ def _spikes_in(values: Vector, noise: float) -> Positions:
 
 
 def _sudden(padded: OtherVector, off: Positions, distance: ChosenVector) -> ChosenFlags:
-    """Whether each suspect is in a short group that the force jumps to, and back from, by half its distance or more."""
+    """Return whether each suspect is in a short group that the force jumps to, and back from, by half its distance or more."""
     first = np.append(True, np.diff(off) > 1)
     group = np.cumsum(first) - 1
     starts = np.flatnonzero(first)

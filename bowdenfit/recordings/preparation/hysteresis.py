@@ -20,10 +20,10 @@ from jaxtyping import Float
 
 from bowdenfit.types import Labels, OtherVector, Vector
 
-_MOST_STEPS = 200
-_LEAST_CHANGE = 1e-14  # of the cost
-_DAMPING = 1e-3
-_MOST_DAMPING = 1e12
+_MOST_STEPS = 200  # judged: far more than a search takes
+_LEAST_CHANGE = 1e-14  # of the cost: rounding
+_DAMPING = 1e-3  # to begin with, as Levenberg and Marquardt have it
+_MOST_DAMPING = 1e12  # where no step lowers the cost any more
 
 Deviations: TypeAlias = tuple[Float[np.ndarray, " residuals"], Float[np.ndarray, "residuals parameters"]]
 """Residuals [standard deviations], and their slopes: a column for each parameter."""
@@ -31,10 +31,10 @@ Deviations: TypeAlias = tuple[Float[np.ndarray, " residuals"], Float[np.ndarray,
 Model: TypeAlias = Callable[[np.ndarray], Deviations]
 """Deviations at parameters."""
 
-_WIDTH, _DEGREE = 7, 2  # blocks that a polynomial is laid through
-_TURNS = 2.0  # of the noise: half of how far a force falls back where it really turns
-_BEYOND = 3.0  # of the noise: what smoothing may change; more is a corner, or a spike, and stays
-_NOISY = 0.5  # of the typical change from block to block: noise that hardly ever passes for motion
+_WIDTH, _DEGREE = 7, 2  # judged: blocks that a polynomial is laid through, and its degree
+_TURNS = 2.0  # judged, of the noise: half of how far a force falls back where it really turns
+_BEYOND = 3.0  # judged, of the noise: what smoothing may change; more is a corner, or a spike, and stays
+_NOISY = 0.5  # judged, of the typical change from block to block: noise that hardly ever passes for motion
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Hysteresis:
 
 
 def play(x: Vector, exponent: float, start: float | None = None) -> tuple[Vector, Labels]:
-    """Output of the play operator, y_t = clip(y_{t-1}, x_t - exponent, x_t + exponent), and where in the band it is.
+    """Return the output of the play operator, y_t = clip(y_{t-1}, x_t - exponent, x_t + exponent), and where in the band it is.
 
     With x = log F_in this is y = log F_out of a cable with capstan friction: the output follows the input at a distance
     while the rope slides, and stands still while the input crosses the friction band after a reversal.
@@ -85,7 +85,7 @@ def play(x: Vector, exponent: float, start: float | None = None) -> tuple[Vector
 
 
 def play_between(lower: Vector, upper: Vector, start: float) -> tuple[Vector, Labels]:
-    """The play operator between two limits that move. A plain loop: meant for up to some 10^4 values.
+    """Return the play operator between two limits that move. A plain loop: meant for up to some 10^4 values.
 
     Returns:
         The output, and its contact: +1 at the lower limit (while pulling or moving forward), -1 at the upper (while returning
@@ -104,7 +104,7 @@ def play_between(lower: Vector, upper: Vector, start: float) -> tuple[Vector, La
 
 
 def clear_of_turns(state: Labels, force: Vector) -> Labels:
-    """Contact without the level on which it ends, where that is longer than a block: noise hides when in it the rope stopped.
+    """Return the contact without the level on which it ends, if that is longer than a block: noise hides when the rope stopped.
 
     Args:
         state: Contact of each block with an operator that follows `force`.
@@ -118,24 +118,24 @@ def clear_of_turns(state: Labels, force: Vector) -> Labels:
 
 
 def last_contact(state: Labels) -> Labels:
-    """The last contact up to each block; 0 before the first."""
+    """Return the last contact up to each block; 0 before the first."""
     at = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
     return np.where(at >= 0, state[np.maximum(at, 0)], 0).astype(int)
 
 
 def white_noise(series: Vector) -> float:
-    """Standard deviation of the white part of a smooth series, from its second differences."""
+    """Return the standard deviation of the white part of a smooth series, from its second differences."""
     second = np.diff(series, 2)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6)) if len(second) else 0.0
 
 
 def robust_cost(residuals: Vector) -> float:
-    """Sum of sqrt(1 + r^2) - 1: half the square of a small residual, the size of a large one."""
+    """Return the sum of sqrt(1 + r^2) - 1: half the square of a small residual, the size of a large one."""
     return float(np.sum(np.sqrt(1 + residuals**2) - 1))
 
 
 def robust_minimum(model: Model, start: OtherVector, least: OtherVector, most: OtherVector) -> tuple[np.ndarray, float]:
-    """Parameters of the least robust cost near a start, and that cost.
+    """Return parameters of the least robust cost near a start, and that cost.
 
     Newton's steps, damped as Levenberg and Marquardt do until the cost falls; a parameter that wants beyond its limits stays
     there. The curvature is that of the cost with the model as a plane, which the play operator is between kinks.
@@ -172,7 +172,7 @@ def robust_minimum(model: Model, start: OtherVector, least: OtherVector, most: O
 
 
 def smooth_input(force: Vector) -> Vector:
-    """A series like a measured one that is smooth, and rises and falls by turns as that does beyond its noise.
+    """Return a series like a measured one that is smooth, and rises and falls by turns as that does beyond its noise.
 
     It is smoothed by polynomials over few blocks (Savitzky and Golay 1964) as far as noise goes, if there is much. Where it
     turns is found by an operator with play as wide as `_TURNS` standard deviations of the noise on either side; from one turn
@@ -200,14 +200,14 @@ def smooth_input(force: Vector) -> Vector:
 
 
 def _noise(force: Vector) -> float:
-    """Standard deviation of the white part of a series, of which a curve has less than in second differences alone."""
+    """Return the standard deviation of the white part of a series; a curve adds less than to second differences alone."""
     fourth = np.diff(force, 4)
     by_fourth = float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70)) if len(fourth) else np.inf
     return min(white_noise(force), by_fourth)
 
 
 def _smooth(force: Vector, noise: float) -> Vector:
-    """The force smoothed over few blocks, and as it was read where that changes it by more than noise does."""
+    """Return the force smoothed over few blocks, and as it was read where that changes it by more than noise does."""
     if len(force) < _WIDTH:
         return force
     powers = np.vander(np.linspace(-1.0, 1.0, _WIDTH), _DEGREE + 1)
@@ -220,7 +220,7 @@ def _smooth(force: Vector, noise: float) -> Vector:
 
 
 def _isotonic(force: Vector) -> Vector:
-    """The rising series nearest to a force, by pooling neighbours that fall (Barlow et al. 1972).
+    """Return the rising series nearest to a force, by pooling neighbours that fall (Barlow et al. 1972).
 
     SciPy has this and the polynomials too, but loading it takes longer than reading recordings.
     """

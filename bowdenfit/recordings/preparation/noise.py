@@ -3,18 +3,18 @@
 import numpy as np
 
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.pieces import PLENTY, Series, sample
+from bowdenfit.files.pieces import PLENTY, Series, subsample
 from bowdenfit.types import Flags, Vector
 
-_TO_SD = 1.4826
-_MOST_TRENDS = 200_000
-_FEWEST = 10
-_PARTS = 8
-_LARGEST_MOVE = 5.0
+_TO_SD = 1.4826  # 1/Phi^-1(3/4): from the median of absolute deviations of a normal variable to its standard deviation
+_MOST_TRENDS = 200_000  # judged: stretches that tell a median to a part in hundreds
+_FEWEST = 10  # judged: samples of a tare
+_PARTS = 8  # judged: parts of a quiet interval whose means are compared
+_LARGEST_MOVE = 5.0  # judged: by how many standard deviations of a sample these means may differ
 
 
 def noise_of(values: Vector) -> float:
-    """Standard deviation of a single sample about smooth motion, from second differences [unit of the values].
+    """Return the standard deviation of a single sample about smooth motion, from second differences [as the values].
 
     Robust: spikes, steps and turns of the motion do not raise it. It is right for white noise, and too small for noise
     that a filter has smoothed; 0 where more than half the samples lie on a straight line.
@@ -26,7 +26,7 @@ def noise_of(values: Vector) -> float:
 
 
 def quantum_of(values: Vector) -> float:
-    """Smallest step that the readings commonly make [unit of the values]: the quantisation step, where there is one."""
+    """Return the smallest step that the readings commonly make [as values]: the quantisation step, where there is one."""
     steps = np.abs(np.diff(values))
     steps = steps[steps > 0]
     if not len(steps):
@@ -35,14 +35,14 @@ def quantum_of(values: Vector) -> float:
 
 
 def noise_about_trend(values: Series, samples: int) -> float:
-    """Standard deviation of a single sample about straight lines through stretches of `samples` [unit of the values].
+    """Return the standard deviation of a single sample about straight lines through stretches of `samples` [as values].
 
     The median over the stretches, so that those with a turn of the motion do not count. Unlike `noise_of` it sees the
     slow part of filtered noise. Falls back on `noise_of` for stretches of fewer than four samples.
     """
     stretches = len(values) // samples
     if samples < 4 or stretches < 5:
-        return noise_of(sample(values))
+        return noise_of(subsample(values))
     step = max(1, len(values) // _MOST_TRENDS)
     if len(values) <= PLENTY:
         rows = values[: stretches * samples].reshape(stretches, samples)[::step]
@@ -58,7 +58,7 @@ def noise_about_trend(values: Series, samples: int) -> float:
 
 
 def correlation_time(values: Vector) -> float:
-    """Integrated autocorrelation time, at least 1 [samples].
+    """Return the integrated autocorrelation time, at least 1 [samples].
 
     References:
         Sokal, Monte Carlo methods in statistical mechanics (1997), section 3: the window is five times the time itself.
@@ -73,7 +73,7 @@ def correlation_time(values: Vector) -> float:
 
 
 def autocorrelation(values: Vector) -> Vector | None:
-    """Correlation of a series with itself by lag [1]; None for one that does not change."""
+    """Return correlation of a series with itself by lag [1]; None for one that does not change."""
     n = len(values)
     centered = values - np.mean(values)
     if not np.any(centered):
@@ -86,7 +86,7 @@ def autocorrelation(values: Vector) -> Vector | None:
 def estimate_tare(
     file: str, name: str, time: Vector, force: Vector, quiet: tuple[float, float], good: Flags
 ) -> tuple[float, float]:
-    """Mean of a channel's good samples in the quiet interval and its standard error [N].
+    """Return the mean of a channel's good samples in the quiet interval and its standard error [N].
 
     The standard error allows for noise that remembers: the variance of the mean is that of a sample times the
     integrated autocorrelation time over the number of samples.

@@ -16,18 +16,19 @@ from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.preparation.noise import noise_of
 from bowdenfit.types import ChosenVector, Flags, Labels, Matrix, OtherVector, Positions, Vector
 
-_STEP = 0.005
-_SEGMENT = 8.0
-_MOST_POINTS = 5_000
-_FEWEST_ROWS = 16
+# Judged; the errors over 24 simulated benches that the docstring of `delay` states are with these.
+_STEP = 0.005  # [s] between points
+_SEGMENT = 8.0  # [s]
+_MOST_POINTS = 5_000  # in all stretches that are kept
+_FEWEST_ROWS = 16  # stretches of a very long recording that are looked at
 _CYCLES = 3  # in a segment, at least
-_FEWEST_POINTS = 500
-_WIDTH = 0.012
-_LIGHT = np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]) / 64
+_FEWEST_POINTS = 500  # that are left on a clock made coarser
+_WIDTH = 0.012  # [s], of the Gaussian that smooths
+_LIGHT = np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]) / 64  # binomial weights, for the noise of neighbouring points
 USED = 0.05  # weight of a point that counts
-_MARGIN = 50 / 12  # of the width of smoothing
-_AWAY = 6.0
-_NEAR = 1.5
+_MARGIN = 50 / 12  # of the width of smoothing: what it rounds at the ends of a rest
+_AWAY = 6.0  # standard deviations by noise, within which the input is at the end of its pull
+_NEAR = 1.5  # likewise, within which the rope is at its rest
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def cut_segments(time: Vector, input_force: Vector, output_force: Vector, good: 
 def _sums(
     time: Vector, forces: tuple[Vector, Vector], good: Flags, step: float, points: int, length: int
 ) -> tuple[Positions, ChosenVector, ChosenVector]:
-    """Number of good readings above zero at each point of the coarse clock, and sums of both forces.
+    """Return the number of good readings above zero at each point of the coarse clock, and sums of both forces.
 
     Of a recording with very many points, those of stretches evenly from all of it.
 
@@ -122,9 +123,9 @@ def _sums(
             else np.searchsorted(time, time[0] + step * np.array([begin, begin + wide])).tolist()
         )
         sums = np.zeros(wide, dtype=int), np.zeros(wide), np.zeros(wide)
-        for part in pieces.parts(ends[1] - ends[0]):
+        for part in pieces.split_pieces(ends[1] - ends[0]):
             some = slice(ends[0] + part.start, ends[0] + part.stop)
-            x, y = (pieces.numbers(force, some) for force in forces)
+            x, y = (pieces.to_floats(force, some) for force in forces)
             usable = good[some] & (x > 0) & (y > 0)
             place = np.clip(((time[some] - time[0]) / step).astype(int) - begin, 0, wide - 1)[usable]
             for total, weights in zip(sums, (None, x[usable], y[usable]), strict=True):
@@ -140,7 +141,7 @@ def _filled(total: Vector, count: Labels) -> Vector:
 
 
 def _coarser(forces: list[Vector], step: float) -> int:
-    """How many points to join, for a segment to hold some cycles: noise averages out over longer parts of slower ones."""
+    """Return how many points to join, so that a segment holds some cycles: noise averages out over longer parts."""
     main = main_frequency(forces[0], forces[1], 1 / step)
     return min(max(1, round(_CYCLES / (main * _SEGMENT))), max(1, len(forces[0]) // _FEWEST_POINTS)) if main > 0 else 1
 
@@ -171,14 +172,14 @@ def _jitter(force: Vector, step: float, width: float) -> Vector:
 
 
 def _most_varied(x: Matrix, most: int) -> Positions:
-    """Rows in which the rate changes most, in order."""
+    """Return rows in which the rate changes most, in order."""
     lag = max(1, x.shape[1] // 50)
     bends = np.abs(x[:, 2 * lag :] - 2 * x[:, lag:-lag] + x[:, : -2 * lag]).sum(axis=1)
     return np.sort(np.argsort(-bends, kind="stable")[:most])
 
 
 def reverses(segments: Segments) -> bool:
-    """Whether the input turns around by more than a fifth of its range within a segment."""
+    """Return whether the input turns around by more than a fifth of its range within a segment."""
     fifth = 0.2 * float(np.ptp(segments.x))
     fall = np.max(np.maximum.accumulate(segments.x, axis=1) - segments.x)
     rise = np.max(segments.x - np.minimum.accumulate(segments.x, axis=1))
@@ -207,12 +208,12 @@ def play_along_rows(x: Matrix, start: Vector, exponent: OtherVector, rests: Rest
 
 
 def _between(x: np.ndarray, low: np.ndarray | int, high: np.ndarray | int, out: np.ndarray | None = None) -> np.ndarray:
-    """The same as `np.clip`, which takes longer to call than these few numbers to compare."""
+    """Return the same as `np.clip`, which takes longer to call than these few numbers to compare."""
     return np.minimum(np.maximum(x, low), high, out=out)
 
 
 def with_drag(segments: Segments, drag: float) -> Segments:
-    """The segments on the scale log(F + drag), on which friction with drag is a constant distance.
+    """Return the segments on the scale log(F + drag), on which friction with drag is a constant distance.
 
     Args:
         segments: On the scale log F.
@@ -245,7 +246,7 @@ def starts(segments: Segments, ratio: float) -> Vector:
 
 
 def shift_rows(y: np.ndarray, points: float) -> np.ndarray:
-    """Each row later by a number of points, with straight lines between them; the ends are held."""
+    """Return each row later by a number of points, with straight lines between them; the ends are held."""
     whole = int(np.floor(points))
     share = points - whole
     place = np.arange(y.shape[-1]) - whole
@@ -254,7 +255,7 @@ def shift_rows(y: np.ndarray, points: float) -> np.ndarray:
 
 
 def sides(segments: Segments, output: Matrix, exponent: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whether the model stands still at each point, and the side of the band that it last touched, 0 for none yet."""
+    """Return whether the model stands still at each point, and the side of the band that it last touched, 0 for none yet."""
     gap = segments.x - output
     touch = np.where(np.abs(gap) >= exponent * (1 - 1e-9), np.sign(gap), 0.0)
     last = np.maximum.accumulate(np.where(touch != 0, np.arange(touch.shape[1]), -1), axis=1)
@@ -293,7 +294,7 @@ def read_rests(segments: Segments, point: OtherVector) -> Rests:
 
 
 def _half_cycles(side: Matrix) -> Iterator[tuple[int, int, int, int]]:
-    """Row, first point, end, and end of the next one, of all stretches in which the band is touched on one side."""
+    """Yield row, first point, end, and end of the next one, of all stretches in which the band is touched on one side."""
     for row, values in enumerate(side):
         ends = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values), len(values)]
         for begin, end, after in zip(ends[:-2], ends[1:-1], ends[2:], strict=True):

@@ -82,7 +82,7 @@ class Cable:
         return [parameter for law in self.laws for parameter in law.parameters(defaults)]
 
     def wrap_angles(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, "rows contacts"]:
-        """Wrap angle of each contact [rad] at values of the route variable."""
+        """Return the wrap angle of each contact [rad] at values of the route variable."""
         columns = [self._wrap_angle(c, values, route) for c in self.description.contact]
         return jnp.stack(columns, axis=-1)
 
@@ -107,7 +107,7 @@ class Cable:
         wrap_angles: Float[Array, "rows contacts"],
         group: Int[Array, " rows"] | None = None,
     ) -> Float[Array, " rows"]:
-        """Friction exponent [1] at given wrap angles [rad], in the groups of given numbers or the one of predictions."""
+        """Return the friction exponent [1] at wrap angles [rad], in the groups of given numbers or the one of predictions."""
 
         def total(laws: tuple[ContactLaw, ...]) -> Array:
             return jnp.sum(jnp.stack([law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(laws)]), axis=0)
@@ -128,7 +128,7 @@ class Cable:
         angle_variance: Float[Array, "rows contacts"],
         group: Int[Array, " rows"] | None = None,
     ) -> Float[Array, " rows"]:
-        """Variance of the friction exponent from independent errors of the wrap angles [rad^2], by groups as it is."""
+        """Return the variance of the friction exponent from independent errors of wrap angles [rad^2], by groups alike."""
 
         def total(laws: tuple[ContactLaw, ...]) -> Array:
             slopes = [law.slope(values, wrap_angles[..., k]) for k, law in enumerate(laws)]
@@ -137,7 +137,7 @@ class Cable:
         return self._in_own_group(total, group)
 
     def efficiency_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """Efficiency while pulling with the reference force at the reference speed [1] at values of the route variable."""
+        """Return the efficiency while pulling with the reference force at the reference speed [1] at route values."""
         if self.is_loop:
             force = self.friction.conditions.reference_force
             return self.output_force_at(values, route, jnp.asarray(force), jnp.ones(())) / force
@@ -184,13 +184,13 @@ class Cable:
         stroke: Float[Array, ""],
         mounting: Float[Array, ""] | float = 0.0,
     ) -> Float[Array, " rows"]:
-        """Input force [N] that gives an output force [N]: the inverse of `output_force_at`, with the same arguments."""
+        """Return the input force [N] that gives an output force [N], by the same arguments as `output_force_at`."""
         return self.input_force_at_angles(values, self.wrap_angles(values, route), output_force, stroke, mounting)
 
     def input_force_at_angles(
         self, values: Mapping[str, Array], angles: Array, output_force: Array, stroke: Array, mounting: Array | float = 0.0
     ) -> Float[Array, "..."]:
-        """Input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
+        """Return the input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
         exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
             return loop_input_force(output_force, preload, exponent, stroke)
@@ -199,7 +199,7 @@ class Cable:
     def _friction_at_angles(
         self, values: Mapping[str, Array], angles: Array, mounting: Array | float
     ) -> tuple[Array, Array | None]:
-        """Friction exponent [1] in a mounting, and the preload of a loop [N]; None of a single rope."""
+        """Return the friction exponent [1] in a mounting, and the preload of a loop [N]; None for a single rope."""
         exponent = self.friction_exponent(values, angles) + mounting
         return exponent, self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1)) if self.is_loop else None
 
@@ -208,7 +208,7 @@ class Cable:
         return -self.efficiency_at(values, route) if self.is_loop else self.exponent_at(values, route)
 
     def exponent_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """Friction exponent [1] at values of the route variable."""
+        """Return the friction exponent [1] at values of the route variable."""
         return self.friction_exponent(values, self.wrap_angles(values, route))
 
 

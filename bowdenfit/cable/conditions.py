@@ -1,4 +1,4 @@
-"""At what loads and speeds a cable was measured, and what its coefficients are stated for."""
+"""Loads and speeds at which a cable was measured, and those for which its coefficients are stated."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Scale
 from bowdenfit.units import speed_dimension
 
-LEAST_SHARE = 1e-5  # of the loads; an offset cannot take more of a rope's reading than this leaves
+LEAST_SHARE = 1e-5  # of the loads, judged; an offset cannot take more of a rope's reading than this leaves
 
 
 @dataclass(frozen=True)
@@ -90,5 +90,5 @@ def make_conditions(
 
 
 def _rounded(value: float) -> float:
-    """To two digits: a reference is a convention, and should look like one."""
+    """Return a value to two digits: a reference is a convention, and should look like one."""
     return float(f"{value:.2g}")

@@ -51,14 +51,14 @@ class Curve(ABC):
 
     @abstractmethod
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Its parameters, with priors that may use the detected angles [rad]."""
+        """Return its parameters, with priors that may use the detected angles [rad]."""
 
     @abstractmethod
     def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
-        """Wrap angle [rad] at z, -1 to 1 over the range, for its coefficients."""
+        """Return the wrap angle [rad] at z, -1 to 1 over the range, for its coefficients."""
 
     def derived(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        """Derived quantities by name, in the units of `derived_units`."""
+        """Return derived quantities by name, in the units of `derived_units`."""
         del values
         return {}
 
@@ -67,7 +67,7 @@ class Curve(ABC):
         return {}
 
     def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """Wrap angle [rad] at values of the route variable."""
+        """Return the wrap angle [rad] at values of the route variable."""
         return self.at((route - self.middle) / self.half_width, *(values[name] for name in self.names))
 
     def _parameter(

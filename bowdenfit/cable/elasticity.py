@@ -46,7 +46,7 @@ class Elasticity:
         return self.description.preload.wrap_angle.to("angle")
 
     def rope(self, values: Values) -> tuple[Array, Array, Array]:
-        """Stiffness [N/mm], bedding-in stretch [mm] and the load over which it is taken up [N]."""
+        """Return stiffness [N/mm], bedding-in stretch [mm] and the load over which it is taken up [N]."""
         return values[STIFFNESS], values[BEDDING_STRETCH], values[BEDDING_LOAD]
 
     def extension(self, values: Values, tension: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
@@ -62,7 +62,7 @@ class Elasticity:
         return tension_from_extension(extended, *self.rope(values))
 
     def friction_exponent(self, values: Values, wrap_angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Friction exponent while the rope is stretched [1]."""
+        """Return the friction exponent while the rope is stretched [1]."""
         return self.law.exponent(values, wrap_angle)
 
     def stretch(
@@ -101,17 +101,17 @@ class Elasticity:
     def preload(
         self, values: Values, bend: Float[Array, "*batch"]
     ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-        """Preload [N] and slack [mm] at a total wrap angle [rad]."""
+        """Return preload [N] and slack [mm] at a total wrap angle [rad]."""
         return self.preload_from(values, values[PRELOAD], bend)
 
     def preload_or_none(self, values: Values, bend: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Preload [N]; 0 of a cable nothing of whose measurements depends on one."""
+        """Return the preload [N]; 0 for a cable of which no measurement depends on it."""
         return self.preload(values, bend)[0] if PRELOAD in values else jnp.zeros(bend.shape)
 
     def preload_from(
         self, values: Values, reference_preload: Float[Array, "*#batch"], bend: Float[Array, "*batch"]
     ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
-        """Preload [N] and slack [mm] at a total wrap angle [rad] of a cable preloaded otherwise."""
+        """Return preload [N] and slack [mm] at a total wrap angle [rad] of a cable preloaded otherwise."""
         if not self.description.preload_follows_stretch:
             return jnp.broadcast_to(reference_preload, bend.shape), jnp.zeros(bend.shape)
         return preload_at(
@@ -120,7 +120,7 @@ class Elasticity:
 
 
 def spread_matrix(at: np.ndarray) -> np.ndarray:
-    """Matrix of zeros and ones that gives each row what belongs to its case; a product with it is quicker than indexing.
+    """Return the matrix of zeros and ones that gives each row what belongs to its case, quicker than indexing.
 
     Args:
         at: Number of the case of each row.
@@ -169,7 +169,7 @@ def rope_parameters(defaults: PriorDefaults, by: RopeScales) -> list[Parameter]:
 
 
 def preload_parameter(description: Description, defaults: PriorDefaults, by: Scale) -> Parameter:
-    """Preload: stated with or without its standard deviation, or free."""
+    """Return the parameter of the preload: stated with or without its standard deviation, or free."""
     settings = description.preload
     at = f" at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if description.preload_follows_stretch else ""
     name, meaning = (PRELOAD, "$P_0$" if at else "$P$"), f"preload{at}"

@@ -39,7 +39,7 @@ class FrictionOption(ABC):
 
     @abstractmethod
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Its parameters.
+        """Return its parameters.
 
         Raises:
             DescriptionError: The measurements lack what the option needs.
@@ -56,12 +56,12 @@ class FrictionOption(ABC):
         return jnp.zeros(())
 
     def stroke_difference(self, values: Mapping[str, Array]) -> Array:
-        """By how much more friction there is pulling than returning, over the mean of both [1]."""
+        """Return by how much more friction there is pulling than returning, over the mean of both [1]."""
         del values
         return jnp.zeros(())
 
     def factor(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Its factor on every coefficient at a speed, up to a constant [1]."""
+        """Return its factor on every coefficient at a speed, up to a constant [1]."""
         del values
         return jnp.ones_like(speed)
 
@@ -166,7 +166,7 @@ class ByGroup(FrictionOption):
     of_group = True
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """None: there are more coefficients."""
+        """Return none: the coefficients of its groups are parameters already."""
         del conditions, defaults
         return []
 

@@ -39,7 +39,7 @@ class ContactLaw(ABC):
 
     @abstractmethod
     def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
-        """Contribution to the friction exponent [1].
+        """Return the contribution to the friction exponent [1].
 
         Args:
             values: Values of the parameters.
@@ -47,7 +47,7 @@ class ContactLaw(ABC):
         """
 
     def slope(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
-        """Derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""
+        """Return the derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""
         return jax.jvp(lambda at: self.exponent(values, at), (wrap_angle,), (jnp.ones_like(wrap_angle),))[1]
 
 

@@ -35,7 +35,7 @@ CURVES = {
 
 
 def check_names(description: Description) -> None:
-    """Every contact's law and curve exists.
+    """Refuse contacts whose law or curve does not exist.
 
     Raises:
         DescriptionError: One is unknown.

@@ -105,11 +105,11 @@ class NoiseLaw(Protocol):
         ...
 
     def draw(self, key: Array, shape: tuple[int, ...]) -> Array:
-        """Standardized deviations."""
+        """Return standardized deviations."""
         ...
 
     def draw_with(self, generator: np.random.Generator, shape: int | tuple[int, ...]) -> np.ndarray:
-        """Standardized deviations, by NumPy."""
+        """Return standardized deviations, by NumPy."""
         ...
 
     def meaning(self, plain: str) -> str:

@@ -116,7 +116,7 @@ class Description(Display, Frozen):
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
     def model_post_init(self, context: Any) -> None:
-        """What it holds of several shows itself."""
+        """Make tuples and dictionaries in it display themselves."""
         del context
         Display.__post_init__(self)
 

@@ -46,7 +46,7 @@ class Route(Frozen):
         return f"{capitalized(self.variable.replace('_', ' '))} ({self.unit})"
 
     def outside(self, value: float) -> str:
-        """That the angle curves do not hold at a value, in words; empty where they do."""
+        """Return words on a value at which the angle curves do not hold; empty where they do."""
         low, high = self.range
         return "" if low <= value <= high else f"outside the curves, {low:g} to {high:g} {self.unit}"
 

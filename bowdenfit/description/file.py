@@ -127,7 +127,7 @@ def _quantities(description: Description) -> list[Stated]:
 
 
 def check_quantities(quantities: Iterable[Stated], file: str) -> None:
-    """Every quantity is in a unit of the right dimension, and possible.
+    """Refuse quantities that are impossible, or in a unit of another dimension.
 
     Raises:
         DescriptionError: Some are not.

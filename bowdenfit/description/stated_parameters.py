@@ -16,7 +16,7 @@ _OF_WHAT = {
     RUN_SCATTER: "how much mountings of one cable differ",
     GAIN_ERROR: "how much the load cells differ",
 }
-_MOST = 1.0  # a factor of e between two mountings or two cells
+_MOST = 1.0  # judged: a factor of e between two mountings or two cells
 
 
 class StretchSettings(Frozen):
@@ -38,7 +38,7 @@ class PreloadSettings(Frozen):
 
 
 def check_elastic(preload: PreloadSettings, prior: Mapping[str, ParameterSetting], file: str) -> None:
-    """Preload is stated once, and no elastic parameter is fixed where it cannot be."""
+    """Refuse preload that is stated twice, and elastic parameters that are fixed at impossible values."""
     if preload.value is not None and PRELOAD in prior:
         raise DescriptionError(
             f"{file} states the preload twice, as value under [preload] and under [prior.{PRELOAD}]; leave one of them out."
@@ -54,7 +54,7 @@ def check_elastic(preload: PreloadSettings, prior: Mapping[str, ParameterSetting
 
 
 def check_shares(prior: Mapping[str, ParameterSetting], file: str) -> None:
-    """No share is of a size that only a number of per cent has.
+    """Refuse shares of a size that only a number of per cent has.
 
     Raises:
         DescriptionError: One is, or is expected to be.

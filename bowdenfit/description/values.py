@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from bowdenfit.units import LARGEST, conversion_factor
 
-_LONGEST_NAME = 80
+_LONGEST_NAME = 80  # characters, a line of a terminal
 
 
 def _nameable(name: str) -> str:
@@ -51,33 +51,33 @@ class QuantityValue(Frozen):
 
 
 class LogNormalPrior(Frozen):
-    """Positive, known to a factor."""
+    """Prior of a positive quantity that is known to a factor."""
 
     median: Positive
     log_sd: Positive
 
 
 class NormalPrior(Frozen):
-    """Of either sign."""
+    """Prior of a quantity of either sign."""
 
     mean: Finite
     sd: Positive
 
 
 class HalfNormalPrior(Frozen):
-    """A scale."""
+    """Prior of a scale."""
 
     sd: Positive
 
 
 class HalfCauchyPrior(Frozen):
-    """A scale of which little more than its size is known."""
+    """Prior of a scale of which little more than its size is known."""
 
     scale: Positive
 
 
 class UniformPrior(Frozen):
-    """Between limits."""
+    """Prior between limits."""
 
     low: Finite
     high: Finite

@@ -13,7 +13,7 @@ from bowdenfit.words import shown
 
 _INIT = "`bowdenfit init` writes a template that has it"
 _MOST_UNKNOWN = 100  # unknown keys of a file for which a known one is looked for that is meant; no message names more
-_ALIKE = 0.5  # likeness from which an unknown key is taken for a misspelled one, as `nearest` has it
+_ALIKE = 0.5  # judged: difflib's likeness from which an unknown key is taken for a misspelled one
 _LONGEST_KEY = 80  # letters that are said of one
 _LARGE = 1e15  # a number that nobody measures
 

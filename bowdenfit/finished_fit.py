@@ -11,8 +11,8 @@ from bowdenfit.display import Rows, text_of
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import bends_text
-from bowdenfit.questions.check.answer import Checks, checks_of
-from bowdenfit.questions.check.words import checks_page
+from bowdenfit.questions.check.answer import Checks, check_readings
+from bowdenfit.questions.check.words import describe_checks_alone
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_with_title, parse_page_width, warning_mark
 from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
@@ -74,7 +74,7 @@ class Fit(Record):
     @property
     def checks(self) -> Checks | None:
         """Every reading against its prediction from all the others, and what the priors do; None without draws."""
-        return checks_of(self)
+        return check_readings(self)
 
     @property
     def groups(self) -> Groups | None:
@@ -190,7 +190,7 @@ def collect_answers(fit: Record) -> dict[str, Any]:
 _WORDS: dict[type, Callable[..., str]] = {
     Record: summary_text,
     Verdict: verdict_text,
-    Checks: checks_page,
+    Checks: describe_checks_alone,
     ElasticAnswers: bends_text,
     Identifiability: identifiability_text,
     Efficiencies: lambda efficiencies: predictions_text(efficiencies.rows),

@@ -13,7 +13,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.model import build_model
 from bowdenfit.questions.bends.overview import describe_products_with_preload
-from bowdenfit.questions.check.data_set_words import warnings_of
+from bowdenfit.questions.check.data_set_words import collect_warnings
 from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended
@@ -111,13 +111,13 @@ def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_sma
     if case == "a single load":
         assert not any(estimates["stiffness"][0].identified for estimates in found)
     if warning is not None:
-        assert any(warning in said for said in warnings_of(data)), warnings_of(data)
+        assert any(warning in said for said in collect_warnings(data)), collect_warnings(data)
 
 
 def test_good_tables_leave_nothing_unidentified():
     found, data = estimates_of(("stretch",), stretched(LOADS, unloading=True), {}, seeds=(0,))
     assert all(estimate.identified for estimates in found for estimate, _ in estimates.values())
-    assert warnings_of(data) == []
+    assert collect_warnings(data) == []
 
 
 def test_the_summary_says_which_values_fit_as_well():
@@ -146,8 +146,8 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
 
 def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
     description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
-    data, _ = measured(description, 0, design=make_design(**FREE), once=True, **TRUTH)
-    assert any('model = "stretch"' in said for said in warnings_of(data))
+    data, _ = measured(description, 0, design=design_of(**FREE), once=True, **TRUTH)
+    assert any('model = "stretch"' in said for said in collect_warnings(data))
 
 
 def test_a_rival_counts_only_where_it_fits_as_well_and_lies_outside_the_error():

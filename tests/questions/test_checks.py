@@ -34,12 +34,10 @@ from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Norma
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check import answer as check_answer
 from bowdenfit.questions.check import checks_figure, prior_figure
-from bowdenfit.questions.check.answer import Checks, checks_of
+from bowdenfit.questions.check.answer import Checks, check_readings, find_influential_outliers
 from bowdenfit.questions.check.checks_figure import CheckedTable, checked_tables
-from bowdenfit.questions.check.prior_predictive import prior_predictive
-from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths, describe_prior_influence
-from bowdenfit.questions.check.suspects import find_influential_outliers
-from bowdenfit.questions.check.words import describe_checks
+from bowdenfit.questions.check.prior_predictive import predict_from_priors
+from bowdenfit.questions.check.words import describe_assumed_widths, describe_checks, describe_prior_influence
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.verdict import suggest_next_step
 from bowdenfit.results.record import Draws, Provenance, Record
@@ -275,7 +273,7 @@ def test_a_best_length_that_leaves_the_end_of_the_range_in_a_draw_that_thinning_
     at_the_end = np.full_like(fit.posterior.optimum["optimal_length"], 430.0)
     at_the_end[0, 1] = 431.0
     optimum = dict(fit.posterior.optimum) | {"optimal_length": at_the_end}
-    checks = checks_of(dataclasses.replace(fit, sampled=dataclasses.replace(fit.posterior, optimum=optimum)))
+    checks = check_readings(dataclasses.replace(fit, sampled=dataclasses.replace(fit.posterior, optimum=optimum)))
     assert [s.quantity for s in checks.sensitivities if s.quantity.startswith("optimal")] == ["optimal_efficiency"]
 
 
@@ -467,7 +465,7 @@ def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
     )
     (said,) = set(of_wrong) - set(of_right)
     assert "gives 4030 mm under 99 N more" in said
-    check_words(prior_figure.draw(prior_predictive(wrong)), "stretch in micrometers")
+    check_words(prior_figure.draw(predict_from_priors(wrong)), "stretch in micrometers")
 
 
 ROWS = 1024  # draws of a fit that are looked at in one go
@@ -495,7 +493,7 @@ class Checked:
             z.reshape(-1, ROWS, z.shape[1]), drawn["values"], {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
             {"z": Diagnostics(1.0, 500.0, 500.0, 0.0, 0.0)}, 1, 1, 0.5,
         )  # fmt: skip
-        return checks_of(Record(dataset, None, posterior, True, (), Provenance(seed, {})))
+        return check_readings(Record(dataset, None, posterior, True, (), Provenance(seed, {})))
 
     @staticmethod
     def implied(model):

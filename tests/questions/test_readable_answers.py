@@ -17,7 +17,7 @@ from bowdenfit.questions.calibrate.answer import QuantityLabel
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication
 from bowdenfit.questions.check import prior_figure
-from bowdenfit.questions.check.prior_predictive import prior_predictive
+from bowdenfit.questions.check.prior_predictive import predict_from_priors
 from bowdenfit.questions.compare.answer import ComparedParameter, Comparison
 from bowdenfit.questions.figure_files import write_figure
 from bowdenfit.questions.figures import FIGURES
@@ -133,7 +133,7 @@ def test_figures_of_answers_can_be_read(of):
 
 @pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-haptic-loop", "yarn-on-cylinder"])
 def test_the_figure_of_the_priors_can_be_read(name):
-    assert_answer_readable(prior_figure, prior_predictive(bf.read(ROOT / "datasets" / name), 1), NAME)
+    assert_answer_readable(prior_figure, predict_from_priors(bf.read(ROOT / "datasets" / name), 1), NAME)
 
 
 def test_no_figure_of_an_answer_is_left_out():
@@ -161,7 +161,7 @@ def test_each_figure_is_written_in_three_formats_beside_its_caption(tmp_path):
 @pytest.mark.parametrize("folder", SETS, ids=lambda path: path.name)
 def test_figures_of_answers_on_every_data_set_can_be_read(folder, tmp_path):
     fit = bf.fit(folder, output=tmp_path / "fit", seed=1, figures=False)
-    assert_answer_readable(prior_figure, prior_predictive(fit.dataset, 1), fit.name)
+    assert_answer_readable(prior_figure, predict_from_priors(fit.dataset, 1), fit.name)
     assert_answer_readable(FILES["identifiability_figure"], bf.identify(fit), fit.name)
     named = (
         () if has_candidates(fit) else ("efficiency@180deg", "efficiency@540deg")

@@ -1,1 +1,5 @@
-"""Do data set and fit make sense, reading by reading?"""
+"""Do data set and fit make sense, reading by reading? Functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -19,6 +19,7 @@ from bowdenfit.plots.style import (
     WIDE,
     in_paper_style,
 )
+from bowdenfit.questions import check as room
 from bowdenfit.words import capitalized, counted, percent
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ HEADING = "Leave-one-out check: every reading against its prediction from all ot
 ROW, LEAST_WIDTH = 1.35, 1.0  # in, of a panel
 MOST_NAMED = 3  # outliers of a panel that are named
 BACK = "Read on the way back"
-LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least
+LEAST_LIMIT = 3.2  # standard deviations that the axis shows at least: beyond these few of 1,000 healthy readings lie
 MOST_PLACES = 2  # that deviations are shown against
 NUMBER = "Number of the reading"  # what they are shown against where no place varies
 DASHES = (0, (4, 2))
@@ -49,7 +50,7 @@ class CheckedTable:
         decisive: Mask of influential readings.
         outlier: Whether it is an outlier.
         labels: Each in words.
-        at: Places in the predictions at which their distribution was looked at; empty of few readings.
+        at: Covariates in the predictions at which their distribution was looked at; empty of few readings.
         off, low, high: Share of readings up to there less what it should be, and the band of that.
         probability: Probability that it stays in the band.
     """
@@ -71,25 +72,22 @@ class CheckedTable:
 
 def data(fit: Record) -> tuple[CheckedTable, ...] | None:
     """Return the readings of every table; None without draws, or of a single reading, whose scatter shows nothing."""
-    from bowdenfit.questions.check.answer import checks_of
-
-    checks = checks_of(fit)
+    checks = room.check_readings(fit)
     return checked_tables(checks) if checks is not None and len(checks.readings) > 1 else None
 
 
 def checked_tables(checks: Checks) -> tuple[CheckedTable, ...]:
-    """The readings of each table as they are shown."""
-    return tuple(_checked(t, [r.outlier for r in checks.readings if r.table == t.table]) for t in checks.tables)
+    """Return the readings of each table as they are shown."""
+    return tuple(_show_table(t, [r.outlier for r in checks.readings if r.table == t.table]) for t in checks.tables)
 
 
-def _checked(table: TableChecks, outlier: list[bool]) -> CheckedTable:
-    from bowdenfit.kinds import find_readings
-
+def _show_table(table: TableChecks, outlier: list[bool]) -> CheckedTable:
+    """Return the readings of one table as they are shown."""
     uniformity, off, low, high = table.uniformity, *[np.zeros(0)] * 3
     if uniformity is not None:
         off, low, high = (part - uniformity.at for part in (uniformity.share, uniformity.low, uniformity.high))
     return CheckedTable(
-        find_readings(table.table).words,
+        table.words,
         table.z_score,
         dict(list(table.positions.numbers.items())[:MOST_PLACES]) or {NUMBER: np.arange(1.0, 1 + len(table.labels))},
         table.positions.group,

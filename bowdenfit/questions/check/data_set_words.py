@@ -1,22 +1,66 @@
-"""What `bowdenfit check` says: what was understood, and what the measurements cannot determine."""
+"""A data set that was checked, in words: what was understood, row by row, and what the measurements cannot determine."""
+
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
+from bowdenfit.files.row_account import RowAccount
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.tables import Measurements, StretchTable
-from bowdenfit.questions.check.copied import describe_copied_readings
-from bowdenfit.questions.check.row_words import describe_rows
+from bowdenfit.questions import check as room
+from bowdenfit.reading import Reading, read
+from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import counted, filled, kept_narrow, listed
+
+
+@dataclass(frozen=True, repr=False)
+class Report(Dataset):
+    """A data set that shows itself as `bowdenfit check` does; it can be fitted as it is."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about what the measurements cannot determine, as far as counting shows."""
+        return collect_warnings(self)
+
+    def __str__(self) -> str:
+        return describe_data_set(self).strip()
+
+
+def check_data_set(dataset: str | Path | Dataset, reading: Reading) -> Report:
+    """Read a data set, and build the model where only that can tell whether the description makes sense.
+
+    Loading JAX takes longer than everything else here, so the model is built only for names and priors that the
+    description alone cannot judge.
+
+    Args:
+        dataset: Folder, file, or data set.
+        reading: Keywords of `bowdenfit.read`.
+
+    Raises:
+        DescriptionError, DatasetError: What is wrong, in a sentence.
+    """
+    data = read(dataset, **reading)
+    description = data.description
+    if (
+        description.friction_model != "capstan"
+        or data.measurements.table(Recordings) is not None
+        or description.prior
+        or any(setting.prior for setting in description.friction.values())
+        or any(not name.startswith("mu") for name in description.coefficients)  # another parameter may be called that
+    ):
+        room.check_priors(data)
+    return Report(**vars(data))
 
 
 def describe_data_set(dataset: Dataset) -> str:
     """Describe what was understood of a data set."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [filled(f"Warning: {warning}") for warning in warnings_of(dataset)]
+    warnings = [filled(f"Warning: {warning}") for warning in collect_warnings(dataset)]
     state = f"{counted(len(warnings), 'warning')}, at the end." if warnings else "Nothing is wrong."
     lines = [description.name, "=" * len(description.name), f"Everything could be read. {state}", ""]
     if description.route:
@@ -69,7 +113,7 @@ def _groups_note(dataset: Dataset, coefficient: str) -> str:
     return f"; one for each of the groups {listed(order_groups(dataset.description, dataset.measurements))}"
 
 
-def warnings_of(dataset: Dataset) -> list[str]:
+def collect_warnings(dataset: Dataset) -> list[str]:
     """Return warnings about what the measurements cannot determine, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
     warnings = list(describe_copied_readings(dataset))
@@ -99,8 +143,19 @@ def warnings_of(dataset: Dataset) -> list[str]:
     return warnings
 
 
+def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
+    """Describe readings that were pasted twice or saved as another run, with a remedy; equal readings may be chance."""
+    copies = [sentence for kind, table in iterate_tables(dataset.measurements) for sentence in kind.copied_readings(table)]
+    return tuple(
+        f"{sentence[0].upper()}{sentence[1:]}. Measurements do not repeat themselves so exactly; the usual cause is a table "
+        "that was pasted or exported twice, or a run that was copied and not measured. Copies count as measurements, so that "
+        "intervals are too narrow: leave them out, or put in what was measured."
+        for sentence in copies
+    )
+
+
 def _count_conditions(measurements: Measurements) -> int:
-    """Number of different wrap-angle conditions under which force was measured."""
+    """Count the different wrap-angle conditions under which force was measured."""
     rows = []
     for kind, table in iterate_tables(measurements):
         if isinstance(kind, FrictionKind):
@@ -112,6 +167,7 @@ def _count_conditions(measurements: Measurements) -> int:
 
 
 def _describe_angle_source(contact: Contact, description: Description) -> str:
+    """Describe what gives the wrap angle of a contact."""
     source = contact.wrap_angle
     if source.constant is not None:
         sd = f" ± {source.sd:g}" if source.sd else ""
@@ -128,6 +184,7 @@ def _describe_angle_source(contact: Contact, description: Description) -> str:
 
 
 def _describe_setting(setting: FrictionSetting | None) -> str:
+    """Describe what the description says of a friction coefficient."""
     if setting is None:
         return "free, default prior"
     if setting.fixed is not None:
@@ -135,3 +192,38 @@ def _describe_setting(setting: FrictionSetting | None) -> str:
     if setting.measured is not None:
         return f"measured separately, {setting.measured.value:g} ± {setting.measured.sd:g}"
     return f"free, prior {setting.prior.model_dump(exclude_none=True)}" if setting.prior else "free"
+
+
+def describe_rows(dataset: Dataset) -> list[str]:
+    """Describe which rows of every file of a data set were read."""
+    accounts = [line for account in dataset.accounts for line in describe_row_account(account, account.file)]
+    return [*describe_first_and_last_rows(dataset), *accounts]
+
+
+def describe_row_account(account: RowAccount, file: str = "") -> list[str]:
+    """Describe how many rows were read, and every row that was not, with the reason.
+
+    Args:
+        account: Row account of a file.
+        file: Its name, where there are several.
+    """
+    over = f", headings in row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"
+    before = f"{file}: of" if file else "Of"
+    held = "holds a reading" if account.read == 1 else "hold readings"
+    lines = [f"{before} {account.rows} rows {account.read} {held}{over if account.headings else ''}."]
+    unused = [row.words for row in account.left_out] + [account.beside_in_words] * bool(account.beside)
+    return [*map(kept_narrow, lines), *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
+
+
+def describe_first_and_last_rows(data: Dataset) -> list[str]:
+    """Describe the first and the last row of each table as understood."""
+    lines = []
+    for kind, table in iterate_tables(data.measurements):
+        page = kind.file_rows(table, data.description)
+        if page is None:
+            continue
+        heads, rows = page
+        for which, i in (("First", 0), ("Last", -1)):
+            cells = ", ".join(f"{head} {cell}" for head, cell in zip(heads, rows[i], strict=True) if cell)
+            lines.append(filled(f"{which} row, {table.origin.describe_row(i)}: {cells}."))
+    return lines

@@ -1,22 +1,35 @@
-"""Lack of fit in sentences with a remedy: residuals that depend on where, when or how readings were taken."""
+"""Lack of fit in sentences with a remedy: residuals that depend on where, when or how readings were taken.
+
+Where a curve does not follow the wrap angles, the other curve families are tried.
+"""
 
 from collections.abc import Sequence
 
+import jax
+import numpy as np
+from scipy.special import bdtrc
+
 from bowdenfit.cable.registry import CURVES
 from bowdenfit.cable.sensors import DELAY_ERROR
+from bowdenfit.dataset import Dataset
 from bowdenfit.description import BY_GROUP
 from bowdenfit.inference.lack_of_fit import FALSE_ALARM, Departure
+from bowdenfit.inference.least_squares import fit_least_squares
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
+from bowdenfit.model import build_model
 from bowdenfit.parameters.priors import Normal
-from bowdenfit.questions.check.answer import Checks, checks_of
+from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import few, listed, significant
 
-_MAX_NAMED = 3  # departures that are said
-_INTERVAL = 0.9
-_MAX_DELAY_ERRORS = 6.0  # standard errors of a delay, which are right to a third
+_MAX_NAMED = 3  # departures, or readings, that are named
+_INTERVAL = 0.9  # probability of the intervals that readings are counted in
+_MAX_DELAY_ERRORS = 6.0  # standard errors of a delay; a judgement, as these errors are right to a third
 
 
 @cached_per_fit
@@ -24,11 +37,9 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
     """Describe readings that the model does not describe, the clearest first; no sentences where all is chance."""
     clear = [departure for departure in fit.least_squares.departures if departure.is_noticeable]
     departures: dict[tuple[str, str], Departure] = {}
-    for (
-        departure
-    ) in clear:  # the same place may have been asked about in two ways, and inside runs as well as between them
+    for departure in clear:  # one place may have been tested in two ways, and inside runs as well as between them
         departures.setdefault((departure.table, departure.group or departure.against), departure)
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     sentences = tuple(_describe_departure(fit, departure) for departure in list(departures.values())[:_MAX_NAMED])
     noise = fit.dataset.description.noise
     return (
@@ -40,7 +51,7 @@ def describe_lack_of_fit(fit: Record) -> tuple[str, ...]:
 
 
 def _describe_delay(fit: Record) -> tuple[str, ...]:
-    """A delay of the output channel that sliding wants far from where the reversals put it.
+    """Describe a delay of the output channel that sliding puts far from where the reversals put it.
 
     Friction and delay are told apart by how fast the force changes, and so is much that is neither.
     """
@@ -62,14 +73,15 @@ def _describe_delay(fit: Record) -> tuple[str, ...]:
 
 
 def _describe_far_readings(fit: Record, noise: str) -> tuple[str, ...]:
-    """Readings far out of least squares, where nothing was sampled; draws judge them better."""
+    """Describe readings far out of least squares, where nothing was sampled; draws judge them better."""
     far = fit.least_squares.far_readings
     if not far or fit.sampled is not None or noise == "student":
         return ()
-    return (_far_reading_sentence([describe_reading(each.table, each.label) for each in far]),)
+    return (_far_reading_sentence([describe_reading(reading.table, reading.label) for reading in far]),)
 
 
 def _far_reading_sentence(names: Sequence[str]) -> str:
+    """Return the sentence about readings far outside what chance does."""
     return (
         f"The model does not describe {few(names, _MAX_NAMED)}: so far out that chance does it in less than one healthy "
         f"fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, "
@@ -174,8 +186,6 @@ def _suggest_friction(model: str, options: tuple[str, ...], otherwise: str) -> s
 
 def _suggest_curve(fit: Record, column: str) -> str:
     """Suggest the curve families that do fit the angles of a column."""
-    from bowdenfit.questions.check.other_curves import curve_family_fits  # what loads JAX is loaded where it is needed
-
     contacts = fit.dataset.description.contact
     number, contact = next((i, c) for i, c in enumerate(contacts) if c.wrap_angle.column == column)
     fitting = [
@@ -192,18 +202,16 @@ def _suggest_curve(fit: Record, column: str) -> str:
 
 
 def _describe_scatter(checks: Checks, noise: str) -> tuple[str, ...]:
-    """Readings that lie outside what the fit says of them more often, or farther, than chance does.
+    """Describe readings that lie outside their intervals more often, or farther, than by chance.
 
     With Student noise a few readings may lie anywhere, which is what it is for.
     """
-    from scipy.special import bdtrc
-
     sentences = []
     for table in checks.tables:
         outside = table.measured - table.in_interval
         if outside and bdtrc(outside - 1, table.measured, 1 - _INTERVAL) * len(checks.tables) < FALSE_ALARM:
             sentences.append(
-                f"The model does not describe {find_readings(table.table).words}: {outside} of {table.measured} lie outside "
+                f"The model does not describe {table.words}: {outside} of {table.measured} lie outside "
                 "their 90 % intervals. The usual causes are a unit or a column that is not what its heading says, labels of "
                 "runs that belong to several mountings, and noise that was stated too small."
             )
@@ -212,3 +220,26 @@ def _describe_scatter(checks: Checks, noise: str) -> tuple[str, ...]:
     if far and noise == "normal":
         sentences.append(_far_reading_sentence([describe_reading(r.table, r.label) for r in far]))
     return tuple(sentences)
+
+
+def curve_family_fits(dataset: Dataset, number: int, family: str) -> bool:
+    """Return whether curves of another family follow the angles of a contact.
+
+    Args:
+        dataset: The data set.
+        number: Number of the contact, from 0.
+        family: The other family.
+    """
+    description = dataset.description
+    contacts = list(description.contact)
+    angle = contacts[number].wrap_angle
+    contacts[number] = contacts[number].model_copy(update={"wrap_angle": angle.model_copy(update={"curve": family})})
+    changed = description.model_copy(update={"contact": tuple(contacts)})
+    table = dataset.measurements.table(AngleTable)
+    with jax.enable_x64(True):
+        posterior = LogDensity(build_model(Dataset(changed, Measurements((table,) if table else (), ()), {})))
+        fit = fit_least_squares(
+            posterior, make_objective(posterior), np.zeros(posterior.model.space.size), intervals=False
+        )
+    departures = [departure for departure in fit.departures if departure.group == angle.column]
+    return bool(departures) and all(departure.p_value >= FALSE_ALARM for departure in departures)

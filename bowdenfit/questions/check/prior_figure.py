@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,6 @@ from bowdenfit.words import capitalized, counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.check.prior_predictive import PriorPredictive, PriorTable
 
 HEADING = "Prior predictive check: readings that the priors allow"
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
@@ -33,6 +33,52 @@ WITHIN, WIDE_RANGE = (
 )  # of the axis, that counts as one place; times the readings, beyond which scales are wide
 _GROUP_MARKERS = SERIES_MARKERS[1:]  # the first is of tables without groups
 SHIFT = 0.006  # of the axis, between contacts whose readings would hide each other
+
+
+@dataclass(frozen=True)
+class PriorTable:
+    """Readings of one table beside their prior predictive quantiles.
+
+    Args:
+        name: What they are, in words.
+        label: Axis label of the readings.
+        numbers: Where they were taken, the first that varies.
+        place: Its axis label.
+        group: Contact or the like of each reading.
+        labels: Each reading in words.
+        reading: As measured; NaN of readings that are only a bound.
+        quantiles: 0.5 %, 5 %, 50 %, 95 % and 99.5 % quantiles (first axis) of readings by the priors.
+        outside: Whether each reading lies outside the widest of these intervals.
+    """
+
+    name: str
+    label: str
+    numbers: np.ndarray
+    place: str
+    group: tuple[str, ...]
+    labels: tuple[str, ...]
+    reading: np.ndarray
+    quantiles: np.ndarray
+    outside: np.ndarray
+
+
+@dataclass(frozen=True)
+class PriorPredictive:
+    """Prior predictive readings and efficiencies of a cable.
+
+    Args:
+        name: Name of the cable.
+        tables: By table.
+        route_label: Axis label of the route; empty without one.
+        route: Route values of the curve.
+        efficiency: Quantiles (first axis, as in `PriorTable`) of the efficiency there; empty without a route.
+    """
+
+    name: str
+    tables: tuple[PriorTable, ...]
+    route_label: str = ""
+    route: np.ndarray | None = None
+    efficiency: np.ndarray | None = None
 
 
 def caption(data: PriorPredictive) -> str:

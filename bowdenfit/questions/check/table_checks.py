@@ -4,16 +4,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import stdtr
 
 from bowdenfit.display import Part
 from bowdenfit.inference.predictive_checks import LooPredictive, Uniformity
 from bowdenfit.inference.psis import RELIABLE_K
+from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.covariates import Covariates
 
-_MIN_DEGREES_OF_FREEDOM = (
-    5  # of the tails of a prediction by few readings, where priors tell something of the scatter too
-)
-FALSE_ALARM = 0.01  # probability that a healthy fit is said to have an outlier; the same for the other kinds of alarm
+_MIN_DEGREES_OF_FREEDOM = 5  # for the tails of a prediction by few readings; a judgement: priors limit the scatter too
+FALSE_ALARM = 0.01  # chosen: share of healthy fits that are said to have an outlier; the same for the other alarms
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,6 +105,11 @@ class TableChecks(Part):
     )
 
     @property
+    def words(self) -> str:
+        """The readings in words, such as "efficiencies"."""
+        return find_readings(self.table).words
+
+    @property
     def z_score(self) -> np.ndarray:
         """Deviations from the predictions in their standard deviations; NaN of a bound, 0 where there is none."""
         deviation = np.asarray(self.reading - self.predicted.mean, dtype=float)
@@ -125,8 +130,6 @@ class TableChecks(Part):
         degrees of freedom are those of a scatter found from the other readings of the table, because a prediction by few
         readings has longer tails than a normal one: without them a healthy reading at 3.8 sds of twenty is an outlier.
         """
-        from scipy.special import stdtr
-
         dof = max(self.measured - 2, _MIN_DEGREES_OF_FREEDOM)
         t = np.abs(np.nan_to_num(self.z_score)) * np.sqrt(dof / (dof - 2))  # z is in sds of the prediction
         unreliable = self.influential & ~self.refitted

@@ -193,7 +193,7 @@ def phase_spans(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
 
 
 def after_gaps(time: np.ndarray) -> np.ndarray:
-    """Places of the first block after each stretch without any."""
+    """Covariates of the first block after each stretch without any."""
     steps = np.diff(time)
     return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
 

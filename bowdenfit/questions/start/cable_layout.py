@@ -309,7 +309,7 @@ def _ask_coefficients(layout: CableLayout, asker: Asker) -> None:
     if len(layout.contacts) == 1:
         layout.contacts[0]["friction"] = "mu"
         return
-    asker.say("Places of the same materials may share a coefficient of friction; they then have the same name here.")
+    asker.say("Covariates of the same materials may share a coefficient of friction; they then have the same name here.")
     for i, contact in enumerate(layout.contacts, start=1):
         words = f"What is the coefficient of friction at {shown(contact['name'])} called?"
         contact["friction"] = asker.ask(coefficient_name_question(words, f"mu{i}", layout.columns))

@@ -8,7 +8,7 @@ from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.overview import elastic_overview
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
@@ -59,13 +59,13 @@ def summary_sentences(fit: Record) -> list[str]:
 
 def checked_readings(fit: Record) -> tuple[CheckedReading, ...]:
     """Every reading beside what all the others say of it; none without draws."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     return checks.readings if checks else ()
 
 
 def outlying_readings(fit: Record) -> Sequence[CheckedReading]:
     """Readings that lie farther from what all the others say than chance puts one, the farthest first."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     return checks.outliers if checks else ()
 
 

@@ -11,7 +11,7 @@ from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
@@ -63,7 +63,7 @@ def details_text(fit: Record) -> str:
         _mounting_scatter_block(fit, page),
         _recordings_block(fit),
         _measured_block(fit, page),
-        describe_checks(checks_of(fit)),
+        describe_checks(check_readings(fit)),
         _friction_model_block(fit),
         describe_elastic(fit),
         loss_text(fit),

@@ -7,7 +7,7 @@ from typing import Any
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.terms import find_term_kind
 from bowdenfit.pages.section import PageSection
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.results.serialization import values_by_key
@@ -115,7 +115,7 @@ def _inference_sentences(fit: Record) -> str:
 
 def _refitted_phrase(fit: Record) -> str:
     """What more was done for readings of which the weights cannot tell."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     n = sum(int(table.refitted.sum()) for table in checks.tables) if checks else 0
     return f", {n} of them against that of a fit without it" if n else ""
 

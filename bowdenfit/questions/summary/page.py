@@ -14,7 +14,7 @@ from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.recordings.kind import list_preparations
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.overview import elastic_overview
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
@@ -88,7 +88,7 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["elastic"] = elastic
     if groups := contrast_groups(fit):
         page["groups"] = groups
-    if checks := checks_of(fit):
+    if checks := check_readings(fit):
         page["checks"] = checks
     if (loss := loss_by_contact(fit)) is not None:
         page["loss"] = loss

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
-from bowdenfit.questions.check.answer import checks_of
+from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.next.words import TITLE
@@ -79,7 +79,7 @@ def checks_section(fit: Record) -> PageSection | None:
     heading = "All readings" if len(readings) <= _MOST_READINGS else f"The first {_MOST_READINGS} of {len(readings)} readings"
     folded: list[tuple[str, str | PageTable]] = [
         (f"{heading} beside what all the others say of each", all_readings),
-        ("What the checks say, with their numbers", describe_checks(checks_of(fit))),
+        ("What the checks say, with their numbers", describe_checks(check_readings(fit))),
     ]
     return prose_section("Checks", [say_no_outliers(readings) if not outliers else ""], [outlier_table], folded=folded)
 

@@ -6,14 +6,16 @@ from typing import Any
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
-from bowdenfit.questions.check.answer import checks_of
-from bowdenfit.questions.check.copied import describe_copied_readings
-from bowdenfit.questions.check.impossible import describe_implausible_friction, describe_impossible_efficiencies
+from bowdenfit.questions.check.answer import check_readings
+from bowdenfit.questions.check.data_set_words import describe_copied_readings
+from bowdenfit.questions.check.implausible_readings import (
+    describe_coarse_readings,
+    describe_implausible_friction,
+    describe_impossible_efficiencies,
+)
 from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
-from bowdenfit.questions.check.sensitivity_words import describe_assumed_widths
 from bowdenfit.questions.check.table_checks import CheckedReading
-from bowdenfit.questions.check.too_coarse import describe_coarse_readings
-from bowdenfit.questions.check.words import describe_misfits
+from bowdenfit.questions.check.words import describe_assumed_widths, describe_misfits
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates
@@ -101,7 +103,7 @@ def assess_fit(fit: Record) -> Verdict:
 
 def _doubts(fit: Record) -> tuple[str, ...]:
     """Readings that lie far off, and tables that scatter otherwise than the fit says."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     if checks is None:
         return ()
     outliers = [describe_reading(reading.table, reading.label) for reading in checks.outliers]
@@ -156,7 +158,7 @@ def _trusted_sentence(fit_verdict: Verdict) -> str:
 
 def suggest_next_step(fit: Record) -> str:
     """What to do next with a fit that may be trusted; empty where there is nothing."""
-    checks, outliers = checks_of(fit), outlying_readings(fit)
+    checks, outliers = check_readings(fit), outlying_readings(fit)
     if checks is None:
         return ""
     if outliers:
@@ -178,7 +180,7 @@ def _reading_name(reading: CheckedReading) -> str:
 
 def interval_width_caveat(fit: Record) -> str:
     """That few readings leave it to a prior how wide intervals are; empty where they do not."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     return describe_assumed_widths(checks) if checks else ""
 
 
@@ -200,7 +202,7 @@ def _correlation_sentence(fit: Record) -> str:
 
 def _prior_conflict_sentence(fit: Record) -> str:
     """Parameters about which readings and prior contradict each other."""
-    checks = checks_of(fit)
+    checks = check_readings(fit)
     pulled = [s.parameter for s in checks.conflicts] if checks else []
     names = dict.fromkeys(pulled + [f.parameter for f in checks.prior_conflicts] if checks else [])
     return f"The readings contradict what was assumed of {listed(list(names))} beforehand; check its unit." if names else ""

@@ -1,17 +1,18 @@
-"""Efficiencies that no rope can have, and friction that no sheath has, in sentences for the verdict."""
+"""Readings that cannot be right, in sentences: impossible efficiencies, implausible friction, too coarse readings."""
 
 import numpy as np
 
 from bowdenfit.description import PriorDefaults
-from bowdenfit.kinds import find_readings
-from bowdenfit.kinds.plausibility import GAIN_ERROR
+from bowdenfit.kinds import find_kind, find_readings, iterate_tables
+from bowdenfit.kinds.plausibility import GAIN_ERROR, CoarseReadings
 from bowdenfit.kinds.term import Term
 from bowdenfit.parameters.priors import LogNormal
 from bowdenfit.results.record import Record
 from bowdenfit.words import few, percent
 
-_MAX_DEVIATIONS = 4.5  # of noise above what is possible, which one healthy reading of 300,000 exceeds
-_LEAST, _MOST = 0.015, 1.0  # coefficients outside which a mistake is likelier than such a rope
+_MAX_DEVIATIONS = 4.5  # standard deviations of noise above what is possible; 1 healthy reading of 300,000 exceeds them
+_LEAST, _MOST = 0.015, 1.0  # coefficients; a judgement: outside them a mistake is likelier than such a rope
+_SHARE = 0.5  # of what the last digit leaves open, below which an interval is too narrow; a judgement
 
 
 def describe_impossible_efficiencies(fit: Record) -> str:
@@ -21,9 +22,9 @@ def describe_impossible_efficiencies(fit: Record) -> str:
         called = find_readings(term.name)
         if not called.are_efficiencies:
             continue
-        measured, predicted = term.observed(), _predicted(fit, term)
+        measured, predicted = term.observed(), _predicted_readings(fit, term)
         above = np.log(measured / np.maximum(predicted, 1.0))  # offsets and gains of the cells may show more than 1
-        beyond = np.flatnonzero(above > GAIN_ERROR + _MAX_DEVIATIONS * _noise(fit, term))
+        beyond = np.flatnonzero(above > GAIN_ERROR + _MAX_DEVIATIONS * _noise_in_log(fit, term))
         impossible += [f"{called.one.format(term.labels[i])} {percent(measured[i])}" for i in beyond]
     if not impossible:
         return ""
@@ -66,14 +67,15 @@ def describe_implausible_friction(fit: Record) -> str:
     )
 
 
-def _predicted(fit: Record, term: Term) -> np.ndarray:
+def _predicted_readings(fit: Record, term: Term) -> np.ndarray:
+    """Return the expected readings of a term: medians of the draws, or least squares without draws."""
     if fit.sampled is None:
         return fit.least_squares.readings[term.name]
     return np.asarray(np.median(fit.posterior.expected[term.name], axis=(0, 1)))
 
 
-def _noise(fit: Record, term: Term) -> np.ndarray | float:
-    """What noise of the forces adds to the log of each reading; a mounting cannot take friction below none."""
+def _noise_in_log(fit: Record, term: Term) -> np.ndarray | float:
+    """Return what noise of the forces adds to the log of each reading; a mounting cannot take friction below none."""
     weight, noise = term.data.get("run_weight"), getattr(term, "reading_noise", "")
     if weight is None:
         return np.asarray(term.data.get("log_sd", 0.0))
@@ -86,3 +88,48 @@ def _noise(fit: Record, term: Term) -> np.ndarray | float:
         cells = np.asarray(term.data["weight"])
         value = float(np.sqrt(np.sum(term.data["scatter"]) / max(np.sum(term.data["n"]) - np.sum(cells > 0), 1.0)))
     return np.asarray(value / np.sqrt(weight))
+
+
+def describe_coarse_readings(fit: Record) -> tuple[str, ...]:
+    """Describe tables whose repeated readings are equal to the last digit while intervals are narrower than that digit allows.
+
+    The average of independent errors of rounding in so many different readings, spread over the coefficients, is what the fit
+    must leave open of the readings that it expects; without draws nothing is said.
+    """
+    if fit.sampled is None:
+        return ()
+    coefficients = sum(p.role == "friction" for p in fit.model.space.free)
+    sentences = []
+    for kind, table in iterate_tables(fit.dataset.measurements):
+        coarse = kind.coarse_readings(table)
+        terms = [term for term in fit.model.terms if find_kind(term.name) is kind and term.name in fit.posterior.expected]
+        if coarse is None or not terms:
+            continue
+        left_open = coarse.log_sd * np.sqrt(min(coefficients / coarse.different, 1.0))
+        if all(_log_sd(fit, term) < _SHARE * left_open for term in terms):
+            sentences.append(_coarse_sentence(coarse, terms[0]))
+    return tuple(sentences)
+
+
+def _log_sd(fit: Record, term: Term) -> float:
+    """Return the standard deviation of log expected readings, averaged over them; infinite where logarithms do not exist."""
+    expected = fit.posterior.expected[term.name].reshape(-1, len(term.labels))
+    if not np.all(expected > 0):
+        return float("inf")
+    return float(np.sqrt(np.mean(np.var(np.log(expected), axis=0))))
+
+
+def _coarse_sentence(coarse: CoarseReadings, term: Term) -> str:
+    """Return the sentence about readings that are too coarse, with a remedy."""
+    noise = getattr(term, "reading_noise", "")
+    stated = (
+        f"[prior.{noise}] fixed = {coarse.sd:.2g} in cable.toml"
+        if noise
+        else f"a column efficiency_sd with {coarse.sd:.2g}"
+    )
+    return (
+        f"Whatever was read more than once in {coarse.file} is alike to the last digit, {coarse.last_digit}, and does not show "
+        "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
+        f"{percent(np.sqrt(3) * coarse.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
+        f"it may be off: {stated}."
+    )

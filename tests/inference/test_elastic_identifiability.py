@@ -12,7 +12,7 @@ from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.model import build_model
-from bowdenfit.questions.bends.overview import describe_products_with_preload
+from bowdenfit.questions.bends.words import describe_products_with_preload
 from bowdenfit.questions.check.data_set_words import collect_warnings
 from bowdenfit.questions.summary.details import details_text
 
@@ -146,7 +146,7 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
 
 def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
     description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
-    data, _ = measured(description, 0, design=design_of(**FREE), once=True, **TRUTH)
+    data, _ = measured(description, 0, design=make_design(**FREE), once=True, **TRUTH)
     assert any('model = "stretch"' in said for said in collect_warnings(data))
 
 

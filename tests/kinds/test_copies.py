@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.plausibility import Compared, copies
+from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies
 from bowdenfit.questions.check.data_set_words import describe_copied_readings, describe_data_set
 from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.verdict import COPIED

@@ -9,8 +9,8 @@ from bowdenfit.description.device import read_device
 from bowdenfit.device.plant import draw_device
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.ringdown.kind import RingDownTable
-from bowdenfit.questions.bends import ring_down
-from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.bends import device_loop
+from bowdenfit.questions.bends.device_loop import read_device_with_ring_down
 
 pytestmark = pytest.mark.extended
 
@@ -50,7 +50,7 @@ def named(monkeypatch):
 
     def put(found):
         asked = []
-        monkeypatch.setattr(ring_down, "load", lambda folder: asked.append(folder) or found)
+        monkeypatch.setattr(device_loop, "load", lambda folder: asked.append(folder) or found)
         return asked
 
     return put
@@ -58,7 +58,7 @@ def named(monkeypatch):
 
 def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_path, named):
     asked = named(Fitted())
-    found = device_with_ring_down(Fitted(rings=False), device(tmp_path))
+    found = read_device_with_ring_down(Fitted(rings=False), device(tmp_path))
     assert asked == [tmp_path / "../bar"], "as seen from device.toml"
     keys = "rope.damping", "joint.damping"
     rope, joint = draw_device(found.needed("an answer", *keys), 40_000, 7).values()
@@ -70,10 +70,10 @@ def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_
 
 def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(tmp_path):
     path = device(tmp_path, "mounting", ('inertia = { value = 1e-3, unit = "kg*m^2", sd = 0.1e-3 }\n', ""))
-    found = device_with_ring_down(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
+    found = read_device_with_ring_down(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
     draws = draw_device(found, 5000, 1)
     np.testing.assert_allclose(draws["joint.inertia"], 1e-3 + 0.02 * (draws["rope.damping"] + draws["joint.damping"]))
-    assert device_with_ring_down(Fitted(rings=False), DEVICE) == read_device(DEVICE)
+    assert read_device_with_ring_down(Fitted(rings=False), DEVICE) == read_device(DEVICE)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
 def test_what_a_ring_down_cannot_tell_is_refused(tmp_path, named, own, other, change, says):
     named(other)
     with pytest.raises(DescriptionError, match=says):
-        device_with_ring_down(Fitted(rings=own), device(tmp_path, **change))
+        read_device_with_ring_down(Fitted(rings=own), device(tmp_path, **change))
 
 
 def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):
@@ -98,7 +98,7 @@ def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):
     doubtful.converged, doubtful.reasons = False, ("R-hat is 1.7",)
     named(doubtful)
     with pytest.raises(DescriptionError, match=r"not to be trusted \(R-hat is 1.7\); sample longer"):
-        device_with_ring_down(Fitted(rings=False), device(tmp_path))
+        read_device_with_ring_down(Fitted(rings=False), device(tmp_path))
 
 
 def test_where_nothing_tells_it_a_ring_down_is_the_remedy(tmp_path):

@@ -13,7 +13,7 @@ import bowdenfit as bf
 from bowdenfit.description.device import read_device
 from bowdenfit.device.limits import moves_by_itself
 from bowdenfit.errors import DescriptionError, UsageError
-from bowdenfit.questions.bends.loop_draws import loop_draws
+from bowdenfit.questions.bends.device_loop import draw_loop
 from bowdenfit.questions.compensate import compensation_figure, compensation_traces_figure, simulation
 from bowdenfit.questions.compensate.limits import estimate_compensation
 from bowdenfit.questions.compensate.words import compensation_text
@@ -70,7 +70,7 @@ def test_parameters_of_a_controller_hold_what_may_be_compensated(fit, tmp_path):
 
 def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, found):
     bends = np.deg2rad([bend.wrap_angle for bend in found.by_bend])
-    draws = loop_draws(fit, bends, read_device(DEVICE), np.ones(1))
+    draws = draw_loop(fit, bends, read_device(DEVICE), np.ones(1))
     motor = 0.01 + 2e-3 * 0.8 + 0.0022 * np.random.default_rng(1).standard_normal((len(draws.friction), 1))
     for fed in ([bend.scheduled for bend in found.by_bend], [found.fixed.torque] * len(bends)):
         risk = np.mean(np.any(moves_by_itself(np.array(fed), draws.friction, motor, 1.0), axis=1))
@@ -158,7 +158,7 @@ def test_less_preload_is_felt_less_until_a_side_is_slack(found):
 def test_springs_make_the_cable_softer(fit, tmp_path):
     bends = np.deg2rad([90.0, 180.0])
     sprung = device(tmp_path, "[rope] ", '[rope]\nspring = { value = 5, unit = "N/mm", sd = 1e-9 }\n#')
-    stiff, soft = (loop_draws(fit, bends, read_device(path), np.ones(1)).stiffness for path in (DEVICE, sprung))
+    stiff, soft = (draw_loop(fit, bends, read_device(path), np.ones(1)).stiffness for path in (DEVICE, sprung))
     np.testing.assert_allclose(1 / soft, 1 / stiff + 1 / (2 * 5e3 * 0.02**2), rtol=1e-6)
 
 

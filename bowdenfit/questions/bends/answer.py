@@ -19,11 +19,13 @@ from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import stiffness_with_springs
-from bowdenfit.questions.bends.equations import BentCable, bending_contact, has_preload, has_stretch
+from bowdenfit.questions.bends.bent_cable import BentCable, bending_contact, has_preload, has_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadWindow
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 
-_WINDOW_BENDS = 25  # wrap angles across a range of bends, on which extremes are searched
+_WINDOW_BENDS = (
+    25  # wrap angles across a range of bends on which extremes are searched; between them answers are smooth
+)
 _MAX_BENDS = 5  # wrap angles shown in a summary
 _QUANTILES = 0.5, 0.05, 0.95
 _UNITS = {
@@ -102,26 +104,26 @@ class ElasticAnswers(Display):
     def efficiency(
         self, wrap_angles: np.ndarray, input_force: float | None = None, preload: float | None = None
     ) -> np.ndarray:
-        """Efficiency [1] of every draw (rows) at wrap angles (columns)."""
+        """Return the efficiency [1] of every draw (rows) at wrap angles (columns)."""
         force = self.reference_force if input_force is None else input_force
         return self.output_force(wrap_angles, force, 1, preload) / force
 
     def output_force(
         self, wrap_angles: np.ndarray, input_force: float, stroke: int = 1, preload: float | None = None
     ) -> np.ndarray:
-        """Output force [N] of every draw (rows) at wrap angles (columns)."""
+        """Return the output force [N] of every draw (rows) at wrap angles (columns)."""
         bent, force = self.bend_to(wrap_angles), float(input_force)
         return self.evaluate(lambda values: bent.output_force(values, jnp.asarray(force), float(stroke), preload))
 
     def input_force(
         self, wrap_angles: np.ndarray, output_force: float, stroke: int = 1, preload: float | None = None
     ) -> np.ndarray:
-        """Input force [N] that gives an output force, of every draw (rows) at wrap angles (columns)."""
+        """Return the input force [N] that gives an output force, of every draw (rows) at wrap angles (columns)."""
         bent, force = self.bend_to(wrap_angles), float(output_force)
         return self.evaluate(lambda values: bent.input_force(values, jnp.asarray(force), float(stroke), preload))
 
     def friction(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
-        """Force felt in free motion [N], draws by wrap angles.
+        """Return the force felt in free motion [N], draws by wrap angles.
 
         Raises:
             UsageError: The cable has no preload, and none is stated.
@@ -131,7 +133,7 @@ class ElasticAnswers(Display):
         return self.evaluate(lambda values: bent.friction(values, preload))
 
     def preload(self, wrap_angles: np.ndarray, preload: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Preload [N] and slack [mm], draws by wrap angles.
+        """Return preload [N] and slack [mm], draws by wrap angles.
 
         Raises:
             UsageError: The cable has no preload, and none is stated.
@@ -141,7 +143,7 @@ class ElasticAnswers(Display):
         return self.evaluate(lambda values: bent.preload(values, preload))
 
     def slack_load(self, wrap_angles: np.ndarray, preload: float | None = None) -> np.ndarray:
-        """Input force at which the return side of a loop goes slack [N], draws by wrap angles.
+        """Return the input force at which the return side of a loop goes slack [N], draws by wrap angles.
 
         Raises:
             UsageError: The cable has no preload, and none is stated.
@@ -153,7 +155,7 @@ class ElasticAnswers(Display):
     def position(
         self, wrap_angles: np.ndarray, input_force: float, preload: float | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Position error and lost motion at the load side [mm], stated backlash included, draws by wrap angles.
+        """Return position error and lost motion at the load side [mm], stated backlash included, draws by wrap angles.
 
         Raises:
             UsageError: Nothing says how the rope stretches.
@@ -164,7 +166,7 @@ class ElasticAnswers(Display):
         return error + self._backlash, lost + self._backlash
 
     def tension(self, extensions: np.ndarray) -> np.ndarray:
-        """Tension [N] of the rope from its extension [mm], draws by extensions; 0 where it is slack.
+        """Return the tension [N] of the rope from its extension [mm], draws by extensions; 0 where it is slack.
 
         Raises:
             UsageError: Nothing says how the rope stretches.
@@ -176,7 +178,7 @@ class ElasticAnswers(Display):
     def stiffness(
         self, wrap_angles: np.ndarray, load: float, preload: float | None = None, spring: float | None = None
     ) -> np.ndarray:
-        """Stiffness seen at the load side [N/mm], draws by wrap angles.
+        """Return the stiffness seen at the load side [N/mm], draws by wrap angles.
 
         Args:
             wrap_angles: Wrap angles [rad].
@@ -200,7 +202,7 @@ class ElasticAnswers(Display):
         return self.evaluate(answer)
 
     def dynamic_range(self, wrap_angles: np.ndarray, largest_force: float, preload: float | None = None) -> np.ndarray:
-        """Largest force over what moving the unloaded loop takes [1], draws by wrap angles.
+        """Return the largest force over what moving the unloaded loop takes [1], draws by wrap angles.
 
         Raises:
             UsageError: The cable has no preload, and none is stated.
@@ -214,7 +216,7 @@ class ElasticAnswers(Display):
     def preload_window(
         self, bends: tuple[float, float], input_force: float = 0.0, friction: float | None = None
     ) -> PreloadWindow:
-        """Lowest preload without slack over a range of bends, highest for a given friction, and the best.
+        """Return the lowest preload without slack over a range of bends, the highest for a given friction, and the best.
 
         Args:
             bends: Lowest and highest wrap angle [rad].
@@ -300,15 +302,18 @@ class ElasticAnswers(Display):
         return angles, self._add_backlash(draws), self._window(ends, window_force, np.inf, lowest, lowest, lowest)
 
     def _add_backlash(self, draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Add the stated backlash to position error and lost motion."""
         shifted = {name: draws[name] + self._backlash for name in ("position_error", "lost_motion") if name in draws}
         return draws | shifted
 
     @property
     def _backlash(self) -> float:
+        """Stated backlash [mm]; 0 without one."""
         stated = self.fit.dataset.description.cable.backlash
         return stated.to("length") if stated is not None else 0.0
 
     def _require_preload(self, stated: float | None) -> None:
+        """Refuse a cable without preload where none is stated."""
         if stated is None and not has_preload(self.fit.model):
             raise UsageError(
                 "nothing measured on this cable says what its preload is; state one with --preload 20N, or add a table of "
@@ -316,6 +321,7 @@ class ElasticAnswers(Display):
             )
 
     def _require_stretch(self) -> None:
+        """Refuse a cable of which nothing says how its rope stretches."""
         if not has_stretch(self.fit.model):
             raise UsageError(
                 "nothing measured on this cable says how its rope stretches; add a table of stretch under load to cable.toml."
@@ -329,23 +335,23 @@ def elastic_answers(fit: Record) -> ElasticAnswers:
 
 
 def has_elastic_answers(fit: Record) -> bool:
-    """Whether a fit says anything of stretch or preload."""
+    """Return whether a fit says anything of stretch or preload."""
     return has_stretch(fit.model) or has_preload(fit.model)
 
 
 def pick_evenly(values: np.ndarray, most: int) -> np.ndarray:
-    """Pick at most so many of the values, evenly from the first to the last."""
+    """Return at most so many of the values, evenly from the first to the last."""
     return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))] if len(values) else values
 
 
 def friction_arm(fit: Record) -> tuple[float, str]:
-    """Radius that turns friction into what is felt [mm] and the unit of that; 1 and N without a radius."""
+    """Return the radius that turns friction into what is felt [mm] and the unit of that; 1 and N without a radius."""
     radius = fit.dataset.description.cable.output_pulley_radius
     return (radius.to("length"), "N*mm") if radius is not None else (1.0, "N")
 
 
 def typical_preload(fit: Record) -> float:
-    """Preload [N]: its median, or least squares without draws, or the median of its prior where neither determines it."""
+    """Return the preload [N]: its median, or least squares without draws, or the median of its prior as a last resort."""
     if fit.sampled is not None and PRELOAD in fit.sampled.values:
         return fit.parameter(PRELOAD).median
     estimate = fit.least_squares.estimates[PRELOAD].value

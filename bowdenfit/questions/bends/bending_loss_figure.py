@@ -13,7 +13,7 @@ from bowdenfit.plots.curves import draw_quantiles, name_band
 from bowdenfit.plots.layout import LEGEND_ROW, TITLE, count_columns, legend_above, panels
 from bowdenfit.plots.panels import label_outer, span
 from bowdenfit.plots.style import BLACK, EFFICIENCY, GRAY, MEDIUM, WIDE, WRAP_ANGLE, in_paper_style, mapped_color
-from bowdenfit.questions.bends.loop_readings import efficiency_between_readings, loop_readings
+from bowdenfit.questions import bends as room
 from bowdenfit.words import counted, significant
 
 if TYPE_CHECKING:
@@ -73,66 +73,12 @@ class BendingLoss:
 
 
 def data(fit: Record) -> BendingLoss | None:
-    """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
-    import jax.numpy as jnp
-
-    from bowdenfit.physics.loop import loop_output_force
-    from bowdenfit.questions.bends.answer import elastic_answers, typical_preload
-    from bowdenfit.questions.bends.curves import (
-        POINTS,
-        Values,
-        describe_reference_angle,
-        evaluate_curves,
-        measured_loop_bends,
-        quantiles_of_draws,
-        range_of_bends,
-    )
-
-    bends, measured = range_of_bends(fit), measured_loop_bends(fit)
-    if bends is None or measured is None:
-        return None
-    elastic, typical = elastic_answers(fit), typical_preload(fit)
-    angles, force = np.linspace(*bends, POINTS), elastic.reference_force
-    preloads = np.unique([float(f"{typical * factor:.2g}") for factor in TIMES_PRELOAD])
-    bent = elastic.bend_to(angles)
-
-    def curves(values: Values) -> dict[str, Any]:
-        exponent, own = bent.exponent(values), bent.preload(values)[0]
-
-        def efficiency(preload: Any, factor: Any = 1.0) -> Any:
-            return loop_output_force(jnp.asarray(force), preload, factor * exponent, jnp.asarray(1.0)) / force
-
-        return {
-            "fitted": efficiency(own),
-            "exponent": exponent,
-            "coefficients": efficiency(own, jnp.asarray(TIMES_COEFFICIENT)[:, None]),
-            "preloads": efficiency(bent.preloads(values, jnp.asarray(preloads))),
-        }
-
-    draws = evaluate_curves(fit, curves)
-    lines = {name: np.median(drawn, axis=0) for name, drawn in draws.items()}
-    coefficient = lines["exponent"][-1] / angles[-1]
-    capstan = np.exp(-lines["exponent"])  # of a rope without preload
-    return BendingLoss(
-        np.rad2deg(angles),
-        force,
-        quantiles_of_draws(draws["fitted"]),
-        capstan,
-        " ".join(filter(None, (f"as fitted, preload {significant(typical)} N", describe_reference_angle(fit)))),
-        tuple(
-            EfficiencyLine(f"coefficient {factor * coefficient:.2g}", line, capstan**factor)
-            for factor, line in zip(TIMES_COEFFICIENT, lines["coefficients"], strict=True)
-        ),
-        tuple(
-            EfficiencyLine(f"preload {significant(preload)} N", line, capstan)
-            for preload, line in zip(preloads, lines["preloads"], strict=True)
-        ),
-        *efficiency_between_readings(loop_readings(fit, measured), force),
-    )
+    """Return efficiency against the wrap angle; None of a cable that is not a loop with preload, or was measured at no bend."""
+    return room.collect_bending_loss(fit)
 
 
 def caption(loss: BendingLoss) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     return (
         "Efficiency, output over input force while moving forward, against the wrap angle, at "
         f"{significant(loss.input_force, 4)} N input "
@@ -144,7 +90,7 @@ def caption(loss: BendingLoss) -> str:
 
 @in_paper_style
 def draw(loss: BendingLoss, width: float | None = None) -> Figure:
-    """Efficiency [%] against the wrap angle [deg]: several friction coefficients, and several preloads."""
+    """Draw efficiency [%] against the wrap angle [deg]: several friction coefficients, and several preloads."""
     sides = [(*COEFFICIENTS, loss.coefficients), (*PRELOADS, loss.preloads)]
     sides = [side for side in sides if side[2]] or [(*FITTED, ())]
     rows = max(-(-len(lines) // LINES_IN_A_ROW) for _, _, lines in sides)
@@ -152,8 +98,8 @@ def draw(loss: BendingLoss, width: float | None = None) -> Figure:
     columns = count_columns(page, len(sides), LEAST_WIDTH, 0.2)
     figure, flat = panels([2.3] * (len(sides) // columns), columns, above, (0.2, above + 0.4), page, sharey=True)
     for axes, (what, colors, lines) in zip(flat, sides, strict=True):
-        _lines(axes, loss, lines, colors)
-        _fitted(axes, loss)
+        _draw_lines(axes, loss, lines, colors)
+        _draw_fitted(axes, loss)
         axes.set_title(f"{what}, at {significant(loss.input_force, 4)} N input force", pad=6 + 72 * rows * LEGEND_ROW)
     label_outer(flat, columns, WRAP_ANGLE, EFFICIENCY)
     flat[0].set_ylim(*_limits(loss))
@@ -161,8 +107,8 @@ def draw(loss: BendingLoss, width: float | None = None) -> Figure:
     return figure
 
 
-def _lines(axes: Axes, loss: BendingLoss, lines: Sequence[EfficiencyLine], colors: str) -> None:
-    """The lines of one panel with the capstan equation's dashed, and their legend between title and panel."""
+def _draw_lines(axes: Axes, loss: BendingLoss, lines: Sequence[EfficiencyLine], colors: str) -> None:
+    """Draw the lines of one panel with the capstan equation's dashed, and their legend between title and panel."""
     handles = []
     for i, line in enumerate(lines):
         color, every = _color(colors, i, len(lines)), max(len(loss.wrap_angle) // MARKS, 1)
@@ -177,8 +123,8 @@ def _lines(axes: Axes, loss: BendingLoss, lines: Sequence[EfficiencyLine], color
         )  # fmt: skip
 
 
-def _fitted(axes: Axes, loss: BendingLoss) -> None:
-    """The cable itself, and the entries of the legend above both panels."""
+def _draw_fitted(axes: Axes, loss: BendingLoss) -> None:
+    """Draw the cable itself, and the entries of the legend above both panels."""
     label = loss.fitted_label[:1].upper() + loss.fitted_label[1:]
     draw_quantiles(axes, loss.wrap_angle, 100 * loss.fitted, BLACK, linewidth=1.6, label=label)
     name_band(axes, loss.fitted, BLACK)
@@ -192,12 +138,12 @@ def _fitted(axes: Axes, loss: BendingLoss) -> None:
 
 
 def _color(colors: str, number: int, of: int) -> Any:
-    """From light to dark, as the number in the label grows."""
+    """Return a color from light to dark, as the number in the label grows."""
     return mapped_color(colors, 0.42 + 0.5 * (number + 0.5) / of)
 
 
 def _limits(loss: BendingLoss) -> tuple[float, float]:
-    """Efficiencies that show every line, from 0 % to 100 % at most."""
+    """Return limits of the efficiency that show every line, from 0 % to 100 % at most."""
     lines = [v for line in (*loss.coefficients, *loss.preloads) for v in (line.efficiency, line.capstan)]
     lines += [loss.fitted, loss.fitted_capstan, loss.points_efficiency]
     low, high = span([100 * np.asarray(v) for v in lines], room=0.04)

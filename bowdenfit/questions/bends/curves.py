@@ -1,4 +1,4 @@
-"""Curves of many draws for the figures of a cable that stretches or has preload, and the range of bends they show.
+"""Curves of many draws for the figures of a cable that stretches or has preload, beside what was read.
 
 Quantiles have the 5 %, 50 % and 95 % quantiles of the draws as first axis; one row, the least-squares line, without draws.
 """
@@ -7,18 +7,21 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import BATCH, for_each_value
-from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import has_preload
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.kind import RopeKind
+from bowdenfit.kinds.tables import PreloadTable, StretchTable
+from bowdenfit.questions.bends.bent_cable import has_preload
+from bowdenfit.questions.bends.preload_figure import PreloadCurve
+from bowdenfit.questions.bends.stretch_figure import StretchCurve
 from bowdenfit.results.record import Record, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
 POINTS = 61  # of a line
-_LEAST_BEND = 0.1  # rad; a figure against the wrap angle needs a range
 
 Values = Mapping[str, Array]
 
@@ -32,32 +35,66 @@ def evaluate_curves(fit: Record, curves: Callable[[Values], dict[str, Any]]) -> 
     """
     values = thinned_parameter_values(fit, 1 if fit.sampled is None else BATCH)
     with jax.enable_x64(True):
-        found_curves: dict[str, np.ndarray] = for_each_value(curves, values)
-    return found_curves
+        draws: dict[str, np.ndarray] = for_each_value(curves, values)
+    return draws
 
 
 def quantiles_of_draws(draws: np.ndarray) -> np.ndarray:
-    """5 %, 50 % and 95 % quantiles over the draws; the one line without draws."""
+    """Return the 5 %, 50 % and 95 % quantiles over the draws; the one line without draws."""
     return draws if len(draws) == 1 else np.quantile(draws, QUANTILES, axis=0)
 
 
-def measured_loop_bends(fit: Record) -> np.ndarray | None:
-    """Wrap angles that a loop with preload was measured at [rad]; None of anything else."""
-    if not fit.model.cable.is_loop or not has_preload(fit.model):
+def collect_stretch(fit: Record) -> tuple[StretchCurve, ...] | None:
+    """Return a curve for each wrap angle that stretch was read at; None without such readings."""
+    table = fit.dataset.measurements.table(StretchTable)
+    if table is None:
         return None
-    try:
-        return elastic_answers(fit).measured_bends
-    except UsageError:  # no wrap angle says which of several contacts is bent
+    angles = np.unique(table.wrap_angle)
+    read = [table.load[table.wrap_angle == angle] for angle in angles]
+    loads = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read])
+
+    def curves(values: Values) -> dict[str, Any]:
+        elastic, load = fit.model.cable.elasticity, jnp.asarray(loads)
+        angle, peak = (jnp.broadcast_to(jnp.asarray(a)[:, None], load.shape) for a in (angles, loads[:, -1]))
+        stretched = {"loading": load, "unloading": peak}
+        return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
+
+    both = {way: quantiles_of_draws(draws) for way, draws in evaluate_curves(fit, curves).items()}
+    curves_by_angle = []
+    for i, angle in enumerate(angles):
+        here = table.wrap_angle == angle
+        down = table.unloading[here]
+        back = both["unloading"][:, i] if down.any() else None
+        points = table.load[here], table.stretch[here], down
+        curves_by_angle.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
+    return tuple(curves_by_angle)
+
+
+def collect_preload(fit: Record) -> PreloadCurve | None:
+    """Return preload and slack against the wrap angle; None where preload does not depend on the wrap angle."""
+    if not fit.dataset.description.preload_follows_stretch or not has_preload(fit.model):
         return None
+    angles = np.linspace(*_measured_range(fit), POINTS)
+
+    def curves(values: Values) -> dict[str, Any]:
+        preload, slack = fit.model.cable.elasticity.preload(values, jnp.asarray(angles))
+        return {"preload": preload, "slack": slack}
+
+    draws, table = evaluate_curves(fit, curves), fit.dataset.measurements.table(PreloadTable)
+    points = (np.zeros(0), np.zeros(0)) if table is None else (np.rad2deg(table.wrap_angle), table.preload)
+    probability = np.mean(draws["slack"] > 0, axis=0)
+    return PreloadCurve(
+        np.rad2deg(angles),
+        quantiles_of_draws(draws["preload"]),
+        quantiles_of_draws(draws["slack"]),
+        probability,
+        *points,
+    )
 
 
-def range_of_bends(fit: Record) -> tuple[float, float] | None:
-    """Return the smallest and largest measured wrap angle of a loop; None where there is no range to show."""
-    bends = measured_loop_bends(fit)
-    return (float(bends[0]), float(bends[-1])) if bends is not None and len(bends) and bends[-1] > _LEAST_BEND else None
-
-
-def describe_reference_angle(fit: Record) -> str:
-    """'at 0 deg', where preload depends on the wrap angle."""
-    settings, follows = fit.dataset.description.preload, fit.dataset.description.preload_follows_stretch
-    return f"at {settings.wrap_angle.value:g} {settings.wrap_angle.unit}" if follows else ""
+def _measured_range(fit: Record) -> tuple[float, float]:
+    """Return the smallest and largest total wrap angle of any reading [rad]; 0 to pi without one."""
+    angles = [kind.bends(table) for kind, table in iterate_tables(fit.dataset.measurements) if isinstance(kind, RopeKind)]
+    every = np.concatenate([np.zeros(0), *angles])
+    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
+    return (low, high) if low < high else (0.0, high or np.pi)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
-from bowdenfit.questions.bends.loop_readings import RECORDED, loop_readings
+from bowdenfit.questions import bends as room
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ HEADING = "Forces of the loop"
 MOST, MOST_COLUMNS = 6, 3
 LEAST_NAMED = 1.5  # in, width of a panel with names of the branches
 WORD_ROOM = 0.075  # share of a panel's width that a word along the line takes
+RECORDED = 2  # times the stroke of a block of a recording, which are many
 # stroke, name, marker, size [pt], color
 STROKES = (
     (1, "Read moving forward", "o", 3.4, BLUE),
@@ -60,48 +61,12 @@ class LoopCurve:
 
 
 def data(fit: Record) -> tuple[LoopCurve, ...] | None:
-    """A curve for each wrap angle that forces of a loop with preload were read at; None of anything else."""
-    import jax.numpy as jnp
-
-    from bowdenfit.physics.loop import loop_band, slack_load
-    from bowdenfit.questions.bends.answer import elastic_answers, pick_evenly
-    from bowdenfit.questions.bends.curves import (
-        POINTS,
-        Values,
-        evaluate_curves,
-        measured_loop_bends,
-        quantiles_of_draws,
-    )
-
-    bends = measured_loop_bends(fit)
-    if bends is None:
-        return None
-    angle, force_in, force_out, stroke = loop_readings(fit, bends)
-    if not len(angle):
-        return None
-    angles = pick_evenly(np.unique(np.round(angle, 9)), MOST)
-    read = [force_in[np.isclose(angle, bend)] for bend in angles]
-    forces, bent = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read]), elastic_answers(fit).bend_to(angles)
-
-    def curves(values: Values) -> dict[str, Any]:
-        exponent, preload = bent.exponent(values), bent.preload(values)[0]
-        force = jnp.asarray(forces)
-        forward, back = loop_band(force, preload[:, None], exponent[:, None])
-        capstan = loop_band(force, jnp.zeros_like(exponent)[:, None], exponent[:, None])[0]
-        return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent)}
-
-    draws, loops = evaluate_curves(fit, curves), []
-    for i, bend in enumerate(angles):
-        forward, back, slack = (quantiles_of_draws(draws[name][:, i]) for name in ("forward", "back", "slack"))
-        here = np.isclose(angle, bend)
-        points = force_in[here], force_out[here], stroke[here]
-        capstan = np.median(draws["capstan"][:, i], axis=0)
-        loops.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
-    return tuple(loops)
+    """Return a curve for each wrap angle that forces of a loop with preload were read at; None of anything else."""
+    return room.collect_loops(fit)
 
 
 def caption(loops: tuple[LoopCurve, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n, shown = sum(len(loop.points_input) for loop in loops), min(len(loops), MOST)
     return (
         f"Output against input force of the loop, moving forward and back, at {count_shown(shown, len(loops), 'wrap angle')}. "
@@ -112,17 +77,17 @@ def caption(loops: tuple[LoopCurve, ...]) -> str:
 
 @in_paper_style
 def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
-    """Output against input force [N], a panel for each of at most six wrap angles."""
+    """Draw output against input force [N], a panel for each of at most six wrap angles."""
     shown = choose_evenly(loops, MOST)
     across = [span([loop.input_force, loop.points_input], room=0.03) for loop in shown]
     up = [span([loop.forward, loop.back, loop.points_output]) for loop in shown]
     made = panels_with_strips([loop.label for loop in shown], across, up, MOST_COLUMNS, width=width)
     for axes, strip, loop in zip(made.mains, made.strips, shown, strict=True):
         axes.locator_params(nbins=6, steps=[1, 2, 2.5, 5, 10])
-        _curves(axes, loop)
-        _readings(axes, loop)
-        _slack(axes, loop)
-        _residuals(strip, loop)
+        _draw_curves(axes, loop)
+        _draw_readings(axes, loop)
+        _draw_slack(axes, loop)
+        _draw_residuals(strip, loop)
     made.finish_strips()
     made.label("Input force (N)", "Output force (N)", "N")
     note_shown_count(made.mains[-1], len(shown), len(loops), "wrap angles")
@@ -131,8 +96,8 @@ def draw(loops: tuple[LoopCurve, ...], width: float | None = None) -> Figure:
     return made.figure
 
 
-def _curves(axes: Axes, loop: LoopCurve) -> None:
-    """Both ways, and the way forward of a rope without preload."""
+def _draw_curves(axes: Axes, loop: LoopCurve) -> None:
+    """Draw both ways, and the way forward of a rope without preload."""
     name = (MEDIAN if len(loop.forward) > 1 else LEAST_SQUARES).lower()
     still = not np.any(loop.points_stroke)
     for way, line, color, words in ((1, loop.forward, BLUE, "Forward"), (-1, loop.back, VERMILLION, "Back")):
@@ -145,8 +110,8 @@ def _curves(axes: Axes, loop: LoopCurve) -> None:
     )  # fmt: skip
 
 
-def _readings(axes: Axes, loop: LoopCurve) -> None:
-    """Forces by stroke; those of recordings are many and small."""
+def _draw_readings(axes: Axes, loop: LoopCurve) -> None:
+    """Draw forces by stroke; those of recordings are many and small."""
     for stroke, name, marker, size, color in STROKES:
         here = loop.points_stroke == stroke
         if here.any():
@@ -158,8 +123,8 @@ def _readings(axes: Axes, loop: LoopCurve) -> None:
             )  # fmt: skip
 
 
-def _residuals(strip: Axes, loop: LoopCurve) -> None:
-    """Output less that of the branch on which it was read; where that is not known, how far it is outside the two."""
+def _draw_residuals(strip: Axes, loop: LoopCurve) -> None:
+    """Draw the output less that of the branch on which it was read; less the nearer branch where that is not known."""
     for stroke, _, marker, size, color in STROKES:
         here = loop.points_stroke == stroke
         if here.any():
@@ -173,8 +138,8 @@ def _residuals(strip: Axes, loop: LoopCurve) -> None:
             )  # fmt: skip
 
 
-def _slack(axes: Axes, loop: LoopCurve) -> None:
-    """The input force at which the return side goes slack, where it is shown, and what the rope is on either side."""
+def _draw_slack(axes: Axes, loop: LoopCurve) -> None:
+    """Draw the input force at which the return side goes slack, where it is shown, and what the rope is on either side."""
     low, high = axes.get_xlim()
     load = float(middle(loop.slack_load))
     if not low < load < high:
@@ -190,17 +155,17 @@ def _slack(axes: Axes, loop: LoopCurve) -> None:
 
 
 def _name_branches(axes: Axes, loop: LoopCurve, place: float) -> None:
-    """Both branches named along the line, at the end of it that is farther from the loop; not in a small panel."""
+    """Name both branches along the line, at its end that is farther from the loop; not in a small panel."""
     if axes.get_position().width * axes.figure.get_size_inches()[0] < LEAST_NAMED:  # type: ignore[union-attr]
         return
     bottom, top = axes.get_ylim()
     height = float(np.interp(middle(loop.slack_load), loop.input_force, middle(loop.forward + loop.back) / 2))
     y, side = (0.02, "bottom") if height > (bottom + top) / 2 else (0.98, "top")
-    for words, align, room, shift in (
+    for words, align, width, shift in (
         ("return side taut", "right", place, -0.015),
         ("slack", "left", 1 - place, 0.015),
     ):
-        if room > WORD_ROOM:
+        if width > WORD_ROOM:
             axes.text(
                 place + shift, y, words, transform=axes.transAxes, rotation=90, ha=align, va=side, fontsize=6,
                 color="#8A3A68", zorder=4,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, MEDIAN, VERMILLION, in_paper_style
+from bowdenfit.questions import bends as room
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
-    from bowdenfit.kinds.displacement.table import DisplacementTable
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
@@ -54,69 +54,12 @@ class MotorForce:
 
 
 def data(fit: Record) -> tuple[MotorForce, ...] | None:
-    """The loop of each run; None where no force was measured against displacement."""
-    from bowdenfit.kinds.displacement.table import DisplacementTable
-    from bowdenfit.kinds.displacement.term import DisplacementTerm, reading_arrays, split_turns_by_depth
-    from bowdenfit.questions.bends.curves import Values, evaluate_curves, quantiles_of_draws
-
-    table = fit.dataset.measurements.table(DisplacementTable)
-    term = next((t for t in fit.model.terms if isinstance(t, DisplacementTerm)), None)
-    if table is None or term is None:
-        return None
-    path = _fine_path(table)
-    both = [
-        {
-            "turns": split_turns_by_depth(way.motion.turns),
-            "angles": term.data["angles"],
-            **reading_arrays(way, np.arange(len(way.run))),
-        }
-        for way in (path, table)
-    ]
-
-    def curves(values: Values) -> dict[str, Any]:
-        mounted = term.mounted_exponents(values, term.data)
-        return {name: term.load_cell_force(values, way, mounted) for name, way in zip(("along", "read"), both, strict=True)}
-
-    draws, runs = evaluate_curves(fit, curves), []
-    along, fitted = draws["along"], np.median(draws["read"], axis=0)
-    for run, name in enumerate(table.run_names):
-        here, rows = path.run == run, table.run == run
-        label = "" if len(table.run_names) == 1 else name
-        points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows], fitted[rows]
-        curve = path.displacement[here], quantiles_of_draws(along[:, here]), path.motion.stroke[here]
-        runs.append(MotorForce(label, *curve, *points))
-    return tuple(runs)
-
-
-def _fine_path(table: DisplacementTable) -> DisplacementTable:
-    """The way that the motor took in each run, in steps finer than its readings."""
-    from bowdenfit.kinds.displacement.table import follow_motor, history_of_sliding_rope
-
-    x, run, stroke = [], [], []
-    for number in range(len(table.run_names)):
-        at = table.displacement[table.run == number]
-        if table.sliding:
-            line = np.linspace(at.min(), at.max(), _POINTS)
-            x.append(np.concatenate([line, line]))
-            stroke.append(np.repeat([1, -1], _POINTS))
-        else:
-            steps = max(1, -(-_POINTS // max(len(at) - 1, 1)))
-            x.append(np.interp(np.arange(steps * (len(at) - 1) + 1) / steps, np.arange(len(at)), at))
-        run.append(np.full(len(x[-1]), number))
-    displacement, of_run = np.concatenate(x), np.concatenate(run)
-    if table.sliding:
-        motion = history_of_sliding_rope(np.concatenate(stroke), displacement, of_run)
-    else:
-        motion = follow_motor(displacement, of_run)
-    no_force, nowhere = np.zeros(len(of_run)), np.full(len(of_run), np.nan)
-    every = np.ones(len(of_run), dtype=bool)
-    return replace(
-        table, route=nowhere, force=no_force, displacement=displacement, motion=motion, run=of_run, used=every
-    )
+    """Return the loop of each run; None where no force was measured against displacement."""
+    return room.collect_motor_forces(fit)
 
 
 def caption(runs: tuple[MotorForce, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n, shown = sum(int(run.points_used.sum()) for run in runs), min(len(runs), MOST)
     return (
         f"Force at the motor against its displacement, {count_shown(shown, len(runs), 'run')}: what was read, and the "
@@ -127,15 +70,15 @@ def caption(runs: tuple[MotorForce, ...]) -> str:
 
 @in_paper_style
 def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
-    """Force at the motor [N] against displacement [mm], a panel for each of at most six runs."""
+    """Draw the force at the motor [N] against displacement [mm], a panel for each of at most six runs."""
     shown = choose_evenly(runs, MOST)
     across = [span([run.displacement], room=0.03) for run in shown]
     up = [span([run.force, run.points_force]) for run in shown]
     made = panels_with_strips([run.label for run in shown], across, up, MOST_COLUMNS, width=width)
     for axes, strip, run in zip(made.mains, made.strips, shown, strict=True):
-        _loop(axes, run)
-        _readings(axes, run.points_force, run)
-        _readings(strip, run.points_force - run.points_fitted, run)
+        _draw_loop(axes, run)
+        _draw_readings(axes, run.points_force, run)
+        _draw_readings(strip, run.points_force - run.points_fitted, run)
     made.finish_strips()
     made.label("Displacement at the motor (mm)", "Force at the motor (N)", "N")
     note_shown_count(made.mains[-1], len(shown), len(runs), "runs")
@@ -144,8 +87,8 @@ def draw(runs: tuple[MotorForce, ...], width: float | None = None) -> Figure:
     return made.figure
 
 
-def _loop(axes: Axes, run: MotorForce) -> None:
-    """The fitted force stroke by stroke, each from the end of the one before."""
+def _draw_loop(axes: Axes, run: MotorForce) -> None:
+    """Draw the fitted force stroke by stroke, each from the end of the one before."""
     name = (MEDIAN if len(run.force) > 1 else LEAST_SQUARES).lower()
     ends = [0, *(np.flatnonzero(np.diff(run.stroke)) + 1).tolist(), len(run.stroke)]
     labelled = set[int]()
@@ -161,8 +104,8 @@ def _loop(axes: Axes, run: MotorForce) -> None:
     axes.axhline(0.0, color=GRAY, linewidth=0.6, zorder=0.5)
 
 
-def _readings(axes: Axes, shown: np.ndarray, run: MotorForce) -> None:
-    """Forces or residuals of the readings by stroke; those that are not used are open."""
+def _draw_readings(axes: Axes, shown: np.ndarray, run: MotorForce) -> None:
+    """Draw forces or residuals of the readings by stroke; those that are not used are open."""
     for stroke, name, marker, size, color in _STROKES:
         for used, words in ((True, name), (False, "Not used")):
             here = (run.points_stroke == stroke) & (run.points_used.astype(bool) == used)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from bowdenfit.plots.layout import legend_above, panels
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.strips import STRIP, finish_strips, name_strip, place_names
 from bowdenfit.plots.style import BLACK, BLUE, LEAST_SQUARES, LIGHT, MEDIAN, MEDIUM, WRAP_ANGLE, in_paper_style, percent
+from bowdenfit.questions import bends as room
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 HEADING = "Preload against the wrap angle"
 DARK = "#C4C4C4"
-PERHAPS, RATHER = 0.05, 0.5  # probabilities of being slack from which on a region is shaded lightly and darkly
+PERHAPS, RATHER = 0.05, 0.5  # chosen probabilities of being slack from which on a region is shaded lightly and darkly
 PLACES = 2001  # along the wrap angle, for the ends of the regions
 
 
@@ -46,46 +47,12 @@ class PreloadCurve:
 
 
 def data(fit: Record) -> PreloadCurve | None:
-    """What is shown; None where preload does not depend on the wrap angle."""
-    import jax.numpy as jnp
-
-    from bowdenfit.kinds.tables import PreloadTable
-    from bowdenfit.questions.bends.curves import POINTS, Values, evaluate_curves, quantiles_of_draws
-    from bowdenfit.questions.bends.equations import has_preload
-
-    if not fit.dataset.description.preload_follows_stretch or not has_preload(fit.model):
-        return None
-    angles = np.linspace(*_measured_range(fit), POINTS)
-
-    def curves(values: Values) -> dict[str, Any]:
-        preload, slack = fit.model.cable.elasticity.preload(values, jnp.asarray(angles))
-        return {"preload": preload, "slack": slack}
-
-    draws, table = evaluate_curves(fit, curves), fit.dataset.measurements.table(PreloadTable)
-    points = (np.zeros(0), np.zeros(0)) if table is None else (np.rad2deg(table.wrap_angle), table.preload)
-    probability = np.mean(draws["slack"] > 0, axis=0)
-    return PreloadCurve(
-        np.rad2deg(angles),
-        quantiles_of_draws(draws["preload"]),
-        quantiles_of_draws(draws["slack"]),
-        probability,
-        *points,
-    )
-
-
-def _measured_range(fit: Record) -> tuple[float, float]:
-    """Smallest and largest total wrap angle of any reading [rad]; from 0 where all are the same, to pi without one."""
-    from bowdenfit.kinds import iterate_tables
-    from bowdenfit.kinds.kind import RopeKind
-
-    angles = [kind.bends(table) for kind, table in iterate_tables(fit.dataset.measurements) if isinstance(kind, RopeKind)]
-    every = np.concatenate([np.zeros(0), *angles])
-    low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, np.pi)
-    return (low, high) if low < high else (0.0, high or np.pi)
+    """Return preload and slack against the wrap angle; None where preload does not depend on the wrap angle."""
+    return room.collect_preload(fit)
 
 
 def caption(curve: PreloadCurve) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n = len(curve.points_preload)
     return " ".join(filter(None, (
         "Tension of the rope between fixed ends, which bending changes because it lengthens the sheath.",
@@ -98,18 +65,18 @@ def caption(curve: PreloadCurve) -> str:
 
 @in_paper_style
 def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
-    """Preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
+    """Draw preload [N] against the wrap angle [deg], and below it the slack [mm] where there is any."""
     ever_slack = bool(np.max(curve.slack) > 0)
     read = len(curve.points_wrap_angle) > 0
     heights = [2.2, *([STRIP] if read else []), *([0.9] if ever_slack else [])]
     figure, flat = panels(heights, 1, 0.02, (0, 0.16), width or MEDIUM, sharex=True)
-    _preload(flat[0], curve)
+    _draw_preload(flat[0], curve)
     if read:
-        _residuals(flat[1], curve)
+        _draw_residuals(flat[1], curve)
         place_names(flat[0], flat[1])
     if ever_slack:
         draw_quantiles(flat[-1], curve.wrap_angle, curve.slack, BLUE)
-        _from_zero(flat[-1], "Slack (mm)", curve.slack)
+        _start_at_zero(flat[-1], "Slack (mm)", curve.slack)
     for axes in flat:
         _shade_slack(axes, curve)
     flat[-1].set_xlabel(WRAP_ANGLE)
@@ -118,18 +85,18 @@ def draw(curve: PreloadCurve, width: float | None = None) -> Figure:
     return figure
 
 
-def _preload(axes: Axes, curve: PreloadCurve) -> None:
-    """The curve and the readings."""
+def _draw_preload(axes: Axes, curve: PreloadCurve) -> None:
+    """Draw the curve and the readings."""
     name = MEDIAN if len(curve.preload) > 1 else LEAST_SQUARES
     draw_quantiles(axes, curve.wrap_angle, curve.preload, BLUE, label=name)
     name_band(axes, curve.preload, BLUE)
     if len(curve.points_wrap_angle):
         axes.plot(curve.points_wrap_angle, curve.points_preload, "o", color=BLACK, zorder=3, label="Reading")
-    _from_zero(axes, "Preload (N)", curve.preload, curve.points_preload)
+    _start_at_zero(axes, "Preload (N)", curve.preload, curve.points_preload)
 
 
-def _residuals(strip: Axes, curve: PreloadCurve) -> None:
-    """Readings less the curve."""
+def _draw_residuals(strip: Axes, curve: PreloadCurve) -> None:
+    """Draw readings less the curve."""
     order = np.argsort(curve.wrap_angle)
     line = np.interp(curve.points_wrap_angle, curve.wrap_angle[order], middle(curve.preload)[order])
     strip.plot(curve.points_wrap_angle, curve.points_preload - line, "o", color=BLACK, markersize=3.6)
@@ -137,8 +104,8 @@ def _residuals(strip: Axes, curve: PreloadCurve) -> None:
     name_strip(strip, "N")
 
 
-def _from_zero(axes: Axes, label: str, *values: np.ndarray) -> None:
-    """An axis from just below zero, so that a line on it is seen, to above everything."""
+def _start_at_zero(axes: Axes, label: str, *values: np.ndarray) -> None:
+    """Let an axis begin just below zero, so that a line on it is seen, and end above everything."""
     highest = span([np.zeros(1), *values])[1]
     axes.set_ylim(-0.03 * highest, highest)
     axes.locator_params(axis="y", nbins=5 if axes.get_position().height < 0.3 else 7)
@@ -146,7 +113,7 @@ def _from_zero(axes: Axes, label: str, *values: np.ndarray) -> None:
 
 
 def _shade_slack(axes: Axes, curve: PreloadCurve) -> None:
-    """Where the rope is slack in most draws, and where in some."""
+    """Shade where the rope is slack in most draws, and where in some."""
     angle = np.linspace(curve.wrap_angle.min(), curve.wrap_angle.max(), PLACES)
     order = np.argsort(curve.wrap_angle)
     share = np.interp(angle, curve.wrap_angle[order], curve.slack_probability[order])

@@ -1,4 +1,4 @@
-"""Which preloads will do: without slack, and without more friction than may be felt."""
+"""Preload window: preloads without slack, and without more friction than may be felt."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.words import percent, significant
 
-TAUT = 0.95  # probability with which the recommended preload keeps both sides taut
+TAUT = 0.95  # probability with which the recommended preload keeps both sides taut; a choice, as an upper 90 % limit
 
 
 @dataclass(frozen=True, repr=False)
 class PreloadWindow(Display):
-    """Which preloads will do.
+    """Preloads that keep a cable taut over a range of bends without more friction than may be felt.
 
     Args:
         bends: Lowest and highest wrap angle that the cable is bent to [deg].
@@ -51,10 +51,11 @@ class PreloadWindow(Display):
 
     @property
     def _at(self) -> str:
+        """The reference angle in words; empty where preload is the same at all."""
         return "" if np.isnan(self.reference_angle) else f" at {self.reference_angle:.4g} deg"
 
     def sentences(self) -> list[str]:
-        """Which to set, and why."""
+        """Return which preload to set, and why."""
         return [self.advice, self.sentence()]
 
     def _table(self) -> Rows:
@@ -63,7 +64,7 @@ class PreloadWindow(Display):
         return rows, {"lowest": "N", "highest": "N", "felt": self.friction_unit}
 
     def sentence(self) -> str:
-        """The answer in words."""
+        """Return the answer in words."""
         low, high = (f"{angle:.4g}" for angle in self.bends)
         at = self._at
         under = f" under up to {self.input_force:g} N" if self.input_force > 0 else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from bowdenfit.plots.style import (
     in_paper_style,
     percent,
 )
+from bowdenfit.questions import bends as room
 from bowdenfit.questions.bends.preload_figure import true_stretches
 from bowdenfit.words import significant
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 HEADING = "Which preload is enough"
 COARSE, FINE = 25, 401  # preloads: friction against them is smooth, the probability of slack is not
-ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window
+ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window, as `preload_window.TAUT`
 
 
 @dataclass(frozen=True)
@@ -61,49 +62,12 @@ class PreloadWindowCurves:
 
 
 def data(fit: Record) -> PreloadWindowCurves | None:
-    """What is shown; None of a cable that is no loop with preload, or was measured at no bend."""
-    import jax.numpy as jnp
-
-    from bowdenfit.physics.loop import free_motion_loss
-    from bowdenfit.questions.bends.answer import elastic_answers, friction_arm, typical_preload
-    from bowdenfit.questions.bends.curves import (
-        QUANTILES,
-        Values,
-        describe_reference_angle,
-        evaluate_curves,
-        quantiles_of_draws,
-        range_of_bends,
-    )
-
-    bends = range_of_bends(fit)
-    if bends is None:
-        return None
-    elastic = elastic_answers(fit)
-    bent, coarse = (
-        elastic.bend_to(np.linspace(*bends, COARSE)),
-        np.linspace(0.0, max(2.5 * typical_preload(fit), 1.0), COARSE),
-    )
-
-    def curves(values: Values) -> dict[str, Any]:
-        friction = free_motion_loss(bent.preloads(values, jnp.asarray(coarse)), bent.exponent(values))
-        return {"friction": jnp.max(friction, axis=-1), "lowest": bent.lowest_preload(values, elastic.window_force)}
-
-    draws, (arm, unit) = evaluate_curves(fit, curves), friction_arm(fit)
-    preloads, (low, high) = np.linspace(coarse[0], coarse[-1], FINE), np.rad2deg(bends)
-    return PreloadWindowCurves(
-        preloads,
-        describe_reference_angle(fit),
-        arm * np.stack([np.interp(preloads, coarse, line) for line in quantiles_of_draws(draws["friction"])]),
-        unit,
-        np.mean(draws["lowest"][:, None] <= preloads, axis=0),
-        np.quantile(draws["lowest"], QUANTILES),
-        (float(low), float(high)),
-        elastic.window_force,
-    )
+    """Return what a preload costs and buys; None of a cable that is not a loop with preload, or was measured at no bend."""
+    return room.collect_preload_window(fit)
 
 
 def caption(window: PreloadWindowCurves) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     return (
         "What a preload costs and what it buys. Above: the friction that is felt in free motion at the bend where it is "
         f"largest. {describe_curve(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
@@ -114,10 +78,10 @@ def caption(window: PreloadWindowCurves) -> str:
 
 @in_paper_style
 def draw(window: PreloadWindowCurves, width: float | None = None) -> Figure:
-    """Friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
+    """Draw friction felt in free motion, and the probability that both sides stay taut [%], against preload [N]."""
     figure, (cost, gain) = panels([1.6, 1.3], 1, TITLE, (0, 0.16), width or MEDIUM, sharex=True)
     cost.set_title(_title(window))
-    draw_quantiles(cost, window.preload, window.friction, BLUE, label=_name(window))
+    draw_quantiles(cost, window.preload, window.friction, BLUE, label=_label_friction(window))
     name_band(cost, window.friction, BLUE)
     cost.set_ylim(0, span([np.zeros(1), window.friction])[1])
     cost.set_ylabel(f"Friction felt ({window.friction_unit.replace('*', chr(0xB7))})")
@@ -135,19 +99,20 @@ def draw(window: PreloadWindowCurves, width: float | None = None) -> Figure:
 
 
 def _title(window: PreloadWindowCurves) -> str:
-    """The bends and the input force that the window is for."""
+    """Return the bends and the input force that the window is for."""
     low, high = window.bends
     bends = f"{low:.4g} deg" if low == high else f"{low:.4g} deg to {high:.4g} deg"
     loaded = f"input force up to {significant(window.input_force, 4)} N" if window.input_force > 0 else "no load"
     return f"Bends {bends}, {loaded}"
 
 
-def _name(window: PreloadWindowCurves) -> str:
+def _label_friction(window: PreloadWindowCurves) -> str:
+    """Return the label of the curve of friction."""
     return f"Friction, {(MEDIAN if len(window.friction) > 1 else LEAST_SQUARES).lower()}"
 
 
 def _shade_window(axes: Axes, window: PreloadWindowCurves) -> None:
-    """The preloads that are enough, or the words that none shown is."""
+    """Shade the preloads that are enough, or say that none shown is."""
     fine = np.linspace(window.preload.min(), window.preload.max(), 2001)
     regions = true_stretches(np.interp(fine, window.preload, window.taut_probability) >= ENOUGH)
     label = f"Taut with at least {percent(ENOUGH)} probability" if len(window.friction) > 1 else "Taut"
@@ -158,7 +123,7 @@ def _shade_window(axes: Axes, window: PreloadWindowCurves) -> None:
 
 
 def _mark_lowest(axes: Axes, window: PreloadWindowCurves) -> None:
-    """The lowest preload that is enough with its interval, or in words where it is off the axis."""
+    """Mark the lowest preload that is enough with its interval, or in words where it is off the axis."""
     low, high = axes.get_xlim()
     lowest, which = float(middle(window.lowest)), MEDIAN if len(window.friction) > 1 else LEAST_SQUARES
     if not low <= lowest <= high:

@@ -14,6 +14,7 @@ from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, GRAY, LEAST_SQUARES, MEDIAN, in_paper_style, mapped_color
+from bowdenfit.questions import bends as room
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -51,38 +52,12 @@ class StretchCurve:
 
 
 def data(fit: Record) -> tuple[StretchCurve, ...] | None:
-    """A curve for each wrap angle that stretch was read at; None without such readings."""
-    import jax.numpy as jnp
-
-    from bowdenfit.kinds.tables import StretchTable
-    from bowdenfit.questions.bends.curves import POINTS, Values, evaluate_curves, quantiles_of_draws
-
-    table = fit.dataset.measurements.table(StretchTable)
-    if table is None:
-        return None
-    angles = np.unique(table.wrap_angle)
-    read = [table.load[table.wrap_angle == angle] for angle in angles]
-    loads = np.array([np.linspace(f.min(), f.max(), POINTS) for f in read])
-
-    def curves(values: Values) -> dict[str, Any]:
-        elastic, load = fit.model.cable.elasticity, jnp.asarray(loads)
-        angle, peak = (jnp.broadcast_to(jnp.asarray(a)[:, None], load.shape) for a in (angles, loads[:, -1]))
-        stretched = {"loading": load, "unloading": peak}
-        return {way: elastic.stretch(values, load, angle, highest) for way, highest in stretched.items()}
-
-    both = {way: quantiles_of_draws(draws) for way, draws in evaluate_curves(fit, curves).items()}
-    curves_by_angle = []
-    for i, angle in enumerate(angles):
-        here = table.wrap_angle == angle
-        down = table.unloading[here]
-        back = both["unloading"][:, i] if down.any() else None
-        points = table.load[here], table.stretch[here], down
-        curves_by_angle.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
-    return tuple(curves_by_angle)
+    """Return a curve for each wrap angle that stretch was read at; None without such readings."""
+    return room.collect_stretch(fit)
 
 
 def caption(stretch: tuple[StretchCurve, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n, shown = sum(len(curve.points_load) for curve in stretch), min(len(stretch), MOST)
     down = any(np.any(curve.points_unloading) for curve in stretch)
     return " ".join(filter(None, (
@@ -96,7 +71,7 @@ def caption(stretch: tuple[StretchCurve, ...]) -> str:
 
 @in_paper_style
 def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figure:
-    """Stretch [mm] against load [N], a color for each wrap angle."""
+    """Draw stretch [mm] against load [N], a color for each wrap angle."""
     every = sorted(stretch, key=lambda curve: curve.wrap_angle)
     shown = choose_evenly(every, MOST)
     across = span([v for c in shown for v in (c.load, c.points_load)], room=0.03)
@@ -106,8 +81,8 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     rows = _explain(axes, shown)
     for i, curve in enumerate(shown):
-        _curve(axes, curve, _color(i, len(shown)), MARKERS[i])
-        _marks(strip, curve, _residuals(curve), _color(i, len(shown)), MARKERS[i])
+        _draw_curve(axes, curve, _color(i, len(shown)), MARKERS[i])
+        _draw_marks(strip, curve, _residuals(curve), _color(i, len(shown)), MARKERS[i])
     made.finish_strips()
     made.label("Load (N)", "Stretch (mm)", "mm")
     note_shown_count(axes, len(shown), len(every))
@@ -116,28 +91,28 @@ def draw(stretch: tuple[StretchCurve, ...], width: float | None = None) -> Figur
 
 
 def _residuals(curve: StretchCurve) -> np.ndarray:
-    """Readings less the branch on which they were read [mm]."""
+    """Return readings less the branch on which they were read [mm]."""
     back = curve.loading if curve.unloading is None else curve.unloading
     up, down = (np.interp(curve.points_load, curve.load, middle(line)) for line in (curve.loading, back))
     return np.asarray(curve.points_stretch - np.where(curve.points_unloading, down, up))
 
 
 def _color(number: int, of: int) -> Any:
-    """From dark to light as the wrap angle grows."""
+    """Return a color from dark to light as the wrap angle grows."""
     return mapped_color("viridis", DARKEST + (LIGHTEST - DARKEST) * number / max(of - 1, 1))
 
 
-def _curve(axes: Axes, curve: StretchCurve, color: Any, marker: str) -> None:
-    """Both branches of one wrap angle, and the readings on each."""
+def _draw_curve(axes: Axes, curve: StretchCurve, color: Any, marker: str) -> None:
+    """Draw both branches of one wrap angle, and the readings on each."""
     draw_quantiles(axes, curve.load, curve.loading, color)
     if curve.unloading is not None:
         draw_quantiles(axes, curve.load, curve.unloading, color, linestyle=DASHES)
-    _marks(axes, curve, curve.points_stretch, color, marker)
+    _draw_marks(axes, curve, curve.points_stretch, color, marker)
     axes.plot([], [], marker=marker, markersize=3.8, color=color, label=f"{curve.wrap_angle:.4g} deg")
 
 
-def _marks(axes: Axes, curve: StretchCurve, shown: np.ndarray, color: Any, marker: str) -> None:
-    """Stretch or residuals of the readings, open where the load came down."""
+def _draw_marks(axes: Axes, curve: StretchCurve, shown: np.ndarray, color: Any, marker: str) -> None:
+    """Draw stretch or residuals of the readings, open where the load came down."""
     down = curve.points_unloading.astype(bool)
     for here, fill in ((~down, color), (down, "white")):
         axes.plot(
@@ -146,7 +121,7 @@ def _marks(axes: Axes, curve: StretchCurve, shown: np.ndarray, color: Any, marke
 
 
 def _explain(axes: Axes, shown: Sequence[StretchCurve]) -> int:
-    """Entries of the legend for what all wrap angles share, which fill its first column; how many they are."""
+    """Add legend entries for what all wrap angles share, which fill its first column, and return their number."""
     name = MEDIAN if len(shown[0].loading) > 1 else LEAST_SQUARES
     down = any(c.unloading is not None or np.any(c.points_unloading) for c in shown)
     both = ((f"{name}, loading", "-", GRAY), (f"{name}, unloading", DASHES, "white"))

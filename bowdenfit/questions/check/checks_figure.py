@@ -104,7 +104,7 @@ def _show_table(table: TableChecks, outlier: list[bool]) -> CheckedTable:
 
 
 def caption(tables: tuple[CheckedTable, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n = sum(len(table.labels) for table in tables)
     probabilities = [table.probability for table in tables if len(table.at)]
     distribution = (
@@ -127,7 +127,7 @@ def _rows_in_words(n_tables: int) -> str:
 
 @in_paper_style
 def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure:
-    """One row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
+    """Draw one row a table: distribution of the readings in their predictions, and deviations by where they were taken."""
     page, counts = width or WIDE, [bool(len(table.at)) + len(table.numbers) for table in tables]
     columns = count_columns(page, max(counts), LEAST_WIDTH, 0.62)
     rows = [-(-count // columns) for count in counts]
@@ -136,17 +136,17 @@ def draw(tables: tuple[CheckedTable, ...], width: float | None = None) -> Figure
     for i, table in enumerate(tables):
         here = drop_unused(flat[sum(rows[:i]) * columns : sum(rows[: i + 1]) * columns], counts[i])
         if len(table.at):
-            _distribution(here[0], table)
+            _draw_distribution(here[0], table)
         for axes, (label, numbers) in zip(here[bool(len(table.at)) :], table.numbers.items(), strict=True):
-            _deviations(axes, table, label, numbers)
+            _draw_deviations(axes, table, label, numbers)
         here[0].set_title(f"{capitalized(table.name)}: {counted(len(table.labels), 'reading')}", loc="left")
         used += here
     legend_above(figure, used, columns=3)
     return figure
 
 
-def _distribution(axes: Axes, table: CheckedTable) -> None:
-    """Share of readings up to a place in their predictions, less what it should be."""
+def _draw_distribution(axes: Axes, table: CheckedTable) -> None:
+    """Draw the empirical distribution of the readings in their predictions, less the uniform one."""
     axes.axhline(0.0, color=GRAY, linewidth=0.8)
     axes.set_xlim(0.0, 1.0)
     axes.set(xlabel="Predicted probability p", ylabel="ECDF of the readings − p")
@@ -156,8 +156,8 @@ def _distribution(axes: Axes, table: CheckedTable) -> None:
     axes.plot(at, off, drawstyle="steps-post", color=BLUE, label="Distribution of the readings (ECDF)")
 
 
-def _deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray) -> None:
-    """Deviations in standard deviations against one of the places."""
+def _draw_deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.ndarray) -> None:
+    """Draw deviations in standard deviations against where readings were taken."""
     z = table.z_score
     for two in (-2, 2):
         axes.axhline(two, color=GRAY, linewidth=0.8, linestyle=DASHES, label="Two standard deviations")

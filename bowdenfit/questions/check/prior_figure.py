@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 HEADING = "Prior predictive check: readings that the priors allow"
 ROW, COLUMNS = 1.9, 2  # in; panels in a row
 WIDEST = "99 % interval by the priors"
-WITHIN, WIDE_RANGE = (
-    0.01,
-    20.0,
-)  # of the axis, that counts as one place; times the readings, beyond which scales are wide
+WITHIN = 0.01  # share of the axis that counts as one place
+WIDE_RANGE = 20.0  # times the typical reading, beyond which an axis is logarithmic
 _GROUP_MARKERS = SERIES_MARKERS[1:]  # the first is of tables without groups
 SHIFT = 0.006  # of the axis, between contacts whose readings would hide each other
 
@@ -82,7 +80,7 @@ class PriorPredictive:
 
 
 def caption(data: PriorPredictive) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n = sum(len(table.reading) for table in data.tables)
     text = (
         "Readings that the priors alone allow, before anything is fitted, beside the measured ones: thick lines contain "
@@ -95,22 +93,22 @@ def caption(data: PriorPredictive) -> str:
 
 @in_paper_style
 def draw(data: PriorPredictive) -> Figure:
-    """Efficiency along the route by the priors, and a panel for each table with its readings."""
+    """Draw efficiency along the route by the priors, and a panel for each table with its readings."""
     n = len(data.tables) + (data.efficiency is not None)
     rows = -(-n // COLUMNS)
     columns = min(COLUMNS, n)
     figure, flat = panels([ROW] * rows, columns, TITLE, (0.7, 0.78), WIDE if columns > 1 else MEDIUM)
     flat = drop_unused(flat, n)
     for axes, table in zip(flat, data.tables, strict=False):
-        _readings(axes, table)
+        _draw_readings(axes, table)
     if data.efficiency is not None:
-        _efficiency(flat[-1], data)
+        _draw_efficiency(flat[-1], data)
     legend_above(figure, flat, columns=4)
     return figure
 
 
-def _readings(axes: Axes, table: PriorTable) -> None:
-    """Intervals by the priors wherever readings were taken, and what was read."""
+def _draw_readings(axes: Axes, table: PriorTable) -> None:
+    """Draw intervals by the priors wherever readings were taken, and what was read."""
     span = float(np.ptp(table.numbers)) or 1.0
     groups = list(dict.fromkeys(table.group))
     for i, group in enumerate(groups):
@@ -127,7 +125,7 @@ def _readings(axes: Axes, table: PriorTable) -> None:
             axes.plot(
                 x[out], reading[out], marker, color=VERMILLION, markersize=4.2, zorder=3, label="Measured, outside"
             )
-    _scale(axes, table)
+    _set_scale(axes, table)
     if np.all(table.numbers == np.round(table.numbers)):
         axes.locator_params(axis="x", integer=True)
     axes.set_title(capitalized(table.name))
@@ -135,7 +133,7 @@ def _readings(axes: Axes, table: PriorTable) -> None:
 
 
 def _intervals(numbers: np.ndarray, quantiles: np.ndarray, within: float) -> tuple[np.ndarray, ...]:
-    """Where readings were taken, each place once, and the intervals there that hold those of all its readings."""
+    """Return the distinct places of readings, and the intervals there that contain those of all readings."""
     order = np.argsort(numbers)
     starts = np.flatnonzero(np.append(True, np.diff(numbers[order]) > within))
     low, lower, _, upper, high = quantiles[:, order]
@@ -144,8 +142,8 @@ def _intervals(numbers: np.ndarray, quantiles: np.ndarray, within: float) -> tup
     return at, least(low, starts), least(lower, starts), most(upper, starts), most(high, starts)
 
 
-def _scale(axes: Axes, table: PriorTable) -> None:
-    """An axis that shows every reading and all 90 % intervals; logarithmic beyond the readings where these are wide."""
+def _set_scale(axes: Axes, table: PriorTable) -> None:
+    """Let an axis show every reading and all 90 % intervals; logarithmic beyond the readings where these are wide."""
     read = table.reading[np.isfinite(table.reading)]
     shown = np.concatenate([read, table.quantiles[1], table.quantiles[3]])
     low, high = float(shown.min()), float(shown.max())
@@ -160,8 +158,8 @@ def _scale(axes: Axes, table: PriorTable) -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def _efficiency(axes: Axes, data: PriorPredictive) -> None:
-    """Efficiency against the route."""
+def _draw_efficiency(axes: Axes, data: PriorPredictive) -> None:
+    """Draw efficiency against the route."""
     assert data.efficiency is not None and data.route is not None  # the caller looked
     low, lower, median, upper, high = data.efficiency
     axes.fill_between(data.route, low, high, color=BLUE, alpha=0.12, linewidth=0)

@@ -16,7 +16,7 @@ from bowdenfit.device.limits import (
 from bowdenfit.device.plant import draw_device
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
+from bowdenfit.questions.bends.device_loop import LoopDraws, draw_loop, read_bends
 from bowdenfit.questions.compensate.answer import (
     ROPE_DAMPING,
     BendCompensation,
@@ -165,8 +165,8 @@ def estimate_compensation(
     """
     if law == "active":
         (device or Device(name="-")).needed("the gain of the active law", *NEEDED)
-    bends = range_of_bends(fit, stated)
-    loop = loop_draws(fit, bends, device, PRELOAD_RATIOS)
+    bends = read_bends(fit, stated)
+    loop = draw_loop(fit, bends, device, PRELOAD_RATIOS)
     known = device.known(*STABILIZING, DEAD_ZONE, FILTER) if device is not None else {}
     motor_friction, damping, dead_zone = _draw_stabilizing(known, len(loop.friction), fit.provenance.seed)
     friction = loop.friction + motor_friction[:, None]

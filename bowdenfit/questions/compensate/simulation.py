@@ -20,8 +20,7 @@ from bowdenfit.device.motion import (
 )
 from bowdenfit.device.plant import LoopTransmission, Motion, Plant, draw_device
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.bends.loop_draws import LoopDraws
-from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.bends.device_loop import LoopDraws, read_device_with_ring_down
 from bowdenfit.questions.compensate.answer import (
     ACTIVE,
     KARNOPP,
@@ -259,7 +258,7 @@ def answer_compensation(
     Raises:
         UsageError, DescriptionError: The fit does not provide it, or something that it needs is not stated.
     """
-    description = None if device is None else device_with_ring_down(fit, device)
+    description = None if device is None else read_device_with_ring_down(fit, device)
     answer, loop = estimate_compensation(fit, description, bends, law, parse_risk(risk))
     if not simulate:
         return answer

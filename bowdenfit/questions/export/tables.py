@@ -19,7 +19,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.model import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import BentCable, bending_contact, has_stretch
+from bowdenfit.questions.bends.bent_cable import BentCable, bending_contact, has_stretch
 from bowdenfit.questions.predict.measured_range import measured_range
 from bowdenfit.results.record import Record
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from bowdenfit.display import Display, Rows, csv_heading
 from bowdenfit.errors import DatasetError, StoreError, UsageError
-from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.bends.device_loop import read_device_with_ring_down
 from bowdenfit.questions.compensate.limits import estimate_compensation, parse_risk
 from bowdenfit.questions.export.c import build_fmu, c_header
 from bowdenfit.questions.export.matlab import function_name, matlab_function
@@ -306,5 +306,5 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
 
 def _estimate_parameters(fit: Record, to: str, device: Path) -> dict[str, Any]:
     refuse_compensation(to)
-    answer, _ = estimate_compensation(fit, device_with_ring_down(fit, device), None, None, parse_risk(None))
+    answer, _ = estimate_compensation(fit, read_device_with_ring_down(fit, device), None, None, parse_risk(None))
     return compensation_parameters(answer)

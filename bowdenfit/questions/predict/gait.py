@@ -16,7 +16,7 @@ from bowdenfit.files.tables import read_table
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.rows import read_angle
-from bowdenfit.questions.bends.equations import bending_contact
+from bowdenfit.questions.bends.bent_cable import bending_contact
 from bowdenfit.questions.predict.lengths import to_newtons
 from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range
 from bowdenfit.results.record import Record

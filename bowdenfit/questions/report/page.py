@@ -8,7 +8,7 @@ from typing import Any
 from bowdenfit.errors import UsageError
 from bowdenfit.pages.section import Chart, HtmlPage, PageSection, Picture, prose_section
 from bowdenfit.plots.write import PNG
-from bowdenfit.questions.bends.bends_section import section as bends_section
+from bowdenfit.questions.bends.words import section as bends_section
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,

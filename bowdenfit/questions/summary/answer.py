@@ -7,7 +7,7 @@ from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.questions.bends.overview import elastic_overview
+from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.groups import contrast_groups

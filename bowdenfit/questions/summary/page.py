@@ -13,7 +13,7 @@ from bowdenfit.inference.sampler_agreement import recommend_sampler
 from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.recordings.kind import list_preparations
 from bowdenfit.kinds.term import Term
-from bowdenfit.questions.bends.overview import elastic_overview
+from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs

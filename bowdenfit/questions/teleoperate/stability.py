@@ -21,8 +21,7 @@ from bowdenfit.device.teleoperation import (
 )
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.bends.loop_draws import LoopDraws, loop_draws, range_of_bends
-from bowdenfit.questions.bends.ring_down import device_with_ring_down
+from bowdenfit.questions.bends.device_loop import LoopDraws, draw_loop, read_bends, read_device_with_ring_down
 from bowdenfit.questions.teleoperate.answer import CouplingScheme, SimulatedContact, Teleoperation
 from bowdenfit.results.record import Record
 
@@ -173,9 +172,9 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
     Raises:
         UsageError, DescriptionError: The fit does not tell it, or something that it needs is not stated.
     """
-    device = device_with_ring_down(fit, path)
-    angles = range_of_bends(fit, bends)
-    loop = loop_draws(fit, angles, device, np.ones(1))
+    device = read_device_with_ring_down(fit, path)
+    angles = read_bends(fit, bends)
+    loop = draw_loop(fit, angles, device, np.ones(1))
     _refuse_missing(device, loop)
     assert loop.stiffness is not None
     stated = device.needed("teleoperation", *NEEDED)

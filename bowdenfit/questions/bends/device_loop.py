@@ -1,7 +1,8 @@
-"""Draws of a fitted loop, each in a new mounting, as torques at the joint of a device."""
+"""A fitted loop in a device: draws of its torques at the joint, each in a new mounting, and its damping from a ring-down."""
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -11,21 +12,23 @@ from jax import Array
 from bowdenfit.cable.drive import LEAST_EXPONENT
 from bowdenfit.cable.elasticity import PRELOAD
 from bowdenfit.cable.sensors import RUN_SCATTER
-from bowdenfit.description.device import Device, missing_settings
+from bowdenfit.description.device import Device, Known, missing_settings, read_device
 from bowdenfit.errors import DatasetError, DescriptionError, UsageError
 from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.kinds.ringdown.kind import RingDownTable
 from bowdenfit.physics.loop import free_motion_loss, slack_load
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.equations import BentCable, has_preload, has_stretch
+from bowdenfit.questions.bends.bent_cable import BentCable, has_preload, has_stretch
 from bowdenfit.results.record import Record
+from bowdenfit.results.store import load
 from bowdenfit.units import conversion_factor
-from bowdenfit.words import shown
+from bowdenfit.words import listed, shown
 
 DRAWS = 4000  # of a fit's, evenly picked; a quantile of 5 % is then known to 0.3 %
 BENDS = 25  # wrap angles at which a range is looked at
 SCATTER, RADIUS, STIFFNESS, SPRING = "rope.mounting_scatter", "joint.pulley_radius", "rope.stiffness", "rope.spring"
 _PER_METRE = 1e-3  # N mm to N m, and N/mm times mm^2 to N m/rad
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-6  # of angles and of ratios, above rounding of units
 _MOUNTING_STREAM, _SPRING_STREAM = 31, 33  # numbers of the random streams, beside the seed of the fit
 _ANGLE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d]\S*)", re.ASCII)
 
@@ -61,7 +64,7 @@ class LoopDraws:
     slack_torque: np.ndarray
 
 
-def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: np.ndarray) -> LoopDraws:
+def draw_loop(fit: Record, bends: np.ndarray, device: Device | None, preloads: np.ndarray) -> LoopDraws:
     """Return draws of a loop at wrap angles.
 
     Args:
@@ -87,7 +90,7 @@ def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: 
     mounting = (
         fit.mounting()[rows]
         if RUN_SCATTER in draws.values
-        else scatter * _standard_normal(fit, _MOUNTING_STREAM, len(rows))
+        else scatter * _draw_standard_normal(fit, _MOUNTING_STREAM, len(rows))
     )
     with jax.enable_x64(True):
         bent = BentCable(fit.model, elastic_answers(fit).contact, jnp.asarray(bends))
@@ -122,19 +125,20 @@ def loop_draws(fit: Record, bends: np.ndarray, device: Device | None, preloads: 
 
 
 def _typical_value(fit: Record, name: str) -> float:
-    """Median of a parameter, or what it is fixed at, in its internal unit."""
+    """Return the median of a parameter, or what it is fixed at, in its internal unit."""
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     if parameter.fixed is not None:
         return float(parameter.fixed)
     return float(np.median(fit.draws().values[name]) / parameter.shown_scale)
 
 
-def _standard_normal(fit: Record, number: int, n: int) -> np.ndarray:
+def _draw_standard_normal(fit: Record, number: int, n: int) -> np.ndarray:
+    """Draw standard normal values from a stream of random numbers of their own."""
     return np.random.default_rng([fit.provenance.seed, number]).standard_normal(n)
 
 
 def _pulley_radius(fit: Record, device: Device | None) -> float:
-    """Radius of the pulley at the joint [mm]: of cable.toml, else of device.toml."""
+    """Return the radius of the pulley at the joint [mm]: of cable.toml, else of device.toml."""
     cable_radius = fit.dataset.description.cable.output_pulley_radius
     stated = device.known(RADIUS).get(RADIUS) if device is not None else None
     if cable_radius is None and stated is None:
@@ -152,7 +156,7 @@ def _pulley_radius(fit: Record, device: Device | None) -> float:
 
 
 def _mounting_scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
-    """Median scatter of the friction exponent from mounting to mounting, and whether the fit tells it."""
+    """Return the median scatter of the friction exponent between mountings, and whether the fit determines it."""
     if RUN_SCATTER in {p.name for p in fit.model.space.parameters}:
         return _typical_value(fit, RUN_SCATTER), True
     if device is None or not device.states(SCATTER):
@@ -166,9 +170,9 @@ def _mounting_scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
 def _joint_stiffness(
     fit: Record, fitted: np.ndarray | None, radius: float, device: Device | None, shape: tuple[int, ...]
 ) -> np.ndarray | None:
-    """Stiffness at the joint, draws by wrap angles [N m/rad]: of the fit, else of device.toml, with the springs in series."""
+    """Return the stiffness at the joint with its springs, draws by wrap angles [N m/rad]: of the fit, else of device.toml."""
     stated = device.known(STIFFNESS, SPRING) if device is not None else {}
-    noise = _standard_normal(fit, _SPRING_STREAM, shape[0])
+    noise = _draw_standard_normal(fit, _SPRING_STREAM, shape[0])
     if fitted is None:
         if STIFFNESS not in stated:
             return None
@@ -184,8 +188,8 @@ def _joint_stiffness(
     return 1 / (1 / fitted + 1 / (2 * spring[:, None] * (radius * 1e-3) ** 2))
 
 
-def range_of_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[float, str]] | None) -> np.ndarray:
-    """Wrap angles of a range [rad], at which a question is looked at; of all that was measured if none is stated.
+def read_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[float, str]] | None) -> np.ndarray:
+    """Return wrap angles across a stated range [rad], or across all that was measured.
 
     Args:
         fit: The fit.
@@ -213,6 +217,7 @@ def range_of_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[flo
 
 
 def _read_range(stated: str | tuple[tuple[float, str], tuple[float, str]]) -> tuple[float, float]:
+    """Return both ends of a stated range [rad]."""
     parts = [_split_number_and_unit(part) for part in stated.split(":")] if isinstance(stated, str) else list(stated)
     usage = "--wrap-angle: write a range as 45deg:180deg, the lower end first, or one angle as 90deg."
     if len(parts) not in (1, 2):
@@ -227,7 +232,76 @@ def _read_range(stated: str | tuple[tuple[float, str], tuple[float, str]]) -> tu
 
 
 def _split_number_and_unit(part: str) -> tuple[float, str]:
+    """Split a number from its unit."""
     match = _ANGLE.fullmatch(part.strip())
     if match is None:
         raise UsageError(f"--wrap-angle: {shown(part)} is not a number with its unit; write a range as 45deg:180deg.")
     return float(match[1]), match[2]
+
+
+DAMPING, JOINT_DAMPING, RINGDOWN = "rope.damping", "joint.damping", "rope.ringdown"
+_INERTIA, _RING_DOWN_DRAWS = "joint.inertia", 4000
+
+
+def read_device_with_ring_down(fit: Record, path: Path) -> Device:
+    """Read a device file; take the damping of the rope from a ring-down of the fit or of results named in the file.
+
+    The released joint is damped by rope and joint together, so that a ring-down determines the sum of both: the known
+    damping of the joint is subtracted from each draw.
+
+    Args:
+        fit: The fit of the cable.
+        path: The file.
+
+    Raises:
+        DescriptionError: See `read_device`; or damping is stated and told, or less is told than the joint alone has.
+        UsageError, StoreError: The results that it names cannot be read, or have no posterior.
+    """
+    device = read_device(path)
+    folder = device.rope.ringdown
+    has_ring_down = fit.dataset.measurements.table(RingDownTable) is not None
+    if folder is None and not has_ring_down:
+        return device
+    results = path.parent / folder if folder is not None else None
+    source = f"{RINGDOWN} names" if results else "the fit itself has"
+    if device.states(DAMPING):
+        raise DescriptionError(
+            f"device.toml, {DAMPING}: {source} a ring-down, which tells it already; leave one of the two out."
+        )
+    ring_down = fit if results is None else load(results)
+    if ring_down.dataset.measurements.table(RingDownTable) is None:
+        raise DescriptionError(
+            f"device.toml, {RINGDOWN}: {ring_down.name} was fitted without a table ringdown; name the results of "
+            'a fit that has one, as [tables] ringdown = { file = "ringdown.csv" }.'
+        )
+    if not ring_down.converged:
+        raise DescriptionError(
+            f"device.toml, {RINGDOWN}: the fit of {ring_down.name} is not to be trusted "
+            f"({listed(ring_down.reasons)}); sample longer."
+        )
+    return device.with_fitted(_known_from_ring_down(ring_down, device))
+
+
+def _known_from_ring_down(ring_down: Record, device: Device) -> dict[str, Known]:
+    """Return the damping of the rope, and the inertia of the joint where the device does not say it."""
+    joint = device.needed(
+        "the damping of the rope, which a ring-down tells together with that of the joint,", JOINT_DAMPING
+    )[JOINT_DAMPING]
+    total = _pick_draws(ring_down, "rope_damping")
+    middle = float(np.median(total)) - joint.value
+    if middle <= 0:
+        raise DescriptionError(
+            f"device.toml, {JOINT_DAMPING}: {joint.value:g} N*m*s/rad is more than the {np.median(total):.3g} N*m*s/rad "
+            "that the ring-down gives for rope and joint together; correct it, or measure it with the rope taken off."
+        )
+    known = {DAMPING: Known(middle, float(total.std()), tuple(total.tolist()), JOINT_DAMPING)}
+    if not device.states(_INERTIA) and "ring_inertia" in ring_down.draws().values:
+        inertia = _pick_draws(ring_down, "ring_inertia")
+        known[_INERTIA] = Known(float(np.median(inertia)), float(inertia.std()), tuple(inertia.tolist()))
+    return known
+
+
+def _pick_draws(fit: Record, name: str) -> np.ndarray:
+    """Return draws of a parameter, evenly picked."""
+    draws = np.ravel(fit.draws().values[name])
+    return draws[np.linspace(0, len(draws) - 1, min(len(draws), _RING_DOWN_DRAWS)).round().astype(int)]

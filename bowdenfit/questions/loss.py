@@ -13,7 +13,7 @@ from jaxtyping import Float
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
-from bowdenfit.questions.recorded.rate import usual_length
+from bowdenfit.questions.recorded.friction_effects import choose_recorded_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent, table
 
@@ -85,7 +85,7 @@ def loss_by_contact(fit: Record) -> LossByContact | None:
     laws, route = fit.model.cable.laws, fit.dataset.description.route
     if fit.sampled is None or len(laws) < 2:
         return None
-    route_value, position = usual_length(fit)
+    route_value, position = choose_recorded_length(fit)
     if route is not None and (lengths := fit.posterior.optimum.get(OPTIMAL_LENGTH)) is not None:
         best = Interval.of(lengths)
         route_value, position = best.median, f"at {best.median:z.{best.digits}f} {route.unit}"

@@ -10,7 +10,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.physics.friction import rate_factor, rate_slope
 from bowdenfit.physics.loop import dynamic_range, loop_output_force
 from bowdenfit.physics.stretch import stiffness_with_springs
-from bowdenfit.questions.recorded.stick_slip import StickSlip, friction_slopes, stick_slip
+from bowdenfit.questions.recorded.friction_effects import StickSlip, compute_friction_slopes, predict_stick_slip
 from bowdenfit.questions.summary.details import details_text
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=100", "sampler.target_r_hat=1.3", "sampler.max_steps=300")
@@ -75,12 +75,12 @@ def test_a_rope_whose_friction_falls_with_speed_says_so(tmp_path):
     path = tmp_path / "bench.csv"
     path.write_text("\n".join(lines) + "\n")
     fit = bf.fit(path, seed=1, settings=QUICK, friction="rate-dependent")
-    found = stick_slip(fit)
+    found = predict_stick_slip(fit)
     assert found is not None
     assert found.unit == "mm/s" and max(found.probabilities) > 0.9
     values = {name: fit.posterior.values[name].ravel() for name in ("stribeck", "stribeck_speed", "viscous")}
     by_hand = (
         -2 * values["stribeck"] * 5 / values["stribeck_speed"] ** 2 * np.exp(-((5 / values["stribeck_speed"]) ** 2))
     )
-    np.testing.assert_allclose(friction_slopes(fit, np.array([5.0]))[:, 0], by_hand + values["viscous"], rtol=1e-9)
+    np.testing.assert_allclose(compute_friction_slopes(fit, np.array([5.0]))[:, 0], by_hand + values["viscous"], rtol=1e-9)
     assert "sticks and slips" in " ".join(details_text(fit).split())

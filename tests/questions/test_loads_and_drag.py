@@ -9,7 +9,7 @@ from hand_bench import BENDS, LENGTHS, pull, write
 import bowdenfit as bf
 from bowdenfit.questions.length.efficiency_figure import data, draw
 from bowdenfit.questions.predict.measured_range import MeasuredRange, clip_to_tension
-from bowdenfit.questions.recorded.lost_force import lost_force
+from bowdenfit.questions.recorded.friction_effects import compute_lost_force
 
 pytestmark = pytest.mark.extended
 
@@ -41,7 +41,7 @@ def drag(tmp_path_factory):
 
 @pytest.mark.slow
 def test_drag_is_said_as_the_hidden_tension_and_as_the_force_that_it_costs(drag):
-    found = lost_force(drag[0])
+    found = compute_lost_force(drag[0])
     assert abs(found.hidden_tension.median - HIDDEN) < 4 * found.hidden_tension.sd < 0.8
     assert abs(found.lost.median - HIDDEN * 0.25) < 4 * found.lost.sd < 0.2
     said = " ".join((drag[1] / "details.txt").read_text().split())

@@ -12,8 +12,7 @@ import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import FIGURES, collect_figure_data
-from bowdenfit.questions.recorded.loop_traces import loop_points
-from bowdenfit.questions.recorded.traces import trace_recordings
+from bowdenfit.questions.recorded.traces import collect_loop_points, trace_recordings
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.store import _measurements, _measurements_page
 
@@ -104,9 +103,9 @@ def test_only_the_figures_that_make_sense_for_a_loop_are_drawn(sampled):
 
 def test_points_of_a_loop_s_plane_are_gathered_by_wrap_angle(several):
     fit = bf.fit(several, mcmc=False)
-    angle, force_in, force_out, _ = loop_points(fit)
+    angle, force_in, force_out, _ = collect_loop_points(fit)
     np.testing.assert_allclose(np.rad2deg(np.unique(angle)), [90, 180, 270])
-    assert set(loop_points(fit, contact=0)[0]) == set(angle)
+    assert set(collect_loop_points(fit, contact=0)[0]) == set(angle)
     for of_one in np.unique(angle):
         here = angle == of_one
         assert here.sum() > 100

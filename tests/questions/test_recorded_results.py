@@ -19,7 +19,7 @@ from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
-from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
+from bowdenfit.questions.recorded.friction_effects import RateEffect, compare_speeds
 from bowdenfit.questions.recorded.traces import trace_recordings
 from bowdenfit.questions.summary.answer import summary_sentences
 from bowdenfit.questions.summary.brief import summary_text
@@ -150,7 +150,7 @@ def test_figures_of_a_fit_show_every_recording_with_a_band_that_holds_most_of_it
 
 def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     fit, folder = with_rate
-    effect = rate_effect(fit)
+    effect = compare_speeds(fit)
     assert (round(effect.slow), round(effect.fast), effect.unit, effect.place) == (20, 60, "r/min", "at 470 mm")
     assert effect.difference.q05 < effect.difference.median < effect.difference.q95
     assert abs(effect.difference.median) < 0.01  # the truth is 0, mountings differ by 1 %

@@ -12,11 +12,11 @@ from kept_data import assert_kept
 from bowdenfit.plots.panels import extremes
 from bowdenfit.questions.figures import FIGURES, write_figure_files
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
-from bowdenfit.questions.recorded.autocorrelation_figure import Autocorrelation, autocorrelation
+from bowdenfit.questions.recorded.autocorrelation_figure import Autocorrelation, compute_autocorrelation
 from bowdenfit.questions.recorded.dependence_figure import Dependence
 from bowdenfit.questions.recorded.hysteresis_figure import LoopPanel
-from bowdenfit.questions.recorded.recordings_figure import POINTS, OverTime, beginning
-from bowdenfit.questions.recorded.sample_efficiency_figure import Samples, sample_efficiencies
+from bowdenfit.questions.recorded.recordings_figure import POINTS, OverTime, cut_to_first_cycles
+from bowdenfit.questions.recorded.sample_efficiency_figure import Samples, compute_sample_efficiencies
 from bowdenfit.questions.summary.residuals_figure import Residuals
 
 pytestmark = pytest.mark.extended
@@ -75,7 +75,7 @@ def trace(number=0, n=BLOCKS, name=None, draws=True, cycles=2, seconds=40.0):
         over_time,
         LoopPanel(name, motor, output, stroke, EXPONENT + spread, exponent),
         Samples(
-            name, *sample_efficiencies(motor, output, stroke * used),
+            name, *compute_sample_efficiencies(motor, output, stroke * used),
             np.array([low, middle, high]) if draws else np.full(1, middle), np.exp(-exponent), 0.002,
         ),
         Autocorrelation(name, lag, correlation, int(used.sum())),
@@ -89,7 +89,7 @@ def one_way(number=0):
     none = dict.fromkeys(("flagged_time", "flagged_input", "flagged_output"), np.zeros(0))
     over_time = dataclasses.replace(whole.over_time, name=name, **cut, **none, flagged_kind=())
     forces = {n: cut[n] for n in ("input_force", "output_force", "stroke")}
-    efficiency, stroke = sample_efficiencies(**forces)
+    efficiency, stroke = compute_sample_efficiencies(**forces)
     return Recorded(
         over_time,
         dataclasses.replace(whole.hysteresis, name=name, **forces),
@@ -194,11 +194,11 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
 
 @pytest.mark.parametrize("blocks", [np.zeros(0), np.ones(7), np.zeros(100)])
 def test_few_or_constant_deviations_have_no_autocorrelation(blocks):
-    assert autocorrelation(blocks).tolist() == [1.0]
+    assert compute_autocorrelation(blocks).tolist() == [1.0]
 
 
 def test_deviations_that_alternate_are_correlated_in_turn():
-    correlation = autocorrelation(np.resize([1.0, -1.0], 400))
+    correlation = compute_autocorrelation(np.resize([1.0, -1.0], 400))
     assert len(correlation) == 60
     np.testing.assert_allclose(correlation, np.resize([1.0, -1.0], 60) * (400 - np.arange(60)) / 400)
 
@@ -290,7 +290,7 @@ def test_of_many_cycles_only_the_first_are_shown_and_this_is_said():
     many = trace(n=4000, cycles=40, seconds=200.0)
     figure = drawn("recordings", data_of([many]))
     assert "First 8 cycles shown" in legend_of(figure)
-    shown = beginning(many.over_time)
+    shown = cut_to_first_cycles(many.over_time)
     assert shown.time[-1] == pytest.approx(8 * 5.0, abs=1.5)
     assert shown.predicted.shape == (3, len(shown.time)) == (3, len(shown.stroke))
     assert shown.flagged_kind == ("dropout",) and shown.flagged_time.tolist() == [40.0]

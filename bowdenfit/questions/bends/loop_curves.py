@@ -14,7 +14,7 @@ from bowdenfit.questions.bends.bent_cable import has_preload
 from bowdenfit.questions.bends.curves import POINTS, QUANTILES, Values, evaluate_curves, quantiles_of_draws
 from bowdenfit.questions.bends.loops_figure import MOST, RECORDED, LoopCurve
 from bowdenfit.questions.bends.preload_window_figure import COARSE, FINE, PreloadWindowCurves
-from bowdenfit.questions.recorded.loop_traces import loop_points
+from bowdenfit.questions.recorded.traces import collect_loop_points
 from bowdenfit.results.record import Record
 from bowdenfit.words import significant
 
@@ -156,7 +156,7 @@ def loop_readings(fit: Record, bends: np.ndarray) -> np.ndarray:
     The stroke is +1 forward and -1 back, `RECORDED` times that of a recording, and 0 where it is neither.
     """
     contact, table = elastic_answers(fit).contact, fit.dataset.measurements.table(LoopTable)
-    recorded = loop_points(fit, contact)
+    recorded = collect_loop_points(fit, contact)
     parts = [recorded * np.array([[1], [1], [1], [RECORDED]])]
     if table is not None:
         column = fit.dataset.description.contact[contact].wrap_angle.column

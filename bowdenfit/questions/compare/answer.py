@@ -24,7 +24,7 @@ from bowdenfit.questions.compare.common_readings import (
     choose_parts,
     find_common_readings,
 )
-from bowdenfit.questions.recorded.rate import RateEffect, rate_effect
+from bowdenfit.questions.recorded.friction_effects import RateEffect, compare_speeds
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.words import listed
@@ -209,7 +209,7 @@ def _compare_fits(fits: Mapping[str, Record], report: Report | None, leave_out: 
             for n, f in ordered.items()
             if f.dataset.description.route
         },
-        {name: effect for name, fit in ordered.items() if (effect := rate_effect(fit)) is not None},
+        {name: effect for name, fit in ordered.items() if (effect := compare_speeds(fit)) is not None},
         unit,
         few,
         {

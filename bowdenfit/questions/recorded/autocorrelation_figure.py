@@ -1,4 +1,4 @@
-"""Whether what the model leaves over in a recording is noise: autocorrelation of the deviations against the lag."""
+"""Autocorrelation of the residuals of a recording against the lag: whether they are noise."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from bowdenfit.plots.curves import choose_evenly, note_shown_count
 from bowdenfit.plots.layout import legend_above
 from bowdenfit.plots.panels import MOST, label_outer, recording_panels, set_limits, share_limits
 from bowdenfit.plots.style import BLUE, GRAY, in_paper_style
+from bowdenfit.questions import recorded as room
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 HEADING = "Autocorrelation of the residuals"
 MOST_COLUMNS = 4
-LEAST_BLOCKS, MOST_LAGS = 8, 60
-NORMAL_95 = 1.96
+LEAST_BLOCKS, MOST_LAGS = 8, 60  # blocks of a recording with an autocorrelation, and lags that are shown
+NORMAL_95 = 1.96  # standard deviations either way that hold 95 % of a normal distribution
 MOST_STEMS = 60  # lags that have a stem each; with more, a line alone
 
 
@@ -42,20 +43,18 @@ class Autocorrelation:
 
 
 def data(fit: Record) -> tuple[Autocorrelation, ...] | None:
-    """Every recording whose deviations were correlated with each other; None without any."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
-
+    """Return the autocorrelation of every recording with enough blocks; None without any."""
     autocorrelations = []
-    for trace in trace_recordings(fit):
-        correlation = autocorrelation(trace.deviation)
+    for trace in room.trace_recordings(fit):
+        correlation = compute_autocorrelation(trace.deviation)
         if len(correlation) > 1:
             lag = float(np.median(np.diff(trace.time))) * np.arange(len(correlation))
             autocorrelations.append(Autocorrelation(trace.recording.name, lag, correlation, int(trace.used.sum())))
     return tuple(autocorrelations) or None
 
 
-def autocorrelation(deviation: np.ndarray) -> np.ndarray:
-    """Autocorrelation at lags from 0; just the first where there are too few blocks."""
+def compute_autocorrelation(deviation: np.ndarray) -> np.ndarray:
+    """Return the autocorrelation at lags from 0; at lag 0 alone where there are too few blocks."""
     centered = deviation - deviation.mean() if len(deviation) else deviation
     if len(centered) < LEAST_BLOCKS or not np.any(centered):
         return np.ones(1)
@@ -65,7 +64,7 @@ def autocorrelation(deviation: np.ndarray) -> np.ndarray:
 
 
 def caption(recordings: tuple[Autocorrelation, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
         f"Autocorrelation of the deviations from the fit in {count_shown(shown, len(recordings), 'recording')}, by the "
@@ -76,14 +75,14 @@ def caption(recordings: tuple[Autocorrelation, ...]) -> str:
 
 @in_paper_style
 def draw(recordings: tuple[Autocorrelation, ...], width: float | None = None) -> Figure:
-    """Autocorrelation against the lag [s], a panel a recording, and the band that noise without memory would keep to."""
+    """Draw the autocorrelation against the lag [s], a panel a recording, and the band of white noise."""
     shown = choose_evenly(recordings, MOST)
     lags = [(float(-0.02 * r.lag.max()), float(1.02 * r.lag.max())) for r in shown]
     share_x = share_limits(lags)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.2, share_x, True, width=width)
     set_limits(flat, lags, "x", share_x)
     for axes, recording in zip(flat, shown, strict=True):
-        _panel(axes, recording)
+        _draw_panel(axes, recording)
         axes.locator_params(axis="x", nbins=4)
     lowest = min(min(float(np.nanmin(r.correlation)), -_bound(r)) for r in shown)
     flat[0].set_ylim(max(-1.05, min(-0.2, 1.15 * lowest)), 1.05)
@@ -94,11 +93,12 @@ def draw(recordings: tuple[Autocorrelation, ...], width: float | None = None) ->
 
 
 def _bound(recording: Autocorrelation) -> float:
-    """What 95 % of the autocorrelations of so many independent blocks are within."""
+    """Return the bound that 95 % of the autocorrelations of as many independent blocks keep to."""
     return NORMAL_95 / float(np.sqrt(max(recording.n_blocks, 1)))
 
 
-def _panel(axes: Axes, recording: Autocorrelation) -> None:
+def _draw_panel(axes: Axes, recording: Autocorrelation) -> None:
+    """Draw the autocorrelation of one recording, with the band of white noise."""
     lag, correlation = recording.lag, recording.correlation
     bound = _bound(recording)
     axes.axhspan(-bound, bound, facecolor="#D5D5D5", linewidth=0, zorder=0.6, label="95 % of white noise")

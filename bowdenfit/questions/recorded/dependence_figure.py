@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
-from bowdenfit.questions.recorded.dependences import Dependence, dependences
+from bowdenfit.questions import recorded as room
 from bowdenfit.words import capitalized, counted
 
 if TYPE_CHECKING:
@@ -39,13 +40,46 @@ WIDE_RANGE = 30.0  # highest over lowest x, beyond which the axis is logarithmic
 POINT_COLORS = (BLACK, *SERIES_COLORS[2:4], *SERIES_COLORS[5:8], BLACK, BLACK)  # not those of the curves
 
 
+@dataclass(frozen=True)
+class Dependence:
+    """How efficiency depends on the load or the speed, where the fit allows it to.
+
+    Args:
+        what: "load" or "speed".
+        label: Axis label with unit.
+        x: Loads [N] or speeds (shown unit).
+        quantiles: Efficiency there, 5 %, 50 % and 95 % quantiles (first axis); one row without draws.
+        constant: Efficiency by the capstan equation alone at the reference, for comparison [1].
+        points_x, points_efficiency: Measured efficiencies, by load or speed.
+        points_label: Run of each point.
+        place: Where on the route, in words, such as "at 470 mm"; empty without a route.
+        note: A note for the panel; empty without one.
+        points_half: Half the 90 % interval of each measured efficiency, from the scatter of its blocks alone.
+        new_run: Ends of the interval that holds the efficiency of a run on a new mounting with 90 % probability; empty
+            without draws.
+    """
+
+    what: str
+    label: str
+    x: np.ndarray
+    quantiles: np.ndarray
+    constant: float
+    points_x: np.ndarray
+    points_efficiency: np.ndarray
+    points_label: tuple[str, ...]
+    place: str
+    note: str = ""
+    points_half: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    new_run: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
 def data(fit: Record) -> tuple[Dependence, ...] | None:
     """Return the dependence on load and on speed; None where the friction model has neither."""
-    return dependences(fit)
+    return room.collect_dependences(fit)
 
 
 def caption(dependences: tuple[Dependence, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     words, n = " and ".join(one.what for one in dependences), max(len(set(one.points_label)) for one in dependences)
     return (
         f"Efficiency against {words}. {describe_curve(len(dependences[0].quantiles) > 1)} Dashed: the capstan equation, by "
@@ -57,7 +91,7 @@ def caption(dependences: tuple[Dependence, ...]) -> str:
 
 @in_paper_style
 def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Figure:
-    """Efficiency [%] against load and speed, a panel each on one efficiency axis."""
+    """Draw efficiency [%] against load and speed, a panel each on one efficiency axis."""
     columns = count_columns(width or WIDE, min(MOST_COLUMNS, len(dependences)), LEAST_WIDTH, 0.2)
     rows = -(-len(dependences) // columns)
     page = width or (WIDE if columns > 1 else MEDIUM)
@@ -65,8 +99,8 @@ def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Fig
     flat = drop_unused(flat, len(dependences))
     runs = list(dict.fromkeys(label for d in dependences for label in d.points_label))
     for i, (axes, one) in enumerate(zip(flat, dependences, strict=True)):
-        _curve(axes, one)
-        _points(axes, one, runs)
+        _draw_curve(axes, one)
+        _draw_points(axes, one, runs)
         axes.set_xlabel(one.label)
         if one.note:
             axes.text(0.97, 0.05, one.note, transform=axes.transAxes, ha="right", va="bottom", fontsize=SMALL)
@@ -81,8 +115,8 @@ def draw(dependences: tuple[Dependence, ...], width: float | None = None) -> Fig
     return figure
 
 
-def _curve(axes: Axes, one: Dependence) -> None:
-    """Median with 90 % interval, or the least-squares line; and the constant efficiency for comparison."""
+def _draw_curve(axes: Axes, one: Dependence) -> None:
+    """Draw the median with 90 % interval, or the least-squares line; and the constant efficiency for comparison."""
     quantiles, has_draws = 100 * one.quantiles, len(one.quantiles) > 1
     middle = quantiles[len(quantiles) // 2]
     axes.plot(one.x, middle, color=BLUE, label=MEDIAN if has_draws else LEAST_SQUARES)
@@ -100,17 +134,18 @@ def _curve(axes: Axes, one: Dependence) -> None:
         axes.xaxis.set_major_formatter("{x:g}")
 
 
-def _points(axes: Axes, one: Dependence, runs: list[str]) -> None:
-    """What was measured, with a mark a run unless these are too many."""
+def _draw_points(axes: Axes, one: Dependence, runs: list[str]) -> None:
+    """Draw the measured efficiencies, with a marker for each run unless there are too many."""
     labels = np.array(one.points_label, dtype=str)
     if len(runs) > MOST_NAMES:
-        _measured(axes, one, np.ones(len(labels), dtype=bool), 0, f"Measured in {len(runs)} runs")
+        _draw_measured(axes, one, np.ones(len(labels), dtype=bool), 0, f"Measured in {len(runs)} runs")
         return
     for i, run in enumerate(runs):
-        _measured(axes, one, labels == run, i, shorten_name(run, LONGEST))
+        _draw_measured(axes, one, labels == run, i, shorten_name(run, LONGEST))
 
 
-def _measured(axes: Axes, one: Dependence, here: np.ndarray, number: int, label: str) -> None:
+def _draw_measured(axes: Axes, one: Dependence, here: np.ndarray, number: int, label: str) -> None:
+    """Draw the measured efficiencies of one run with their intervals."""
     if here.any():
         half = 100 * one.points_half[here] if len(one.points_half) else None
         axes.errorbar(

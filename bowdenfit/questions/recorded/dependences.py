@@ -1,113 +1,60 @@
-"""Dependence of efficiency on load and speed, as plain arrays: curves of the draws, and measured points."""
-
-from __future__ import annotations
+"""Dependence of efficiency on load and speed: curves of the draws, and measured efficiencies."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import NORMAL_90
-
-if TYPE_CHECKING:
-    import jax
-
-    from bowdenfit.recordings.recording import Recording
-    from bowdenfit.results.record import Record
+from bowdenfit.questions.recorded.dependence_figure import Dependence
+from bowdenfit.questions.recorded.friction_effects import SHOWN_SPEED, choose_recorded_length, compute_lost_force
+from bowdenfit.questions.recorded.traces import QUANTILES
+from bowdenfit.recordings.recording import Recording, Recordings
+from bowdenfit.results.record import Record, thinned_parameter_values
 
 GRID, BINS = 60, 12  # places of a curve, and points a run that are shown against the load
 CURVES = 4000  # draws of a curve
-Points = tuple[
-    np.ndarray, np.ndarray, np.ndarray, list[str]
-]  # x, efficiencies, half their intervals, and the run of each
+Points = tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]  # x, efficiencies, half their intervals, runs
 
 
-@dataclass(frozen=True)
-class Dependence:
-    """How efficiency depends on the load or the speed, where the fit allows it to.
-
-    Args:
-        what: "load" or "speed".
-        label: Axis label with unit.
-        x: Loads [N] or speeds (shown unit).
-        quantiles: Efficiency there, 5 %, 50 % and 95 % quantiles (first axis); one row without draws.
-        constant: Efficiency by the capstan equation alone at the reference, for comparison [1].
-        points_x, points_efficiency: Measured, load by load or speed by speed.
-        points_label: Run of each point.
-        place: Where on the route, in words, such as "at 470 mm"; empty without a route.
-        note: What else is to be said; empty if nothing is.
-        points_half: Half the 90 % interval of each, from the scatter of its blocks alone.
-        new_run: Ends of the interval that holds the efficiency of a run on a new mounting with 90 % probability; empty
-            without draws.
-    """
-
-    what: str
-    label: str
-    x: np.ndarray
-    quantiles: np.ndarray
-    constant: float
-    points_x: np.ndarray
-    points_efficiency: np.ndarray
-    points_label: tuple[str, ...]
-    place: str
-    note: str = ""
-    points_half: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    new_run: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-
-
-def dependences(fit: Record) -> tuple[Dependence, ...] | None:
+def collect_dependences(fit: Record) -> tuple[Dependence, ...] | None:
     """Return the dependence on load and on speed, as far as the friction model has them; None where it has neither."""
-    from bowdenfit.questions.recorded.lost_force import lost_force
-    from bowdenfit.questions.recorded.rate import SHOWN_SPEED, usual_length
-    from bowdenfit.recordings.recording import Recordings
-
     friction, recordings = fit.model.cable.friction, fit.dataset.measurements.table(Recordings)
     if recordings is None or not friction.options:
         return None
-    (at, place), found_dependences = usual_length(fit), []
+    (at, place), collected = choose_recorded_length(fit), []
     recordings_here = [r for r in recordings.items if not place or r.route == at]
     if friction.depends_on_load:
-        points = [_points_by_load(r) for r in recordings_here if _is_pulling(r).any()]
+        points = [_average_by_load(r) for r in recordings_here if _is_pulling(r).any()]
         forces = np.concatenate([r.blocks.input_force[_is_pulling(r)] for r in recordings_here])
         low, high = (forces.min(), forces.max()) if len(forces) else (10.0, 100.0)
         grid = np.linspace(max(low, 1e-3), high, GRID)
-        quantiles, constant, new_run = _curves(fit, at, grid, None)
+        quantiles, constant, new_run = _compute_curves(fit, at, grid, None)
         x, efficiency, half, runs = _join_points(points)
-        lost = lost_force(fit)
+        lost = compute_lost_force(fit)
         note = lost.short() if lost is not None else ""
         fields = "load", "Input force (N)", grid, quantiles, constant, x, efficiency, runs, place, note, half, new_run
-        found_dependences.append(Dependence(*fields))
+        collected.append(Dependence(*fields))
     if friction.depends_on_rate:
         (unit, scale), (low, high) = SHOWN_SPEED[recordings.velocity_unit], friction.conditions.speeds
         grid = np.linspace(low, high, GRID)
-        quantiles, constant, new_run = _curves(fit, at, None, grid)
-        x, efficiency, half, runs = _join_points([_point_by_speed(r, scale) for r in recordings_here])
-        fields = (
-            "speed",
-            f"Speed ({unit})",
-            grid * scale,
-            quantiles,
-            constant,
-            x,
-            efficiency,
-            runs,
-            place,
-            "",
-            half,
-            new_run,
-        )
-        found_dependences.append(Dependence(*fields))
-    return tuple(found_dependences) or None
+        quantiles, constant, new_run = _compute_curves(fit, at, None, grid)
+        x, efficiency, half, runs = _join_points([_average_by_speed(r, scale) for r in recordings_here])
+        label = f"Speed ({unit})"
+        fields = "speed", label, grid * scale, quantiles, constant, x, efficiency, runs, place, "", half, new_run
+        collected.append(Dependence(*fields))
+    return tuple(collected) or None
 
 
 def _is_pulling(recording: Recording) -> np.ndarray:
-    """Mask of the blocks that are used and in which the motor pulls."""
+    """Return a mask of the blocks that are used and in which the motor pulls."""
     return recording.strokes.used_sliding & (recording.strokes.stroke > 0)
 
 
-def _points_by_load(recording: Recording) -> Points:
-    """Mean input force and mean efficiency of blocks of similar load, with half its 90 % interval."""
+def _average_by_load(recording: Recording) -> Points:
+    """Return the mean input force and mean efficiency of blocks of similar load, with half its 90 % interval."""
     used = _is_pulling(recording)
     force = recording.blocks.input_force[used]
     efficiency = recording.blocks.output_force[used] / force
@@ -118,12 +65,12 @@ def _points_by_load(recording: Recording) -> Points:
 
 
 def _half_interval(values: np.ndarray) -> float:
-    """Of the mean with 90 % probability, from the scatter of values; none of a single one."""
+    """Return half the 90 % interval of a mean, from the scatter of its values; NaN of a single one."""
     return float(NORMAL_90 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
 
 
-def _point_by_speed(recording: Recording, scale: float) -> Points:
-    """Mean speed in the unit that is shown, and mean efficiency with half its 90 % interval."""
+def _average_by_speed(recording: Recording, scale: float) -> Points:
+    """Return the mean speed in the unit that is shown, and mean efficiency with half its 90 % interval."""
     blocks = recording.blocks
     used = _is_pulling(recording) & np.isfinite(blocks.velocity)
     ratio = np.log(blocks.output_force[used] / blocks.input_force[used])
@@ -133,21 +80,15 @@ def _point_by_speed(recording: Recording, scale: float) -> Points:
 
 
 def _join_points(points: list[Points]) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Join the points of several runs."""
     x, y, half, runs = zip((np.zeros(0), np.zeros(0), np.zeros(0), []), *points, strict=True)
     return np.concatenate(x), np.concatenate(y), np.concatenate(half), tuple(run for labels in runs for run in labels)
 
 
-def _curves(
+def _compute_curves(
     fit: Record, at: float, forces: np.ndarray | None, speeds: np.ndarray | None
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Quantiles of the efficiency while pulling against load or speed, that at the reference, and the interval of a run."""
-    import jax
-    import jax.numpy as jnp
-
-    from bowdenfit.inference.draws import for_each_value
-    from bowdenfit.questions.recorded.traces import QUANTILES
-    from bowdenfit.results.record import thinned_parameter_values
-
+    """Return quantiles of the efficiency against load or speed, the efficiency at the reference, and the interval of a run."""
     model, friction = fit.model, fit.model.cable.friction
 
     def efficiency(values: Mapping[str, jax.Array]) -> tuple[jax.Array, jax.Array]:

@@ -22,6 +22,7 @@ from bowdenfit.plots.style import (
     in_paper_style,
     rounded_texts,
 )
+from bowdenfit.questions import recorded as room
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 HEADING = "Output against input force of the recordings"
 MOST_COLUMNS = 4
-WITHOUT_INTERVAL = 0.05  # uncertainty of an exponent whose digits are to be shown
+WITHOUT_INTERVAL = 0.05  # uncertainty that sets the digits of an exponent without interval
 # stroke, name, marker, size [pt] and color
 STROKES = (
     (1, "Pulling", "o", 2.6, BLUE),
@@ -59,11 +60,9 @@ class LoopPanel:
 
 
 def data(fit: Record) -> tuple[LoopPanel, ...] | None:
-    """Every recording of a single rope; None without any: those of a loop are in the figure of loops."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
-
+    """Return every recording of a single rope; None without any: those of a loop are in the figure of loops."""
     panels = []
-    for trace in trace_recordings(fit):
+    for trace in room.trace_recordings(fit):
         forces, strokes = (trace.input_force, trace.output_force), trace.recording.strokes
         if not trace.is_loop and np.any(np.isfinite(sum(forces))):
             panels.append(LoopPanel(trace.recording.name, *forces, trace.stroke, trace.exponent, strokes.exponent))
@@ -71,7 +70,7 @@ def data(fit: Record) -> tuple[LoopPanel, ...] | None:
 
 
 def caption(recordings: tuple[LoopPanel, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
         f"The loop that friction opens, {count_shown(shown, len(recordings), 'recording')}: output against input force, "
@@ -83,7 +82,7 @@ def caption(recordings: tuple[LoopPanel, ...]) -> str:
 
 @in_paper_style
 def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figure:
-    """Output against input force [N] on equal axes, a panel a recording."""
+    """Draw output against input force [N] on equal axes, a panel a recording."""
     shown = choose_evenly(recordings, MOST)
     limits = [span([r.input_force, r.output_force]) for r in shown]
     shared = share_limits(limits)
@@ -92,10 +91,10 @@ def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figur
     set_limits(flat, limits, "y", shared)
     for axes, recording in zip(flat, shown, strict=True):
         axes.locator_params(nbins=5, steps=[1, 2, 5, 10])
-        _loop(axes, recording)
-        _capstan_lines(axes, recording)
+        _draw_blocks(axes, recording)
+        _draw_capstan_lines(axes, recording)
         axes.text(
-            0.98, 0.02, _words(recording), transform=axes.transAxes, ha="right", va="bottom", fontsize=6,
+            0.98, 0.02, _describe_exponent(recording), transform=axes.transAxes, ha="right", va="bottom", fontsize=6,
             linespacing=1.1, zorder=5,
         )  # fmt: skip
     label_outer(flat, columns, "Input force (N)", "Output force (N)")
@@ -105,8 +104,8 @@ def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figur
     return figure
 
 
-def _loop(axes: Axes, recording: LoopPanel) -> None:
-    """The blocks by stroke."""
+def _draw_blocks(axes: Axes, recording: LoopPanel) -> None:
+    """Draw the blocks by stroke."""
     for stroke, name, marker, size, color in STROKES:
         here = recording.stroke == stroke
         if here.any():
@@ -116,10 +115,10 @@ def _loop(axes: Axes, recording: LoopPanel) -> None:
             )  # fmt: skip
 
 
-def _capstan_lines(axes: Axes, recording: LoopPanel) -> None:
-    """F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
+def _draw_capstan_lines(axes: Axes, recording: LoopPanel) -> None:
+    """Draw F_out = F_in exp(-Lambda) when pulling, F_in exp(Lambda) when returning, and the diagonal between."""
     force = np.array(axes.get_xlim())
-    low, middle, high = _exponent(recording)
+    low, middle, high = _exponent_interval(recording)
     has_draws = len(recording.exponent) > 1
     for sign in (-1.0, 1.0):
         if has_draws:
@@ -132,9 +131,9 @@ def _capstan_lines(axes: Axes, recording: LoopPanel) -> None:
     axes.plot(force, force, color=GRAY, linewidth=0.6, linestyle=(0, (4, 2)), label="No friction")
 
 
-def _words(recording: LoopPanel) -> str:
-    """The exponent of this recording by itself, and that of the cable; in short lines, which fit below the loop."""
-    low, middle, high = _exponent(recording)
+def _describe_exponent(recording: LoopPanel) -> str:
+    """Describe the exponent of this recording by itself and that of the cable, in short lines that fit below the loop."""
+    low, middle, high = _exponent_interval(recording)
     own, width = recording.own_exponent, high - low
     low_text, middle_text, high_text, own_text = rounded_texts((low, middle, high, own), width or WITHOUT_INTERVAL)
     lines = [f"exponent {own_text}"] if np.isfinite(own) else []
@@ -142,7 +141,7 @@ def _words(recording: LoopPanel) -> str:
     return "\n".join(lines)
 
 
-def _exponent(recording: LoopPanel) -> tuple[float, float, float]:
-    """Ends and middle of the interval of the cable's exponent, all the same without draws."""
+def _exponent_interval(recording: LoopPanel) -> tuple[float, float, float]:
+    """Return ends and middle of the interval of the cable's exponent, all the same without draws."""
     exponent = recording.exponent.tolist()
     return exponent[0], exponent[len(exponent) // 2], exponent[-1]

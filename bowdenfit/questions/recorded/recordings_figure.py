@@ -1,4 +1,4 @@
-"""Force recordings over time: both forces, phases, what the fit says, and what was left out."""
+"""Force recordings over time: both forces, phases, what the fit says, and what was left out; and the same as charts."""
 
 from __future__ import annotations
 
@@ -24,16 +24,20 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.questions import recorded as room
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.recorded.traces import RecordingTrace
     from bowdenfit.results.record import Record
+from collections.abc import Callable, Iterator
+
+from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
 
 HEADING = "Recordings over time"
 POINTS = 3200  # of each line, all panels together, which is what a page can show
-GAP_STEPS = 5
+GAP_STEPS = 5  # times the median step between blocks, beyond which there is a gap
 HEIGHT, ROW_GAP, LEAST_HEIGHT = 3.5, 0.42, 0.65  # in, of all panels, from one row to the next, of one panel at least
 MOST_IN_TWO = 4  # panels in two columns
 MOST_CYCLES = 8  # of each recording over time
@@ -44,6 +48,10 @@ PHASES = ((1, "Pulling", "#F1F6FC"), (-1, "Returning", "#F3E4CE"), (0, "Switchin
 LOOP_PHASES = ("Moving forward", "Moving back", "Between")
 FLAGS = {"dropout": ("x", VERMILLION), "spike": ("^", PURPLE), "saturated": ("s", ORANGE), "quiet": (".", GRAY)}
 OTHER_FLAG = ("+", GREEN)
+MOST_CHARTS = 24  # recordings on a page
+_CHART_POINTS = 6000  # points of all charts together
+_MAX_LEFT_OUT = 300  # samples left out that a chart shows
+_CHART_COLORS = {1: "pull", -1: "return", 0: "rest"}
 
 
 @dataclass(frozen=True)
@@ -79,13 +87,12 @@ class OverTime:
 
 
 def data(fit: Record) -> tuple[OverTime, ...] | None:
-    """Every recording; None without any of two blocks."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
-
-    return tuple(_over_time(trace) for trace in trace_recordings(fit) if len(trace.block_numbers) > 1) or None
+    """Return every recording of two blocks or more; None without any."""
+    return tuple(_show_over_time(trace) for trace in room.trace_recordings(fit) if len(trace.block_numbers) > 1) or None
 
 
-def _over_time(trace: RecordingTrace) -> OverTime:
+def _show_over_time(trace: RecordingTrace) -> OverTime:
+    """Return a recording as it is shown over time."""
     recording, flagged = trace.recording, trace.recording.account.flagged
     blocks = (
         trace.time,
@@ -99,7 +106,7 @@ def _over_time(trace: RecordingTrace) -> OverTime:
 
 
 def caption(recordings: tuple[OverTime, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     band = (
         "the band holds it with 90 % probability, a new mounting included"
         if len(recordings[0].predicted) > 1
@@ -115,20 +122,20 @@ def caption(recordings: tuple[OverTime, ...]) -> str:
 
 @in_paper_style
 def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure:
-    """Input and output force [N] over time, what the cable would give at this input, and the samples left out."""
+    """Draw input and output force [N] over time, what the cable would give at this input, and the samples left out."""
     columns = min(2 if len(recordings) <= MOST_IN_TWO else 3, count_columns(width or WIDE, 3, LEAST_WIDTH, 0.42))
     rows_with_room = int((HEIGHT + ROW_GAP) / (LEAST_HEIGHT + ROW_GAP))
     whole = choose_evenly(recordings, columns * rows_with_room)
     rows = -(-len(whole) // columns)
     height = (HEIGHT + ROW_GAP) / rows - ROW_GAP
-    shown = [beginning(r) for r in whole]
-    times = [span([r.time - start_of(r), r.flagged_time - start_of(r)], room=0.0) for r in shown]
+    shown = [cut_to_first_cycles(r) for r in whole]
+    times = [span([r.time - find_start(r), r.flagged_time - find_start(r)], room=0.0) for r in shown]
     forces = [_force_limits(r) for r in shown]
     figure, flat, columns = panels_with_limits([r.name for r in shown], times, forces, columns, height, WIDE, width)
     for axes, recording in zip(flat, shown, strict=True):
-        _phases(axes, recording)
-        _forces(axes, recording, POINTS // (2 * len(shown)))
-        _left_out(axes, recording)
+        _shade_phases(axes, recording)
+        _draw_forces(axes, recording, POINTS // (2 * len(shown)))
+        _mark_left_out(axes, recording)
     label_outer(flat, columns, TIME, FORCE)
     note_shown_count(flat[0], len(shown), len(recordings), "recordings")
     if any(len(a.time) < len(b.time) for a, b in zip(shown, whole, strict=True)):
@@ -137,8 +144,8 @@ def draw(recordings: tuple[OverTime, ...], width: float | None = None) -> Figure
     return figure
 
 
-def beginning(recording: OverTime) -> OverTime:
-    """A recording up to the last of as many cycles as can be told apart over time."""
+def cut_to_first_cycles(recording: OverTime) -> OverTime:
+    """Return a recording up to the last of as many cycles as can be told apart over time."""
     sliding = np.flatnonzero(recording.stroke)
     turns = sliding[1:][np.diff(recording.stroke[sliding]) != 0]
     if len(turns) < 2 * MOST_CYCLES:
@@ -153,36 +160,34 @@ def beginning(recording: OverTime) -> OverTime:
     )
 
 
-def start_of(recording: OverTime) -> float:
-    """Time of the first block or sample [s]."""
+def find_start(recording: OverTime) -> float:
+    """Return the time of the first block or sample [s]."""
     return float(min(recording.time[0], recording.flagged_time.min(initial=np.inf)))
 
 
 def _force_limits(recording: OverTime) -> tuple[float, float]:
-    """Limits that show what was measured and fitted, and the interval unless it is far away."""
+    """Return limits that show what was measured and fitted, and the interval unless it is far away."""
     low, high = span([recording.input_force, recording.output_force, recording.fitted])
     band_low, band_high = span([recording.predicted])
     room = 0.3 * (high - low)
     return max(min(low, band_low), low - room), min(max(high, band_high), high + room)
 
 
-def _phases(axes: Axes, recording: OverTime) -> None:
-    """Shade what the rope does."""
+def _shade_phases(axes: Axes, recording: OverTime) -> None:
+    """Shade the phases: pulling, returning, and neither."""
     names = LOOP_PHASES if recording.loop else tuple(name for _, name, _ in PHASES)
     for (value, _, fill), name in zip(PHASES, names, strict=True):
-        spans = [(start, stop - start) for start, stop in phase_spans(recording, value)]
+        spans = [(start, stop - start) for start, stop in find_phases(recording, value)]
         if spans:
             axes.broken_barh(
                 spans, (0, 1), transform=axes.get_xaxis_transform(), facecolor=fill, linewidth=0, zorder=0.4, label=name
             )
 
 
-def phase_spans(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
-    """From when to when the rope did one thing [s]: from the middle between two blocks to the next such; not where nothing
-    was recorded.
-    """
-    time = recording.time - start_of(recording)
-    gap = after_gaps(time)
+def find_phases(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
+    """Return begin and end of every phase of a stroke [s], midway between blocks; gaps in the recording belong to none."""
+    time = recording.time - find_start(recording)
+    gap = find_gaps(time)
     change = np.union1d(np.flatnonzero(np.diff(recording.stroke)) + 1, gap)
     before, after = time[change - 1], time[change]
     middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
@@ -192,16 +197,16 @@ def phase_spans(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
     return list(zip(starts[here].tolist(), stops[here].tolist(), strict=True))
 
 
-def after_gaps(time: np.ndarray) -> np.ndarray:
-    """Covariates of the first block after each stretch without any."""
+def find_gaps(time: np.ndarray) -> np.ndarray:
+    """Return the number of the first block after every gap."""
     steps = np.diff(time)
     return np.flatnonzero(steps > GAP_STEPS * np.median(steps)) + 1
 
 
-def _forces(axes: Axes, recording: OverTime, most: int) -> None:
-    """What was measured, predicted and fitted, broken where nothing was recorded."""
-    time = recording.time - start_of(recording)
-    gaps = after_gaps(time)
+def _draw_forces(axes: Axes, recording: OverTime, most: int) -> None:
+    """Draw the measured, predicted and fitted forces, broken where nothing was recorded."""
+    time = recording.time - find_start(recording)
+    gaps = find_gaps(time)
 
     def broken(values: np.ndarray) -> np.ndarray:
         return np.insert(values.astype(float), gaps, np.nan)
@@ -227,9 +232,9 @@ def _forces(axes: Axes, recording: OverTime, most: int) -> None:
     line(broken(recording.fitted), color=VERMILLION, linewidth=0.7, label="Output fitted")
 
 
-def _left_out(axes: Axes, recording: OverTime) -> None:
-    """Samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
-    kinds, start = np.array(recording.flagged_kind, dtype=str), start_of(recording)
+def _mark_left_out(axes: Axes, recording: OverTime) -> None:
+    """Mark samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
+    kinds, start = np.array(recording.flagged_kind, dtype=str), find_start(recording)
     for kind in dict.fromkeys(recording.flagged_kind):
         here = kinds == kind
         x = np.tile(recording.flagged_time[here] - start, 2)
@@ -241,3 +246,58 @@ def _left_out(axes: Axes, recording: OverTime) -> None:
         draw_marks(
             axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white"
         )
+
+
+def make_recordings_charts(recordings: tuple[OverTime, ...]) -> tuple[Chart, ...]:
+    """Return a chart for each recording, or for evenly chosen ones of many.
+
+    Args:
+        recordings: What the figure shows, and all that it has no room for.
+    """
+    shown = choose_evenly(recordings, MOST_CHARTS)
+    return tuple(_make_chart(recording, _CHART_POINTS // len(shown)) for recording in shown)
+
+
+def _make_chart(recording: OverTime, most: int) -> Chart:
+    """Return the chart of a recording, with at most so many points."""
+    time = recording.time - find_start(recording)
+    keep = np.unique(
+        np.concatenate([extremes(values, most // 2) for values in (recording.input_force, recording.output_force)])
+    )
+    gaps = find_gaps(time[keep])
+
+    def broken(values: np.ndarray) -> np.ndarray:
+        return np.insert(values[keep].astype(float), gaps, np.nan)
+
+    places = np.insert(time[keep], gaps, 0.5 * (time[keep][gaps - 1] + time[keep][gaps]))
+    lines = SeriesGroup(places, tuple(_series(recording, broken)))
+    names = LOOP_PHASES if recording.loop else tuple(name for _, name, _ in PHASES)
+    spans = tuple(
+        Span(name, _CHART_COLORS[value], start, stop)
+        for (value, _, _), name in zip(PHASES, names, strict=True)
+        for start, stop in find_phases(recording, value)
+    )
+    return Chart(recording.name, TIME, FORCE, (lines, *_left_out_group(recording)), spans)
+
+
+def _series(recording: OverTime, broken: Callable[[np.ndarray], np.ndarray]) -> Iterator[Series]:
+    """Yield the measured, predicted and fitted forces."""
+    yield Series("Input", "dashed", "gray", broken(recording.input_force))
+    yield Series("Output", "line", "black", broken(recording.output_force))
+    predicted = [broken(row) for row in recording.predicted]
+    if len(predicted) == 1:
+        yield Series(f"Output predicted, {LEAST_SQUARES.lower()}", "dashed", "blue", predicted[0])
+    else:
+        yield Series(f"Output predicted, {WIDE_INTERVAL}", "low", "blue", predicted[0])
+        yield Series(f"Output predicted, {WIDE_INTERVAL}", "high", "blue", predicted[-1])
+    yield Series("Output fitted", "line", "vermillion", broken(recording.fitted))
+
+
+def _left_out_group(recording: OverTime) -> Iterator[SeriesGroup]:
+    """Yield the output force of samples that were left out, where they have one."""
+    finite = np.flatnonzero(np.isfinite(recording.flagged_output))
+    if not len(finite):
+        return
+    chosen = np.array(choose_evenly(finite.tolist(), _MAX_LEFT_OUT))
+    time, first = np.unique(recording.flagged_time[chosen] - find_start(recording), return_index=True)
+    yield SeriesGroup(time, (Series("Output left out", "hollow", "purple", recording.flagged_output[chosen][first]),))

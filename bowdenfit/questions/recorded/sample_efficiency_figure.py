@@ -27,6 +27,7 @@ from bowdenfit.plots.style import (
     WIDE_INTERVAL,
     in_paper_style,
 )
+from bowdenfit.questions import recorded as room
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -60,49 +61,29 @@ class Samples:
 
 
 def data(fit: Record) -> tuple[Samples, ...] | None:
-    """Every recording of a single rope with blocks inside a sliding phase; None without any."""
-    from bowdenfit.questions.recorded.traces import trace_recordings
-
-    recordings, samples = [t for t in trace_recordings(fit) if not t.is_loop], []
-    runs = _run_efficiencies(fit) if recordings else {}
+    """Return every recording of a single rope with blocks inside a sliding phase; None without any."""
+    recordings, samples = [t for t in room.trace_recordings(fit) if not t.is_loop], []
+    runs = room.estimate_run_efficiencies(fit) if recordings else {}
     for trace in recordings:
-        efficiency, stroke = sample_efficiencies(trace.input_force, trace.output_force, trace.stroke * trace.used)
+        efficiency, stroke = compute_sample_efficiencies(
+            trace.input_force, trace.output_force, trace.stroke * trace.used
+        )
         if len(efficiency):
             samples.append(Samples(trace.recording.name, efficiency, stroke, *runs[trace.recording.run]))
     return tuple(samples) or None
 
 
-def sample_efficiencies(
+def compute_sample_efficiencies(
     input_force: np.ndarray, output_force: np.ndarray, stroke: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Efficiency [1] of each block in a stroke, F_out / F_in when pulling and F_in / F_out when returning; and its stroke."""
+    """Return efficiency [1], F_out / F_in when pulling and F_in / F_out when returning, and stroke of each sliding block."""
     here = (stroke != 0) & (np.minimum(input_force, output_force) > 0)
     stroke = stroke[here]
     return (output_force[here] / input_force[here]) ** stroke.astype(float), stroke
 
 
-def _run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
-    """Of each run: efficiency as expected, as measured, and the standard error of that from its readings alone."""
-    from bowdenfit.cable.sensors import BLOCK_NOISE
-    from bowdenfit.kinds.recordings.blocks import RECORDED
-    from bowdenfit.questions.recorded.traces import QUANTILES
-    from bowdenfit.recordings.recording import Recordings
-
-    recordings, posterior = fit.dataset.measurements.table(Recordings), fit.sampled
-    assert recordings is not None  # the caller has traces of them
-    term = next(t for t in fit.model.terms if t.name == RECORDED)
-    observed = term.observed()
-    weight = np.asarray(term.data.get("run_weight", np.full(len(observed), np.nan)), dtype=float)
-    expected, sigma = fit.least_squares.readings[RECORDED][None], float("nan")
-    if posterior is not None:
-        expected = np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
-        sigma = float(np.median(posterior.values[BLOCK_NOISE]))
-    sd = observed * sigma / np.sqrt(weight)
-    return {run: (expected[:, i], float(observed[i]), float(sd[i])) for i, run in enumerate(recordings.runs)}
-
-
 def caption(recordings: tuple[Samples, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     shown = min(len(recordings), MOST)
     return (
         f"Efficiency of every used block of samples in {count_shown(shown, len(recordings), 'recording')}. Line and gray "
@@ -114,20 +95,20 @@ def caption(recordings: tuple[Samples, ...]) -> str:
 
 @in_paper_style
 def draw(recordings: tuple[Samples, ...], width: float | None = None) -> Figure:
-    """Efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
+    """Draw the efficiency [%] of each used block against its number, a panel a recording on one efficiency axis."""
     shown = choose_evenly(recordings, MOST)
     counts = [(0.0, float(len(r.stroke))) for r in shown]
     share_x = share_limits(counts)
     figure, flat, columns = recording_panels([r.name for r in shown], MOST_COLUMNS, 1.6, share_x, True, width=width)
     longest = max(count for _, count in counts)
     for axes, recording, (_, count) in zip(flat, shown, counts, strict=True):
-        _samples(axes, recording)
+        _draw_samples(axes, recording)
         end = (longest if share_x else count) + 0.5
         axes.set_xlim(0.5 - 0.02 * end, end / (1 - EDGE))
         axes.locator_params(axis="x", nbins=4, integer=True, min_n_ticks=1)
-        _mean(axes, recording, count)
-        _expected(axes, recording)
-    flat[0].set_ylim(*_limits(shown))
+        _draw_mean(axes, recording, count)
+        _draw_expected(axes, recording)
+    flat[0].set_ylim(*_limit_efficiency(shown))
     flat[0].locator_params(axis="y", nbins=7)
     label_outer(flat, columns, "Number of the sample", EFFICIENCY)
     note_shown_count(flat[0], len(shown), len(recordings), "recordings")
@@ -136,8 +117,8 @@ def draw(recordings: tuple[Samples, ...], width: float | None = None) -> Figure:
     return figure
 
 
-def _samples(axes: Axes, recording: Samples) -> None:
-    """A mark a block, by stroke."""
+def _draw_samples(axes: Axes, recording: Samples) -> None:
+    """Draw a marker for every block, by stroke."""
     values, stroke = recording.efficiency, recording.stroke
     number = 1 + np.arange(len(values))
     for sign, label, marker, color in ((1, "Pulling", "o", BLUE), (-1, "Returning", "s", VERMILLION)):
@@ -149,8 +130,8 @@ def _samples(axes: Axes, recording: Samples) -> None:
             )  # fmt: skip
 
 
-def _mean(axes: Axes, recording: Samples, count: float) -> None:
-    """The run's efficiency as measured, with the uncertainty from its readings."""
+def _draw_mean(axes: Axes, recording: Samples, count: float) -> None:
+    """Draw the run's efficiency as measured, with the uncertainty from its readings."""
     mean, off = 100 * recording.mean, 100 * NORMAL_90 * recording.sd
     if not np.isfinite(mean):
         return
@@ -163,8 +144,8 @@ def _mean(axes: Axes, recording: Samples, count: float) -> None:
         )  # fmt: skip
 
 
-def _expected(axes: Axes, recording: Samples) -> None:
-    """What is expected of the cable, at the right edge."""
+def _draw_expected(axes: Axes, recording: Samples) -> None:
+    """Draw the efficiency that is expected of the cable, at the right edge."""
     efficiency = 100 * recording.expected
     low, middle, high = efficiency[0], efficiency[len(efficiency) // 2], efficiency[-1]
     right = axes.get_xlim()[1] * (1 - 0.4 * EDGE)
@@ -176,8 +157,8 @@ def _expected(axes: Axes, recording: Samples) -> None:
     )  # fmt: skip
 
 
-def _limits(shown: list[Samples]) -> tuple[float, float]:
-    """Efficiency axis [%] that shows nearly all samples, every mean and every expectation."""
+def _limit_efficiency(shown: list[Samples]) -> tuple[float, float]:
+    """Return limits of the efficiency [%] that shows nearly all samples, every mean and every expectation."""
     ends = [np.quantile(r.efficiency, (0.5 - SHARE / 2, 0.5 + SHARE / 2)) for r in shown]
     means = np.array([r.mean for r in shown])
     values = 100 * np.concatenate([*ends, *(r.expected for r in shown), means[np.isfinite(means)]])

@@ -1,18 +1,36 @@
-"""Predicted and fitted output force of each recording."""
+"""Recordings as the fit follows them, sample by sample: predicted and fitted output force, and points of loops.
 
+Output forces follow from the measured input force by the cable's play operator, for every draw.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
+from jaxtyping import Float
 
-from bowdenfit.cable.sensors import RUN_SCATTER, noise_law
+from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
+from bowdenfit.cable.sensors import BLOCK_NOISE, RUN_SCATTER, LoadCells, noise_law
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.draws import for_each_value
+from bowdenfit.kinds.recordings.blocks import RECORDED, pad_columns
+from bowdenfit.kinds.recordings.reader import angles_of_recordings
+from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.questions.recorded.equations import DRAWS, RecordingFollower, choose_blocks
+from bowdenfit.model import Model
+from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recording, Recordings
-from bowdenfit.results.record import Record, cached_per_fit, thinned_parameter_values
+from bowdenfit.results.record import Record, cached_per_fit, parameter_values, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
-_MAX_MOUNTING = 0.1  # mounting effects of a run that are looked at, either way
+DRAWS = 200  # draws that are followed, enough for the edges of a band
+MOST_BLOCKS = 1000  # blocks of a recording in a figure
+_MAX_MOUNTING = 0.1  # largest mounting effect of a run that is tried, either way; a judgement: mountings differ by less
+_SAME_ANGLE = np.deg2rad(0.05)  # wrap angles that differ by less are shown as one
 
 
 @dataclass(frozen=True)
@@ -67,6 +85,35 @@ class RecordingTrace:
         return _force_difference(self.output_force, self.fitted, self.is_loop)[self.used]
 
 
+class RecordingFollower:
+    """Follows all recordings of a data set with the cable's play operator, for `DRAWS` draws at a time; compiled once.
+
+    Args:
+        model: The model.
+        recordings: The recordings.
+        angles: The angle table, for recordings outside the curves.
+    """
+
+    def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
+        self._data = _block_arrays(model, recordings, angles)
+        values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
+        mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.items)), jnp.float64)
+        function = jax.vmap(_make_follow_function(model), in_axes=(0, 0, None))
+        self._program: Callable[..., Any] = compile_program(function, values, mounting, self._data)
+
+    def __call__(
+        self, values: Mapping[str, np.ndarray], mounting: Float[np.ndarray, "draws recordings"]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the output force [N] of each draw, block and recording, and friction exponent [1] of each draw and recording.
+
+        Args:
+            values: Named values [internal units] of `DRAWS` draws.
+            mounting: Effect of the mounting on the friction exponent of each recording [1].
+        """
+        force, exponent = self._program(values, mounting, self._data)
+        return np.asarray(force), np.asarray(exponent)
+
+
 @cached_per_fit
 def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
     """Trace every recording of a fit; empty without any."""
@@ -75,8 +122,8 @@ def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
         return ()
     with jax.enable_x64(True):
         follower = RecordingFollower(fit.model, recordings, fit.dataset.measurements.table(AngleTable))
-        predicted, exponent = _predicted(fit, recordings, follower)
-        fitted = _fitted(fit, recordings, follower)
+        predicted, exponent = _predict_forces(fit, recordings, follower)
+        fitted = _fit_forces(fit, recordings, follower)
     recording_traces = []
     for i, recording in enumerate(recordings.items):
         block_numbers = choose_blocks(len(recording.blocks.time))
@@ -85,8 +132,8 @@ def trace_recordings(fit: Record) -> tuple[RecordingTrace, ...]:
     return tuple(recording_traces)
 
 
-def _predicted(fit: Record, recordings: Recordings, follower: RecordingFollower) -> tuple[np.ndarray, np.ndarray]:
-    """Quantiles of the output force with a new mounting, and of the friction exponent without."""
+def _predict_forces(fit: Record, recordings: Recordings, follower: RecordingFollower) -> tuple[np.ndarray, np.ndarray]:
+    """Return quantiles of the output force with a new mounting, and of the friction exponent without."""
     values, n = thinned_parameter_values(fit, DRAWS), len(recordings.items)
     if fit.sampled is None:
         force, exponent = follower(values, np.zeros((DRAWS, n)))
@@ -99,8 +146,8 @@ def _predicted(fit: Record, recordings: Recordings, follower: RecordingFollower)
     return np.quantile(force, QUANTILES, axis=0), np.quantile(exponent, QUANTILES, axis=0)
 
 
-def _fitted(fit: Record, recordings: Recordings, follower: RecordingFollower) -> np.ndarray:
-    """Output force with the mounting effect of each run that suits its recordings best, by looking at many."""
+def _fit_forces(fit: Record, recordings: Recordings, follower: RecordingFollower) -> np.ndarray:
+    """Return the output force with the mounting effect of each run that suits its recordings best, of a grid."""
     center = {name: np.full(DRAWS, np.median(draws)) for name, draws in thinned_parameter_values(fit, DRAWS).items()}
     grid = np.linspace(-_MAX_MOUNTING, _MAX_MOUNTING, DRAWS)
     force, _ = follower(center, np.repeat(grid[:, None], len(recordings.items), axis=1))
@@ -116,3 +163,96 @@ def _fitted(fit: Record, recordings: Recordings, follower: RecordingFollower) ->
 def _force_difference(one: np.ndarray, other: np.ndarray, loop: bool) -> np.ndarray:
     """Return the log ratio of two forces; for a loop, whose forces pass through zero, their difference [N]."""
     return one - other if loop else np.log(np.maximum(one, 1e-3) / np.maximum(other, 1e-3))
+
+
+def choose_blocks(n_blocks: int) -> np.ndarray:
+    """Choose the blocks of a recording that are followed: all, or evenly spaced ones of a long recording."""
+    return np.arange(0, n_blocks, -(-n_blocks // MOST_BLOCKS))
+
+
+def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
+    """Return the blocks of all recordings side by side, the shorter ones standing still at their end."""
+    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.items]
+    chosen = list(zip(recordings.items, shown, strict=True))
+    drive = LoopDrive if model.cable.is_loop else RopeDrive
+    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
+    rows = collect_row_angles(model.description, angles_of_recordings(recordings), angles).data
+    held = {
+        name: pad_columns([getattr(r.blocks, name)[s] for r, s in chosen])
+        for name in ("input_force", "output_force", "velocity")
+    }
+    likely = pad_columns([smooth_input(r.blocks.input_force)[s] for r, s in chosen])
+    return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant")}
+
+
+def _make_follow_function(
+    model: Model,
+) -> Callable[[Mapping[str, Array], Array, Mapping[str, Any]], tuple[Array, Array]]:
+    """Return the output force and exponent as a function of one draw's values, of mounting effects and of the blocks."""
+
+    def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
+        drive = make_drive(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
+        cells, least = LoadCells.of(values), drive.least_force
+        start = drive.scaled(cells.true_output(data["output_force"][0], least))
+        output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)
+        return drive.without_delay(cells.shown_output(output), cells.late(data["drift"])), drive.exponent
+
+    return follow
+
+
+def estimate_run_efficiencies(fit: Record) -> dict[str, tuple[np.ndarray, float, float]]:
+    """Return the efficiency of each run as expected, as measured, and the standard error of that from its readings alone."""
+    recordings, posterior = fit.dataset.measurements.table(Recordings), fit.sampled
+    assert recordings is not None  # the caller has traces of them
+    term = next(t for t in fit.model.terms if t.name == RECORDED)
+    observed = term.observed()
+    weight = np.asarray(term.data.get("run_weight", np.full(len(observed), np.nan)), dtype=float)
+    expected, sigma = fit.least_squares.readings[RECORDED][None], float("nan")
+    if posterior is not None:
+        expected = np.quantile(posterior.expected[RECORDED], QUANTILES, axis=(0, 1))
+        sigma = float(np.median(posterior.values[BLOCK_NOISE]))
+    sd = observed * sigma / np.sqrt(weight)
+    return {run: (expected[:, i], float(observed[i]), float(sd[i])) for i, run in enumerate(recordings.runs)}
+
+
+def collect_loop_points(fit: Record, contact: int | None = None) -> np.ndarray:
+    """Return wrap angle [rad], input and output force [N] and stroke of every block of a loop, the smallest angle first.
+
+    Args:
+        fit: The fit.
+        contact: Number of the contact whose wrap angle is meant; that of all contacts together if omitted.
+
+    Returns:
+        Four rows; no columns without such recordings.
+    """
+    recordings, parts = fit.dataset.measurements.table(Recordings), [np.zeros((4, 0))]
+    if recordings is None or not recordings.loop:
+        return parts[0]
+    angles = _recording_angles(fit, recordings)
+    angle = angles.sum(axis=1) if contact is None else angles[:, contact]
+    order = np.argsort(angle, kind="stable")
+    for group in np.split(order, np.flatnonzero(np.diff(angle[order]) > _SAME_ANGLE) + 1):
+        parts += [_recording_points(float(angle[group].mean()), recordings.items[i]) for i in group.tolist()]
+    return np.concatenate(parts, axis=1)
+
+
+def _recording_angles(fit: Record, recordings: Recordings) -> np.ndarray:
+    """Return the wrap angles of each recording in each contact [rad], by the middle of the draws where curves give them."""
+    cable, angles = fit.model.cable, fit.dataset.measurements.table(AngleTable)
+    measured = collect_row_angles(cable.description, angles_of_recordings(recordings), angles).data
+    middle = {name: np.median(draws, keepdims=True) for name, draws in parameter_values(fit).items()}
+
+    def angles_of(values: Mapping[str, jax.Array]) -> jax.Array:
+        return resolve_angles(cable, values, {name: jnp.asarray(array) for name, array in measured.items()})[0]
+
+    with jax.enable_x64(True):
+        angles_by_recording: np.ndarray = for_each_value(angles_of, middle)[0]
+    return angles_by_recording
+
+
+def _recording_points(angle: float, recording: Recording) -> np.ndarray:
+    """Return the blocks of a recording that are readings, moving and at rest."""
+    blocks, stroke = recording.blocks, recording.strokes.stroke * recording.strokes.used_sliding
+    shown = choose_blocks(len(blocks.time))
+    kept = shown[~blocks.saturated[shown]]
+    return np.stack([np.full(len(kept), angle), blocks.input_force[kept], blocks.output_force[kept], stroke[kept]])

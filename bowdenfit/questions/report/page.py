@@ -22,7 +22,7 @@ from bowdenfit.questions.loss import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import ranking_section
-from bowdenfit.questions.recorded.recordings_chart import recordings_charts
+from bowdenfit.questions.recorded.recordings_figure import make_recordings_charts
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.sections import (
     answer_section,
@@ -44,7 +44,7 @@ FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
 CHARTS: dict[str, Callable[[Any], tuple[Chart, ...]]] = {
     "efficiency": efficiency_chart,
-    "recordings": recordings_charts,
+    "recordings": make_recordings_charts,
 }
 
 

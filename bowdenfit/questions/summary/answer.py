@@ -12,8 +12,7 @@ from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
-from bowdenfit.questions.recorded.lost_force import lost_force
-from bowdenfit.questions.recorded.rate import rate_effect
+from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
 from bowdenfit.questions.summary.sampled_quantities import BETWEEN_MOUNTINGS
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, few
@@ -143,4 +142,4 @@ def _option_sentences(fit: Record) -> list[str]:
     """What was found of drag, of speed and of groups, where the fit asked for them."""
     groups = contrast_groups(fit)
     contrasts = [f"Friction {c.coefficient}, {c.sentence()}." for c in (groups.contrasts if groups else ())[:_FEW]]
-    return [effect.sentence() for effect in (lost_force(fit), rate_effect(fit)) if effect is not None] + contrasts
+    return [effect.sentence() for effect in (compute_lost_force(fit), compare_speeds(fit)) if effect is not None] + contrasts

@@ -18,9 +18,12 @@ from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.loss import loss_text
-from bowdenfit.questions.recorded.lost_force import lost_force
-from bowdenfit.questions.recorded.rate import SHOWN_SPEED, rate_effect
-from bowdenfit.questions.recorded.stick_slip import stick_slip
+from bowdenfit.questions.recorded.friction_effects import (
+    SHOWN_SPEED,
+    compare_speeds,
+    compute_lost_force,
+    predict_stick_slip,
+)
 from bowdenfit.questions.summary.methods import describe_fitted_data, sampler_sentences, sampler_text
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import (
@@ -200,7 +203,7 @@ def _friction_model_block(fit: Record) -> str:
             f"{conditions.reference_force:g} N, because friction depends on the load; measured efficiencies hold at the force "
             "that stands beside them."
         )
-        lost = lost_force(fit)
+        lost = compute_lost_force(fit)
         lines += [lost.explanation()] if lost is not None else []
     if friction.depends_on_stroke:
         lines.append(
@@ -212,10 +215,10 @@ def _friction_model_block(fit: Record) -> str:
         lines.append(
             f"Coefficients and efficiencies are stated for a speed of {speed}, because friction may depend on speed."
         )
-    effect = rate_effect(fit)
+    effect = compare_speeds(fit)
     if effect is not None:
         lines.append(effect.sentence())
-    if (falls := stick_slip(fit)) is not None:
+    if (falls := predict_stick_slip(fit)) is not None:
         lines.append(falls.sentence())
     return "\n".join(filled(line) for line in lines)
 

@@ -18,9 +18,7 @@ from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
-from bowdenfit.questions.recorded.lost_force import lost_force
-from bowdenfit.questions.recorded.rate import rate_effect
-from bowdenfit.questions.recorded.stick_slip import stick_slip
+from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force, predict_stick_slip
 from bowdenfit.questions.summary.verdict import agreement_page, assess_fit
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Draws, Record
@@ -92,12 +90,12 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["checks"] = checks
     if (loss := loss_by_contact(fit)) is not None:
         page["loss"] = loss
-    if (lost := lost_force(fit)) is not None:
+    if (lost := compute_lost_force(fit)) is not None:
         page["drag"] = lost
-    effect = rate_effect(fit)
+    effect = compare_speeds(fit)
     if effect is not None:
         page["rate_effect"] = effect
-    if (falls := stick_slip(fit)) is not None:
+    if (falls := predict_stick_slip(fit)) is not None:
         page["stick_slip"] = falls
     if fit.sampled is not None:
         page["sampler"] = _sampler_page(fit, fit.posterior)

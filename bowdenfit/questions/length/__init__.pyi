@@ -1,4 +1,5 @@
-from .curves import curves_along_route as curves_along_route
-from .curves import efficiency_points as efficiency_points
-from .curves import new_run_interval as new_run_interval
-from .curves import optimal_length_draws as optimal_length_draws
+from .curves import collect_angle_curves as collect_angle_curves
+from .curves import collect_efficiency_points as collect_efficiency_points
+from .curves import collect_optimal_lengths as collect_optimal_lengths
+from .curves import compute_curves as compute_curves
+from .curves import compute_new_run_interval as compute_new_run_interval

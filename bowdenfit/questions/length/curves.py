@@ -7,8 +7,10 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import curve_function
 from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.covariates import route_values
+from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import BAND_QUANTILES, Band
 from bowdenfit.questions.length.efficiency_figure import EfficiencyPoints
+from bowdenfit.questions.length.wrap_angles_figure import AngleCurve
 from bowdenfit.results.along_route import route_grid
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit
 
@@ -16,8 +18,8 @@ _DRAWS = 5000  # from so many draws a quantile is off by less than the width of 
 
 
 @cached_per_fit
-def curves_along_route(fit: Record) -> dict[str, Band]:
-    """The efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
+def compute_curves(fit: Record) -> dict[str, Band]:
+    """Return the efficiency [1] and every curved wrap angle [deg], by name; empty without a route."""
     if fit.dataset.description.route is None:
         return {}
     if fit.sampled is not None:
@@ -31,20 +33,20 @@ def curves_along_route(fit: Record) -> dict[str, Band]:
     return {name: Band(grid, np.asarray(line)[None]) for name, line in lines.items()}
 
 
-def new_run_interval(fit: Record) -> np.ndarray:
-    """Quantiles of the efficiency of a run along the route, whose mounting shifts the friction exponent."""
+def compute_new_run_interval(fit: Record) -> np.ndarray:
+    """Return quantiles of the efficiency of a run along the route, whose mounting shifts the friction exponent."""
     efficiency, thinned = fit.along_route.curves["efficiency"], slice(None, None, max(1, len(fit.mounting()) // _DRAWS))
     mounted = efficiency[thinned] * np.exp(-fit.mounting()[thinned, None])
     return np.quantile(mounted, (BAND_QUANTILES[0], BAND_QUANTILES[-1]), axis=0)
 
 
-def optimal_length_draws(fit: Record) -> np.ndarray:
-    """Draws of the optimal length, in the unit of the route."""
+def collect_optimal_lengths(fit: Record) -> np.ndarray:
+    """Return draws of the optimal length, in the unit of the route."""
     return np.asarray(fit.posterior.optimum[OPTIMAL_LENGTH])
 
 
-def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
-    """Every measured efficiency, by table."""
+def collect_efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
+    """Return every measured efficiency, by table."""
     route, points = fit.dataset.description.route, []
     for term in fit.model.terms:
         reading_kind, position = find_readings(term.name), route_values(term)
@@ -58,3 +60,27 @@ def efficiency_points(fit: Record) -> tuple[EfficiencyPoints, ...]:
         inside = (position >= route.range[0]) & (position <= route.range[1]) if route else np.ones(len(position), dtype=bool)
         points.append(EfficiencyPoints(reading_kind.are_runs, term.labels, position, term.observed(), predicted, inside))
     return tuple(points)
+
+
+def collect_angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
+    """Return the curve and the readings of each curved contact."""
+    return tuple(_collect_angle_curve(fit, column, compute_curves(fit)[column]) for column in fit.model.cable.curves)
+
+
+def _collect_angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
+    """Return the curve of a column of wrap angles, and its readings by how they entered."""
+    table, route = fit.dataset.measurements.table(AngleTable), fit.dataset.description.route
+    assert table is not None and route is not None  # a curve has both
+    angle, limit = table.column(column)
+    inside, detected = (table.route >= route.range[0]) & (table.route <= route.range[1]), np.isfinite(angle)
+    contact = next(c.name for c in fit.dataset.description.curved if c.wrap_angle.column == column)
+    return AngleCurve(
+        contact,
+        band,
+        table.route[inside & detected],
+        np.rad2deg(angle[inside & detected]),
+        table.route[inside & ~detected],
+        np.rad2deg(limit[inside & ~detected]),
+        table.route[~inside & detected],
+        np.rad2deg(angle[~inside & detected]),
+    )

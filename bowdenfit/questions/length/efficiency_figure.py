@@ -1,4 +1,4 @@
-"""Efficiency against the route, and below it where the optimum lies and which length to buy."""
+"""Efficiency against the route, and below it where the optimum lies and which length to buy; and the same as a chart."""
 
 from __future__ import annotations
 
@@ -30,12 +30,14 @@ from bowdenfit.results.optimal_length import OptimalLength
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
+from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
+from bowdenfit.plots.style import LEAST_SQUARES, MEDIAN, NARROW_INTERVAL, WIDE_INTERVAL
 
 HEADING = "Efficiency along the route"
 # marker, its size [pt] and label
 READING, RUN = ("o", 4.5, "Measured"), ("D", 2.8, "Measured, mean of a run")
 MOST_NUMBERS, SMALLEST_NUMBER = 16, 0.5  # so many bars have numbers over them, if they are so many percent high
-LEAST_AT_EDGE = 0.005
+LEAST_AT_EDGE = 0.005  # probability of an optimum at an end of the range from which on it is said; a judgement
 DOTS = (0, (1, 1.2))
 
 
@@ -88,26 +90,26 @@ class EfficiencyAlongRoute:
 
 
 def data(fit: Record) -> EfficiencyAlongRoute | None:
-    """What is shown; None without a route."""
+    """Return efficiency along the route and its optimum; None without a route."""
     route, posterior = fit.dataset.description.route, fit.sampled
     if route is None:
         return None
     friction = fit.model.cable.friction
     force = friction.conditions.reference_force if friction.depends_on_load else None
-    points = length.efficiency_points(fit)
+    points = length.collect_efficiency_points(fit)
     shown = EfficiencyAlongRoute(
-        route.label, route.range, length.curves_along_route(fit)["efficiency"], points, at_input_force=force
+        route.label, route.range, length.compute_curves(fit)["efficiency"], points, at_input_force=force
     )
     if posterior is None:
         return shown
-    mounted = length.new_run_interval(fit) if any(p.of_runs for p in points) else None
+    mounted = length.compute_new_run_interval(fit) if any(p.of_runs for p in points) else None
     return replace(
-        shown, optimum=fit.optimal_length(), optimal_length=length.optimal_length_draws(fit), new_run=mounted
+        shown, optimum=fit.optimal_length(), optimal_length=length.collect_optimal_lengths(fit), new_run=mounted
     )
 
 
 def caption(data: EfficiencyAlongRoute) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n, has_draws = sum(len(points.labels) for points in data.points), not data.efficiency.is_line
     best = data.optimum
     return " ".join(filter(None, (
@@ -128,7 +130,7 @@ def caption(data: EfficiencyAlongRoute) -> str:
 
 @in_paper_style
 def draw(data: EfficiencyAlongRoute, width: float | None = None) -> Figure:
-    """Efficiency [%] against the route, the density of the optimal length, and each choice's chance to be the best."""
+    """Draw efficiency [%] against the route, the density of the optimal length, and each choice's probability to be best."""
     below = 0 if data.optimum is None else 2 if data.optimum.choices else 1
     has_points = any(np.isfinite(points.route).any() for points in data.points)
     figure, flat = panels(
@@ -153,7 +155,7 @@ def draw(data: EfficiencyAlongRoute, width: float | None = None) -> Figure:
 
 
 def _draw_residuals(strip: Axes, data: EfficiencyAlongRoute) -> None:
-    """Measured less predicted, and where a reading would lie with 90 % probability if it were taken anew."""
+    """Draw measured less predicted efficiencies, and where a reading would lie with 90 % probability if it were taken anew."""
     for points in data.points:
         marker, size, _ = RUN if points.of_runs else READING
         middle = points.predicted[len(points.predicted) // 2]
@@ -170,6 +172,7 @@ def _draw_residuals(strip: Axes, data: EfficiencyAlongRoute) -> None:
 
 
 def _draw_curve_and_points(axes: Axes, data: EfficiencyAlongRoute) -> None:
+    """Draw the curve with its intervals, and the measured points."""
     draw_band(axes, data.efficiency, scale=100.0)
     if data.new_run is not None:
         for end in data.new_run:
@@ -185,7 +188,7 @@ def _draw_curve_and_points(axes: Axes, data: EfficiencyAlongRoute) -> None:
 
 
 def _draw_measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill: str, note: str) -> None:
-    """Some of the measured points; the note is added to their label."""
+    """Draw some of the measured points; the note is added to their label."""
     marker, size, label = RUN if points.of_runs else READING
     if where.any():
         axes.plot(
@@ -195,7 +198,7 @@ def _draw_measured(axes: Axes, points: EfficiencyPoints, where: np.ndarray, fill
 
 
 def _draw_predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> None:
-    """What is predicted where there is no curve: median with 90 % interval, or the least-squares value."""
+    """Draw what is predicted where there is no curve: median with 90 % interval, or the least-squares value."""
     predicted, route = 100 * points.predicted[:, where], points.route[where]
     if len(predicted) == 1:
         axes.plot(route, predicted[0], "_", color=BLUE, markersize=8, label="Predicted there")
@@ -208,6 +211,7 @@ def _draw_predicted(axes: Axes, points: EfficiencyPoints, where: np.ndarray) -> 
 
 
 def _draw_optimum_density(axes: Axes, data: EfficiencyAlongRoute, optimum: OptimalLength) -> None:
+    """Draw the density of the optimal length."""
     assert data.optimal_length is not None  # comes with the optimum
     grid = np.linspace(*data.route_range, 2 * GRID_POINTS)
     height = density(data.optimal_length, grid, *data.route_range)
@@ -228,7 +232,7 @@ def _draw_optimum_density(axes: Axes, data: EfficiencyAlongRoute, optimum: Optim
 
 
 def _draw_optimum_marks(axes: Axes, optimum: OptimalLength) -> None:
-    """The median optimum, and the window of lengths that are good enough."""
+    """Draw the median optimum, and the window of lengths that are good enough."""
     length, window, unit = optimum.length, optimum.window, optimum.unit
     median, low, high = rounded_texts((length.median, length.q05, length.q95), length.q95 - length.q05)
     label = f"Optimum {median} {unit} (90 % interval {low} to {high} {unit})"
@@ -241,7 +245,7 @@ def _draw_optimum_marks(axes: Axes, optimum: OptimalLength) -> None:
 
 
 def _draw_choices(axes: Axes, optimum: OptimalLength, span: float) -> None:
-    """A bar for each choice; lengths that are far apart get bars of a tenth of the span at most."""
+    """Draw a bar for each choice; lengths that are far apart get bars of a tenth of the span at most."""
     lengths = np.array([choice.length for choice in optimum.choices])
     probability = 100 * np.array([choice.probability_best for choice in optimum.choices])
     width = 0.5 * float(np.min(np.diff(np.unique(lengths)), initial=0.1 * span))
@@ -257,3 +261,75 @@ def _draw_choices(axes: Axes, optimum: OptimalLength, span: float) -> None:
     axes.set_title("Which choice is the best", loc="left", fontsize=SMALL)
     axes.set_ylabel("Probability (%)", fontsize=SMALL)
     axes.locator_params(axis="y", nbins=3)
+
+
+def make_efficiency_chart(data: EfficiencyAlongRoute) -> tuple[Chart]:
+    """Return the chart of the curve with its intervals, measured points, and the lengths that are good enough.
+
+    Args:
+        data: What the figure shows.
+    """
+    points = [_points_group(table) for table in data.points if np.isfinite(table.route).any()]
+    groups = (*_new_run_group(data), _curve_group(data.efficiency), *points)
+    force = "" if data.at_input_force is None else f", curve at {data.at_input_force:g} N"
+    return (Chart("Efficiency", data.route_label, EFFICIENCY + force, groups, _optimum_spans(data)),)
+
+
+def _new_run_group(data: EfficiencyAlongRoute) -> tuple[SeriesGroup, ...]:
+    """Return the interval of the efficiencies of runs, each on a mounting of its own."""
+    if data.new_run is None:
+        return ()
+    low, high = 100 * data.new_run
+    return (SeriesGroup(data.efficiency.route, (Series(NEW_RUN, "low", "blue", low), Series(NEW_RUN, "high", "blue", high))),)
+
+
+def _curve_group(band: Band) -> SeriesGroup:
+    """Return the curve with its intervals."""
+    rows = 100 * band.quantiles
+    if band.is_line:
+        return SeriesGroup(band.route, (Series(LEAST_SQUARES, "line", "blue", rows[0]),))
+    low, lower, median, upper, high = rows
+    return SeriesGroup(
+        band.route,
+        (
+            Series(WIDE_INTERVAL, "low", "blue", low),
+            Series(WIDE_INTERVAL, "high", "blue", high),
+            Series(NARROW_INTERVAL, "low", "blue", lower),
+            Series(NARROW_INTERVAL, "high", "blue", upper),
+            Series(MEDIAN, "line", "blue", median),
+        ),
+    )
+
+
+def _points_group(points: EfficiencyPoints) -> SeriesGroup:
+    """Return the measured points; those at one place one after the other, as near as they can be told apart."""
+    order = np.flatnonzero(np.isfinite(points.route))
+    order = order[np.argsort(points.route[order], kind="stable")]
+    route, measured = _separate(points.route[order]), 100 * points.measured[order]
+    inside, (_, _, label) = points.inside[order], RUN if points.of_runs else READING
+    series = [Series(label, "points", "black", np.where(inside, measured, np.nan))]
+    if not inside.all():
+        series.append(Series(f"{label}, outside the range", "hollow", "black", np.where(inside, np.nan, measured)))
+        predicted = 100 * points.predicted[len(points.predicted) // 2, order]
+        series.append(Series("Predicted there", "hollow", "blue", np.where(inside, np.nan, predicted)))
+    return SeriesGroup(route, tuple(series))
+
+
+def _separate(route: np.ndarray) -> np.ndarray:
+    """Return ascending places, moved apart where they are equal."""
+    positions = np.array(route, dtype=float)
+    least = 1e-6 * max(float(np.ptp(route)), float(np.abs(route).max()), 1e-9)
+    for i in range(1, len(positions)):
+        positions[i] = max(positions[i], positions[i - 1] + least)
+    return positions
+
+
+def _optimum_spans(data: EfficiencyAlongRoute) -> tuple[Span, ...]:
+    """Return the lengths that are good enough, and the best one as a line."""
+    best = data.optimum
+    if best is None:
+        return ()
+    line = Span(f"Best {best.what}", "vermillion", best.length.median, best.length.median)
+    if not best.is_certain:
+        return (line,)
+    return Span(f"Within {percent(best.window.within)} of the best", "window", best.window.start, best.window.stop), line

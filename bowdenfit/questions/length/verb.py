@@ -1,8 +1,9 @@
-"""Asking which length is best."""
+"""The verb `length`: which length is best."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bowdenfit import results
 from bowdenfit.arguments import FIT, RESULTS, read_first
 from bowdenfit.verb import Reply, Verb
 
@@ -25,16 +26,15 @@ def length(fit: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
 
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:
+    """Return what the command line prints."""
     return Reply(f"{answer}\n", lambda: answer, csv=answer.to_csv)
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
+    """Return the reply of a stored answer; None where it is not stored."""
     if "length" not in answers:
         return None
-    from bowdenfit.results.optimal_length import OptimalLength
-    from bowdenfit.results.serialization import deserialize
-
-    return _reply(deserialize(OptimalLength, answers["length"]), options)
+    return _reply(results.deserialize(results.OptimalLength, answers["length"]), options)
 
 
 VERB = Verb(

@@ -55,38 +55,13 @@ class WrapAngles:
 
 
 def data(fit: Record) -> WrapAngles | None:
-    """What is shown; None where no contact's wrap angle is a curve."""
-    route, curves = fit.dataset.description.route, collect_angle_curves(fit)
+    """Return the curves of all curved contacts; None where no contact's wrap angle is a curve."""
+    route, curves = fit.dataset.description.route, length.collect_angle_curves(fit)
     return WrapAngles(curves, route.label, route.range) if route is not None and curves else None
 
 
-def collect_angle_curves(fit: Record) -> tuple[AngleCurve, ...]:
-    """The curve and the readings of each curved contact."""
-    return tuple(_angle_curve(fit, column, length.curves_along_route(fit)[column]) for column in fit.model.cable.curves)
-
-
-def _angle_curve(fit: Record, column: str, band: Band) -> AngleCurve:
-    from bowdenfit.kinds.tables import AngleTable
-
-    table, route = fit.dataset.measurements.table(AngleTable), fit.dataset.description.route
-    assert table is not None and route is not None  # a curve has both
-    angle, limit = table.column(column)
-    inside, detected = (table.route >= route.range[0]) & (table.route <= route.range[1]), np.isfinite(angle)
-    contact = next(c.name for c in fit.dataset.description.curved if c.wrap_angle.column == column)
-    return AngleCurve(
-        contact,
-        band,
-        table.route[inside & detected],
-        np.rad2deg(angle[inside & detected]),
-        table.route[inside & ~detected],
-        np.rad2deg(limit[inside & ~detected]),
-        table.route[~inside & detected],
-        np.rad2deg(angle[~inside & detected]),
-    )
-
-
 def caption(data: WrapAngles) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n_read = sum(len(c.route) for c in data.curves)
     limits, unused = sum(len(c.undetected_route) for c in data.curves), sum(len(c.outside_route) for c in data.curves)
     has_draws = not data.curves[0].band.is_line
@@ -103,17 +78,17 @@ def caption(data: WrapAngles) -> str:
 
 @in_paper_style
 def draw(data: WrapAngles, width: float | None = None) -> Figure:
-    """Wrap angle [deg] of each curved contact against the route, a panel each."""
+    """Draw the wrap angle [deg] of each curved contact against the route, a panel each."""
     everywhere = [route for c in data.curves for route in (c.route, c.undetected_route, c.outside_route)]
     shown = route_limits(data.route_range, *everywhere)
-    names, top = [curve.contact for curve in data.curves], (0.0, _axis_top(data.curves))
+    names, top = [curve.contact for curve in data.curves], (0.0, _find_axis_top(data.curves))
     panels = panels_with_strips(names, [shown] * len(names), [top] * len(names), MOST_COLUMNS, HEIGHT, width)
     for axes, strip, curve in zip(panels.mains, panels.strips, data.curves, strict=True):
         draw_band(axes, curve.band)
         _draw_readings(axes, curve)
         strip.plot(curve.route, _residuals(curve), "o", color=BLACK, markersize=3.6)
         shade_outside(strip, data.route_range, shown)
-        _draw_undetected(axes, curve, data.route_range, _spacing(everywhere, shown))
+        _draw_undetected(axes, curve, data.route_range, _find_spacing(everywhere, shown))
         shade_outside(axes, data.route_range, shown)
         axes.locator_params(axis="y", nbins=7)
     panels.finish_strips()
@@ -123,13 +98,13 @@ def draw(data: WrapAngles, width: float | None = None) -> Figure:
 
 
 def _residuals(curve: AngleCurve) -> np.ndarray:
-    """Readings less the curve that they follow [deg]."""
+    """Return readings less the curve that they follow [deg]."""
     middle = curve.band.quantiles[len(curve.band.quantiles) // 2]
     return np.asarray(curve.angle - np.interp(curve.route, curve.band.route, middle))
 
 
 def _draw_readings(axes: Axes, curve: AngleCurve) -> None:
-    """The readings that the curve follows, and those that it does not."""
+    """Draw the readings that the curve follows, and those that it does not."""
     axes.plot(curve.route, curve.angle, "o", color=BLACK, label="Reading")
     if len(curve.outside_route):
         axes.plot(
@@ -139,7 +114,7 @@ def _draw_readings(axes: Axes, curve: AngleCurve) -> None:
 
 
 def _draw_undetected(axes: Axes, curve: AngleCurve, route_range: tuple[float, float], spacing: float) -> None:
-    """Readings that may be anything between zero and their limit."""
+    """Draw readings that may be anything between zero and their limit."""
     route, limit = curve.undetected_route, curve.limit
     if not len(route):
         return
@@ -151,14 +126,14 @@ def _draw_undetected(axes: Axes, curve: AngleCurve, route_range: tuple[float, fl
     axes.plot(route, limit, "v", color=BLACK, markerfacecolor="white", label="Not detected, at its limit")
 
 
-def _spacing(routes: list[np.ndarray], shown: tuple[float, float]) -> float:
-    """Distance from one reading to the next."""
+def _find_spacing(routes: list[np.ndarray], shown: tuple[float, float]) -> float:
+    """Return the distance from one reading to the next."""
     steps = np.diff(np.unique(np.concatenate(routes)))
     return float(np.min(steps)) if len(steps) else 0.02 * (shown[1] - shown[0])
 
 
-def _axis_top(curves: tuple[AngleCurve, ...]) -> float:
-    """Top of the axis: above every reading, and above every interval unless that is far above the readings."""
+def _find_axis_top(curves: tuple[AngleCurve, ...]) -> float:
+    """Return the top of the axis: above every reading, and above every interval unless that is far above the readings."""
     readings = np.concatenate([values for c in curves for values in (c.angle, c.limit, c.outside_angle)])
     band, reading = max(c.band.quantiles.max() for c in curves), readings.max(initial=0.0)
     return 1.06 * float(max(reading, min(band, 2 * reading) if reading else band))

@@ -17,7 +17,7 @@ from bowdenfit.questions.figures import (
     warning_mark,
     write_figure_files,
 )
-from bowdenfit.questions.length.efficiency_chart import efficiency_chart
+from bowdenfit.questions.length.efficiency_figure import make_efficiency_chart
 from bowdenfit.questions.loss import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.ranking import rank_measurements
@@ -43,7 +43,7 @@ BELOW_FIGURES = (methods_section, provenance_section)
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
 CHARTS: dict[str, Callable[[Any], tuple[Chart, ...]]] = {
-    "efficiency": efficiency_chart,
+    "efficiency": make_efficiency_chart,
     "recordings": make_recordings_charts,
 }
 

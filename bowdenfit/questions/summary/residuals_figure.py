@@ -45,7 +45,7 @@ class Residuals:
 
 def data(fit: Record) -> Residuals | None:
     """What is shown; None where no efficiency was measured."""
-    points = length.efficiency_points(fit)
+    points = length.collect_efficiency_points(fit)
     return Residuals(points) if points else None
 
 

@@ -10,7 +10,7 @@ from hand_bench import pull, write
 import bowdenfit as bf
 from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.summary import forces_figure
-from bowdenfit.questions.summary.forces_data import MOST_PLACES, MOST_READINGS, ForcesAtBend, ForcesData
+from bowdenfit.questions.summary.figure_data import MOST_PLACES, MOST_READINGS, ForcesAtBend, ForcesData
 
 LONG = "The model does not describe force runs: around a load of 1.8 N the loss is 65 % larger than the model says; and so on"
 

@@ -29,9 +29,8 @@ from bowdenfit.questions.length.efficiency_figure import EfficiencyAlongRoute, E
 from bowdenfit.questions.length.wrap_angles_figure import AngleCurve, WrapAngles
 from bowdenfit.questions.summary import pairs_figure
 from bowdenfit.questions.summary.coefficients_figure import Coefficient
-from bowdenfit.questions.summary.pairs_figure import Pairs
+from bowdenfit.questions.summary.pairs_figure import Pairs, SampledQuantity
 from bowdenfit.questions.summary.residuals_figure import Residuals
-from bowdenfit.questions.summary.sampled_quantities import SampledQuantity
 from bowdenfit.questions.summary.traces_figure import Traces
 from bowdenfit.results.optimal_length import Choice, OptimalLength, Window
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH

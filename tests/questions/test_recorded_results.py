@@ -21,8 +21,7 @@ from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.recorded import dependence_figure
 from bowdenfit.questions.recorded.friction_effects import RateEffect, compare_speeds
 from bowdenfit.questions.recorded.traces import trace_recordings
-from bowdenfit.questions.summary.answer import summary_sentences
-from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.brief import summary_sentences, summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.recordings.recording import Recordings
 

@@ -13,8 +13,7 @@ import bowdenfit as bf
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.style import rounded_texts
 from bowdenfit.questions.summary import brief
-from bowdenfit.questions.summary.answer import KeyQuantity
-from bowdenfit.questions.summary.brief import summary_text
+from bowdenfit.questions.summary.brief import KeyQuantity, summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, Verdict
 

@@ -2,32 +2,46 @@
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+from bowdenfit.cable.sensors import RUN_SCATTER
+from bowdenfit.inference.interval import NORMAL_90, Interval
+from bowdenfit.inference.least_squares import Estimate
 from bowdenfit.kinds import describe_reading
+from bowdenfit.parameters.space import Parameter
+from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
-from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
+from bowdenfit.questions.groups import contrast_groups
+from bowdenfit.questions.loss import loss_by_contact
+from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
 from bowdenfit.questions.summary.verdict import (
     assess_fit,
+    collect_checked_readings,
     distrust_warning,
+    find_outliers,
     interval_width_caveat,
     reasons_against,
     reasons_to_trust,
     suggest_next_step,
 )
 from bowdenfit.results.record import Record
-from bowdenfit.words import WIDTH, counted, filled, table
+from bowdenfit.words import WIDTH, counted, decimals, few, filled, table
 
-LINES = 25
-_LONGEST_NAME, _LONGEST_READING = 44, 36  # characters
+LINES = 25  # fit on one terminal of usual height
+_LONGEST_NAME, _LONGEST_READING = 44, 36  # characters of names in a line of 80
 _LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OUTLIERS = 4, 8, 3  # rows
 _OTHER_LINES = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
 READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
+_KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
+_FEW = 3  # coefficients and contrasts that the answer names
+_COEFFICIENT = "friction coefficient"
+BETWEEN_MOUNTINGS = "scatter between mountings"
 
 
 def summary_text(fit: Record) -> str:
-    """One page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
+    """Return one page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
     sentences, outlier_lines = _sentence_lines(fit), _outlier_lines(fit)
     shown, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - len(outlier_lines) - _OTHER_LINES)
     if not complete and assess_fit(fit).trusted and not assess_fit(fit).doubts:  # that all readings agree is said above already
@@ -41,7 +55,7 @@ def summary_text(fit: Record) -> str:
 
 
 def _shorten_to(sentences: list[list[str]], room: int) -> list[str]:
-    """Sentences in so many lines: the first and the last stay, of the others as many as there is room for, in their order."""
+    """Return sentences in at most so many lines: the first, the last, and of the others as many as there is room for."""
     first, *others, last = sentences
     if sum(map(len, sentences)) <= room:
         return [line for sentence in sentences for line in sentence]
@@ -55,7 +69,7 @@ def _shorten_to(sentences: list[list[str]], room: int) -> list[str]:
 
 
 def _sentence_lines(fit: Record) -> list[list[str]]:
-    """Lines of the answer, of whether to trust it and of what to do next, each sentence from a line of its own on."""
+    """Return the lines of the answer, of whether to trust it and of what to do next, every sentence on a line of its own."""
     fit_verdict, name = assess_fit(fit), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
     first, *others = summary_sentences(fit)
     first = first[0].lower() + first[1:]
@@ -67,7 +81,7 @@ def _sentence_lines(fit: Record) -> list[list[str]]:
 
 
 def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
-    """The coefficients in a table of about so many rows, and whether it says what each is, for which it takes further lines."""
+    """Return the coefficients in a table of about so many rows, and whether it says in full what every one is."""
     rows_to_show = key_quantities(fit)
     shown = rows_to_show[: min(max(lines, _LEAST_QUANTITIES), _MOST_QUANTITIES)]
     if not shown:
@@ -88,9 +102,7 @@ def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
 
 
 def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
-    """What a coefficient is, in one line and as many more as there are to spare, else cut; the names of those that are no
-    friction say it themselves where there is no room.
-    """
+    """Return what a coefficient is, in one line and at most so many more; cut, or left out, where there is no room."""
     whole = textwrap.wrap(meaning, room) or [""]
     if len(whole) <= 1 + max(spare, 0):
         return whole
@@ -99,8 +111,8 @@ def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
 
 
 def _outlier_lines(fit: Record) -> list[str]:
-    """Readings that are off, beside what was expected of them; how many there are where none is."""
-    outliers, readings = outlying_readings(fit), checked_readings(fit)
+    """Return the outliers beside what was expected of them; how many readings there are where none is an outlier."""
+    outliers, readings = find_outliers(fit), collect_checked_readings(fit)
     if not outliers:
         return [filled(say_no_outliers(readings))] if len(readings) > 1 else []
     rows = [format_reading(reading) for reading in outliers[:_MOST_OUTLIERS]]
@@ -110,12 +122,12 @@ def _outlier_lines(fit: Record) -> list[str]:
 
 
 def say_no_outliers(readings: Sequence[CheckedReading]) -> str:
-    """That every reading agrees with all the others."""
+    """Say that every reading agrees with all the others."""
     return f"None of {len(readings)} readings is off."
 
 
 def format_reading(reading: CheckedReading) -> tuple[str, str, str, str]:
-    """A reading beside what all the others say of it, under `READING_HEADS`."""
+    """Format a reading beside its prediction from all the others, under `READING_HEADS`."""
     name = describe_reading(reading.table, reading.label)
     measured, expected, low, high = (
         value_with_unit(reading, value) for value in (reading.reading, reading.expected, reading.q05, reading.q95)
@@ -123,3 +135,119 @@ def format_reading(reading: CheckedReading) -> tuple[str, str, str, str]:
     bound = "at most " if reading.is_bound else ""
     interval = f"{low.rsplit(' ', 1)[0]} to {high}"
     return textwrap.shorten(name, _LONGEST_READING, placeholder="..."), f"{bound}{measured}", expected, interval
+
+
+@dataclass(frozen=True)
+class KeyQuantity:
+    """One coefficient as it is shown.
+
+    Args:
+        name: As in cable.toml.
+        description: What it is.
+        unit: Its unit, empty without one.
+        value: Median, or estimate of least squares.
+        interval: 90 % interval; what is known instead where there is none.
+    """
+
+    name: str
+    description: str
+    unit: str
+    value: str
+    interval: str
+
+
+def key_quantities(fit: Record) -> list[KeyQuantity]:
+    """Return the coefficients of friction, of the rope, and the scatter of mountings; curves and noise are details."""
+    selected = [p for p in fit.model.space.parameters if p.role in _KEY_ROLES or (p.name == RUN_SCATTER and p.fixed is None)]
+    rows = [_key_quantity(fit, p) for p in sorted(selected, key=lambda p: p.name == RUN_SCATTER)]
+    return [row for row in rows if row is not None]
+
+
+def summary_sentences(fit: Record) -> list[str]:
+    """Return the answer in sentences: the first says what to do, or what the coefficients are."""
+    if fit.sampled is not None and fit.dataset.description.route is not None:
+        best = fit.optimal_length()
+        return [best.headline, *best.sentences(), *_loss_sentence(fit), *_option_sentences(fit)]
+    return [_coefficient_sentence(fit), *_preload_advice(fit), *_loss_sentence(fit), *_option_sentences(fit)]
+
+
+def _key_quantity(fit: Record, parameter: Parameter) -> KeyQuantity | None:
+    """Return a parameter as it is shown; None without an estimate."""
+    is_run_scatter = parameter.name == RUN_SCATTER
+    unit, scale = ("%", 100.0) if is_run_scatter else ("" if parameter.unit == "1" else parameter.unit, 1.0)
+    description = BETWEEN_MOUNTINGS if is_run_scatter else _describe(parameter)
+    if parameter.fixed is not None:
+        return KeyQuantity(parameter.name, description, unit, f"{parameter.fixed * parameter.shown_scale:.4g}", "as stated")
+    if fit.sampled is not None:
+        return KeyQuantity(parameter.name, description, unit, *_format_posterior(fit.parameter(parameter.name).times(scale)))
+    estimate = fit.least_squares.estimates.get(parameter.name)
+    return KeyQuantity(parameter.name, description, unit, *_format_estimate(estimate)) if estimate is not None else None
+
+
+def _describe(parameter: Parameter) -> str:
+    """Describe a parameter, such as 'friction, free sheath'; of options by what stands before the colon."""
+    meaning = parameter.meaning.replace(_COEFFICIENT, "friction")
+    return meaning.split(": ", 1)[-1] if parameter.role == "friction_model" else meaning
+
+
+def _format_posterior(interval: Interval) -> tuple[str, str]:
+    """Format a median and its 90 % interval."""
+    digits = interval.digits
+    return f"{interval.median:z.{digits}f}", f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
+
+
+def _format_estimate(estimate: Estimate) -> tuple[str, str]:
+    """Format an estimate of least squares and its 90 % interval."""
+    if not estimate.identified:
+        return "unknown", "not told"
+    digits = decimals(2 * NORMAL_90 * estimate.standard_error)
+    interval = f"{estimate.lower:z.{digits}f} to {estimate.upper:z.{digits}f}"
+    return f"{estimate.value:z.{digits}f}", interval if "nan" not in interval and "inf" not in interval else "not known"
+
+
+def _coefficient_sentence(fit: Record) -> str:
+    """Return such as 'Coefficient of friction 0.181 (90 % interval 0.177 to 0.185).'"""
+    names = {p.name: p for p in fit.model.space.parameters}
+    coefficients = [q for q in key_quantities(fit) if q.name != RUN_SCATTER]
+    shown = [q for q in coefficients if names[q.name].role == "friction"] or coefficients
+    if not shown:
+        return "Nothing was to be found: every coefficient is stated."
+    if len(shown) == 1:
+        (only,) = shown
+        what = (
+            "Coefficient of friction"
+            if names[only.name].role == "friction"
+            else only.description[0].upper() + only.description[1:]
+        )
+        return f"{what} {_with_unit(only)} ({_interval_phrase(only)})."
+    start = "Coefficients of friction: " if names[shown[0].name].role == "friction" else ""
+    return f"{start}{few([f'{q.name} {_with_unit(q)}' for q in shown], _FEW)}."
+
+
+def _with_unit(quantity: KeyQuantity) -> str:
+    """Return the value of a quantity with its unit."""
+    return f"{quantity.value} {quantity.unit}".rstrip()
+
+
+def _interval_phrase(quantity: KeyQuantity) -> str:
+    """Return the interval of a quantity in words."""
+    return f"90 % interval {quantity.interval}" if " to " in quantity.interval else quantity.interval
+
+
+def _preload_advice(fit: Record) -> list[str]:
+    """Say which preload to set, of a cable that has one."""
+    overview = elastic_overview(fit)
+    return [overview.preload_window.advice] if overview is not None and overview.preload_window is not None else []
+
+
+def _loss_sentence(fit: Record) -> list[str]:
+    """Say which contact takes how much of the loss, of a cable that has several."""
+    loss = loss_by_contact(fit)
+    return [loss.sentence()] if loss is not None else []
+
+
+def _option_sentences(fit: Record) -> list[str]:
+    """Say what was found of drag, of speed and of groups, where the fit asked for them."""
+    groups = contrast_groups(fit)
+    contrasts = [f"Friction {c.coefficient}, {c.sentence()}." for c in (groups.contrasts if groups else ())[:_FEW]]
+    return [effect.sentence() for effect in (compute_lost_force(fit), compare_speeds(fit)) if effect is not None] + contrasts

@@ -68,7 +68,7 @@ class Coefficient:
 
 
 def data(fit: Record) -> tuple[Coefficient, ...] | None:
-    """The parameters that belong to friction, constant angles or sensors; None where none was sampled."""
+    """Return the parameters that belong to friction, constant angles or sensors; None without draws."""
     posterior, estimates, coefficients = fit.sampled, fit.least_squares.estimates, []
     if posterior is None:
         return None
@@ -84,7 +84,7 @@ def data(fit: Record) -> tuple[Coefficient, ...] | None:
 
 
 def caption(parameters: tuple[Coefficient, ...]) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     return (
         f"What the measurements say of {counted(len(parameters), 'coefficient')}. Shaded: how plausible each value is, "
         "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
@@ -96,45 +96,46 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
 
 @in_paper_style
 def draw(parameters: tuple[Coefficient, ...], width: float | None = None) -> Figure:
-    """Posterior density of each coefficient against its prior, and the least-squares estimate with standard error."""
+    """Draw the posterior density of each coefficient against its prior, and the least-squares estimate."""
     columns = count_columns(width or WIDE, min(MOST_COLUMNS, len(parameters)), LEAST_WIDTH, 0.68)
     rows = -(-len(parameters) // columns)
     page = width or (WIDE if columns > 1 else MEDIUM)
     figure, flat = panels([1.35] * rows, columns, TITLE + 0.14, (0.68, TITLE + 0.64), page)
     flat = drop_unused(flat, len(parameters))
     for axes, parameter in zip(flat, parameters, strict=True):
-        _panel(axes, parameter)
+        _draw_panel(axes, parameter)
     legend_above(figure, flat, columns=3)
     room_for_labels(figure)
     return figure
 
 
-def _panel(axes: Axes, parameter: Coefficient) -> None:
-    draws, shown = parameter.draws, _axis(parameter)
+def _draw_panel(axes: Axes, parameter: Coefficient) -> None:
+    """Draw the posterior density of one coefficient against its prior, and the least-squares estimate."""
+    draws, shown = parameter.draws, _find_limits(parameter)
     grid, lower = np.linspace(*shown, GRID_POINTS), support(draws, parameter.prior)
     posterior = density(draws, grid, lower)
     axes.fill_between(grid, posterior, color=BLUE, alpha=0.38, linewidth=0)
     axes.plot(grid, posterior, color=BLUE, label="With the measurements")
     prior = density(parameter.prior, grid, lower)
     axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Before them (prior)")
-    _least_squares(axes, parameter, shown, 0.08 * posterior.max())
+    _draw_least_squares(axes, parameter, shown, 0.08 * posterior.max())
     axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()))
     label_across(axes, axis_label(parameter.symbol, parameter.unit))
-    axes.yaxis.set_major_formatter(lambda value, _: _in_few_letters(value))
+    axes.yaxis.set_major_formatter(lambda value, _: _format_in_few_letters(value))
     axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
-    axes.set_title(_title(parameter))
+    axes.set_title(_describe_posterior(parameter))
 
 
-def _in_few_letters(value: float) -> str:
-    """A number as it is, or as a power of ten where that is shorter: 4e5."""
+def _format_in_few_letters(value: float) -> str:
+    """Format a number as it is, or as a power of ten where that is shorter: 4e5."""
     if value == 0 or _SHORT[0] <= abs(value) < _SHORT[1]:
         return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
     digits, power = f"{value:.3e}".split("e")
     return f"{digits.rstrip('0').rstrip('.')}e{int(power)}".replace("-", "\N{MINUS SIGN}")
 
 
-def _axis(parameter: Coefficient) -> tuple[float, float]:
-    """Limits that show the posterior, and the least-squares estimate unless it is far away."""
+def _find_limits(parameter: Coefficient) -> tuple[float, float]:
+    """Return limits that show the posterior, and the least-squares estimate unless it is far away."""
     low, high = limits(parameter.draws)
     value, width = parameter.least_squares, high - low
     if np.isfinite(value) and low - width < value < high + width:
@@ -142,8 +143,8 @@ def _axis(parameter: Coefficient) -> tuple[float, float]:
     return low, high
 
 
-def _least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float], height: float) -> None:
-    """The estimate with its standard error, or a note where there is none to draw."""
+def _draw_least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float], height: float) -> None:
+    """Draw the estimate with its standard error, or a note where there is none to draw."""
     value, error = parameter.least_squares, parameter.standard_error
     if shown[0] <= value <= shown[1]:
         axes.errorbar(
@@ -159,7 +160,8 @@ def _least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, float
     )  # fmt: skip
 
 
-def _title(parameter: Coefficient) -> str:
+def _describe_posterior(parameter: Coefficient) -> str:
+    """Return the median and 90 % interval of a coefficient, as a title."""
     low, middle, high = (float(q) for q in np.quantile(parameter.draws, (0.05, 0.5, 0.95)))
     low_text, median, high_text = rounded_texts((low, middle, high), high - low)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"

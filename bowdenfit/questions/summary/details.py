@@ -40,17 +40,17 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Record
 from bowdenfit.words import decimals, filled, listed, percent, significant, table
 
-_UNLIMITED = 2000.0  # an angle in degrees or a length in mm beyond which a curve coefficient is no longer a finding
-_PRIOR_DRIVEN = 0.2  # contraction below which a parameter is said to rest on its prior alone
+_UNLIMITED = 2000.0  # deg or mm, beyond which a curve coefficient counts as not limited; a judgement
+_PRIOR_DRIVEN = 0.2  # contraction below which a parameter is said to rest on its prior alone; a judgement
 
 
 _HEADS = (
     "parameter", "median", "90 % interval", "mean ± sd", "least squares ± s.e.", "90 % profile interval", "prior", "unit",
 )  # fmt: skip
 _ALWAYS = (0, 4, 6)  # columns that are shown even where they are empty
-_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings it is 1.6
+_WIDE = 2.5  # standard errors to each side beyond which an interval needs a word; of many readings they are 1.6 (NORMAL_90)
 def details_text(fit: Record) -> str:
-    """Everything that a fit says, for people."""
+    """Return everything that a fit says, for people."""
     page = summarize(fit)
     blocks = [
         _title_block(fit),
@@ -77,11 +77,13 @@ def details_text(fit: Record) -> str:
 
 
 def _title_block(fit: Record) -> str:
+    """Return the name of the cable and what was fitted."""
     remarks = [filled(remark) for remark in fit.dataset.measurements.remarks]
     return "\n".join([fit.name, "=" * len(fit.name), filled(describe_fitted_data(fit)), *remarks])
 
 
 def _verdict_block(fit: Record, page: dict[str, Any]) -> str:
+    """Return the verdict, its reasons, and how the sampling went."""
     fit_verdict = assess_fit(fit)
     if fit.sampled is None:
         state = "least squares only; no posterior, no design answer" if fit_verdict.trusted else _problem_headline(fit_verdict)
@@ -98,7 +100,7 @@ def _verdict_block(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _problem_headline(fit_verdict: Verdict) -> str:
-    """What is wrong, in capitals that nobody overlooks."""
+    """Return what is wrong, in capitals that nobody overlooks."""
     kinds = {
         NOT_IDENTIFIABLE: "COEFFICIENTS NOT IDENTIFIABLE",
         CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
@@ -113,12 +115,13 @@ def _problem_headline(fit_verdict: Verdict) -> str:
 
 
 def _identified_sentence(fit: Record) -> str:
-    """Which coefficients the measurements determine, in a sentence."""
+    """Say which coefficients the measurements determine."""
     friction = assess_identifiability(fit).groups.get("friction") if fit.sampled is not None else None
     return filled(describe_identified(friction, measured=True)) if friction is not None else ""
 
 
 def _prior_driven_sentence(page: dict[str, Any]) -> str:
+    """Say which parameters rest on their prior almost alone; empty without any."""
     names = [
         n
         for n, p in page["parameters"].items()
@@ -131,7 +134,7 @@ def _prior_driven_sentence(page: dict[str, Any]) -> str:
 
 
 def _curve_block(fit: Record, page: dict[str, Any]) -> str:
-    """Derived quantities of the curves, a table for each family."""
+    """Return derived quantities of the curves, a table for each family."""
     if fit.sampled is None:
         return ""
     families: dict[type[Curve], list[str]] = {}
@@ -141,6 +144,7 @@ def _curve_block(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _curve_family_lines(family: type[Curve], names: list[str], page: dict[str, Any]) -> str:
+    """Return derived quantities of the curves of one family."""
     lines, note = [f"{family.heading}, median (90 % interval):"], False
     for name in names:
         c = page[name]
@@ -154,6 +158,7 @@ def _curve_family_lines(family: type[Curve], names: list[str], page: dict[str, A
 
 
 def _residual_sentence(page: dict[str, Any]) -> str:
+    """Return the residual standard deviation of every table, in a sentence."""
     deviations = [(find_readings(name), sd) for name, sd in page["least_squares"]["residual_sd"].items() if sd is not None]
     parts = [
         f"{called.name.replace('_', ' ')} {called.shown_scale * sd:.2f} {called.scatter_unit}"
@@ -164,7 +169,7 @@ def _residual_sentence(page: dict[str, Any]) -> str:
 
 
 def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
-    """The scatter from mounting to mounting, in words."""
+    """Describe the scatter from mounting to mounting."""
     tau, runs = (
         page["parameters"].get(RUN_SCATTER, {}),
         {r["label"] for r in page["measured"] if find_readings(r["table"]).are_runs},
@@ -187,12 +192,13 @@ def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _recordings_block(fit: Record) -> str:
+    """Describe the recordings; empty without any."""
     recordings = fit.dataset.measurements.table(Recordings)
     return "Recordings\n" + "\n".join(describe_preparations(recordings)) if recordings is not None else ""
 
 
 def _friction_model_block(fit: Record) -> str:
-    """What the options of the friction model found."""
+    """Describe what the options of the friction model found."""
     friction = fit.model.cable.friction
     if not friction.options:
         return ""
@@ -224,6 +230,7 @@ def _friction_model_block(fit: Record) -> str:
 
 
 def _measured_block(fit: Record, page: dict[str, Any]) -> str:
+    """Return measured beside predicted efficiencies in a table; empty without any."""
     if not page["measured"]:
         return ""
     has_draws = fit.sampled is not None
@@ -248,18 +255,20 @@ def _measured_block(fit: Record, page: dict[str, Any]) -> str:
 
 
 def _design_answer(fit: Record) -> str:
+    """Return the best length; empty without a route or draws."""
     if fit.sampled is None or fit.dataset.description.route is None:
         return ""
     return str(fit.optimal_length())
 
 
 def _origin_sentence(page: dict[str, Any]) -> str:
+    """Return the seed and the versions of libraries."""
     versions = ", ".join(f"{name} {version}" for name, version in page["versions"].items())
     return filled(f"Seed {page['seed']}; {versions}.")
 
 
 def parameters_text(fit: Record) -> str:
-    """Every parameter, and remarks on least squares."""
+    """Return every parameter in a table, and remarks on least squares."""
     estimates, intervals = fit.least_squares.estimates, posterior_intervals(fit)
     rows = [_row(p, intervals.get(p.name), estimates.get(p.name), bool(intervals)) for p in fit.model.space.parameters]
     keep = [i for i in range(len(_HEADS)) if i in _ALWAYS or any(row[i] for row in rows)]
@@ -290,11 +299,12 @@ def parameters_text(fit: Record) -> str:
 
 
 def posterior_intervals(fit: Record) -> dict[str, Interval]:
-    """Of every parameter that was sampled; empty without draws."""
+    """Return the posterior interval of every parameter that was sampled; empty without draws."""
     return {p.name: fit.parameter(p.name) for p in fit.model.space.free} if fit.sampled is not None else {}
 
 
 def _row(parameter: Parameter, interval: Interval | None, estimate: Estimate | None, sampled: bool) -> tuple[str, ...]:
+    """Return the cells of a parameter, see `_HEADS`."""
     posterior_cells = _format_moments(interval) if interval is not None else ("", "", "")
     # Beside a posterior's intervals there is no room for others; those are in summary.json.
     profiled = "" if sampled or estimate is None else _format_profile_interval(estimate)
@@ -305,11 +315,12 @@ def _row(parameter: Parameter, interval: Interval | None, estimate: Estimate | N
 
 
 def _unit(parameter: Parameter) -> str:
+    """Return the unit of a parameter; empty without one."""
     return "" if parameter.unit == "1" else parameter.unit
 
 
 def _format_moments(interval: Interval) -> tuple[str, str, str]:
-    """Median, interval, and mean with standard deviation."""
+    """Format median, interval, and mean with standard deviation."""
     median, low, high, mean, sd = (
         f"{value:z.{decimals(interval.sd)}f}"
         for value in (interval.median, interval.q05, interval.q95, interval.mean, interval.sd)
@@ -318,6 +329,7 @@ def _format_moments(interval: Interval) -> tuple[str, str, str]:
 
 
 def _format_estimate(estimate: Estimate) -> str:
+    """Format an estimate with its standard error."""
     if not estimate.identified:
         return _say_why_missing(estimate)
     digits = _digits(estimate, abs(estimate.value) / 1000)
@@ -325,17 +337,18 @@ def _format_estimate(estimate: Estimate) -> str:
 
 
 def _say_why_missing(estimate: Estimate) -> str:
+    """Say why there is no estimate."""
     return "at bound" if estimate.at_bound else "not identified"
 
 
 def _digits(estimate: Estimate, otherwise: float) -> int:
-    """Decimals that go with its standard error, where there is one."""
+    """Return the decimals that go with a standard error, where there is one."""
     error = estimate.standard_error
     return decimals(error if isfinite(error) and error else otherwise)
 
 
 def _format_profile_interval(estimate: Estimate) -> str:
-    """Profile interval of least squares; empty where it was not computed."""
+    """Format the profile interval of least squares; empty where it was not computed."""
     finite = [limit for limit in (estimate.lower, estimate.upper) if isfinite(limit)]
     if not finite:
         return "not limited" if estimate.open else ""
@@ -347,10 +360,11 @@ def _format_profile_interval(estimate: Estimate) -> str:
 
 
 def _is_wide(estimate: Estimate) -> bool:
-    """Whether the interval is much wider than the standard error says."""
+    """Return whether the interval is much wider than the standard error says."""
     width, error = estimate.upper - estimate.lower, estimate.standard_error
     return estimate.identified and isfinite(width) and isfinite(error) and width > 2 * _WIDE * error
 
 
 def _describe_problem(estimate: Estimate) -> str:
+    """Describe an estimate that is not identified."""
     return "at its bound in least squares" if estimate.at_bound else "not identified by least squares"

@@ -64,6 +64,7 @@ def _find_drawn_figures(results: Path, names: Sequence[str], endings: Sequence[s
 
 
 def _copy_figures(source: Path, names: Sequence[str], folder: Path, endings: Sequence[str]) -> None:
+    """Copy figures from one folder to another."""
     for name in names:
         for ending in endings:
             shutil.copyfile(source / f"{name}.{ending}", folder / f"{name}.{ending}")

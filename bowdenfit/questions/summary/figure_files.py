@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bowdenfit import results as results_door
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions import summary
@@ -44,6 +45,7 @@ def prepare_figures(fit: Any, names: Sequence[str], width: NumberWithUnit | None
 def _draw_figures(
     figures: Mapping[str, Any], look: tuple[str, float | None, str], folder: Path, endings: Sequence[str]
 ) -> None:
+    """Draw figures into a folder."""
     for name, data in figures.items():
         write_figure_files(name, data, folder, endings, *look)
 
@@ -61,9 +63,7 @@ def _collect_data(fit: Any, names: Sequence[str]) -> tuple[dict[str, Any], str, 
     if data and results is not None:
         cable, troubles = read_page(results / FIT)["description"]["name"], read_answers(results)["troubles"]
     else:
-        from bowdenfit.results.store import load  # which loads JAX
-
-        record = load(results) if results is not None else fit
+        record = results_door.load(results) if results is not None else fit
         data, cable = dict(collect_figure_data(record, names)), record.name
         troubles = tuple(summary.assess_fit(record).troubles)
     if missing := [name for name in names if name not in data]:

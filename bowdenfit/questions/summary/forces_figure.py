@@ -117,12 +117,12 @@ class ForcesData:
 
 
 def data(fit: Record) -> ForcesData | None:
-    """What is shown; None without a table of forces."""
+    """Return readings and law of a table of forces; None without one."""
     return summary.collect_forces(fit)
 
 
 def caption(forces: ForcesData) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n = forces.count or sum(len(here.stroke) for here in forces.places)
     band = "lines: medians, with the intervals that hold them with 90 % probability" if len(forces.places[0].law) > 1 else (
         "lines: least squares"
@@ -140,16 +140,16 @@ def caption(forces: ForcesData) -> str:
 
 @in_paper_style
 def draw(forces: ForcesData, width: float | None = None) -> Figure:
-    """Output against input with a strip of residuals below; beside them the apparent coefficient against the load."""
+    """Draw output against input force with residuals below, and the apparent coefficient against the load beside them."""
     page = width or WIDE
-    verdict_lines = wrap_words(_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
-    figure, (main, strip, beside) = _panels(page, 0.06 + VERDICT_ROW * (1 + verdict_lines.count("\n")))
+    verdict_lines = wrap_words(_describe_verdict(forces), page - LEFT - RIGHT + LABEL, most=VERDICT_ROWS)
+    figure, (main, strip, beside) = _make_panels(page, 0.06 + VERDICT_ROW * (1 + verdict_lines.count("\n")))
     if forces.logarithmic:
         for axes, name, value in ((main, "x", "input_force"), (main, "y", "output_force"), (beside, "x", "input_force")):
             read = np.concatenate([getattr(here, value) for here in forces.places])
             make_logarithmic(axes, name, float(read.max() / read.min()))
-    _main(main, forces)
-    _strip(strip, forces)
+    _draw_forces(main, forces)
+    _draw_residuals(strip, forces)
     draw_apparent_friction(beside, forces)
     inner = page * main.get_position().width
     for axes in (main, strip, beside):
@@ -161,8 +161,8 @@ def draw(forces: ForcesData, width: float | None = None) -> Figure:
     return figure
 
 
-def _panels(page: float, top: float) -> tuple[Figure, list[Axes]]:
-    """Output with its strip, and the coefficient beside them, or below where the page is narrow."""
+def _make_panels(page: float, top: float) -> tuple[Figure, list[Axes]]:
+    """Return the figure with panels for the output, its residuals, and the coefficient beside or below."""
     beside = page >= 2 * LEAST_WIDTH
     inner = (page - LEFT - RIGHT - ACROSS) / 2 if beside else page - LEFT - RIGHT
     lower = 0.0 if beside else MAIN + BOTTOM + 2 * GAP
@@ -173,15 +173,15 @@ def _panels(page: float, top: float) -> tuple[Figure, list[Axes]]:
     return figure, [main, strip, axes_at(figure, left, BOTTOM, inner, tall)]
 
 
-def _verdict(forces: ForcesData) -> str:
-    """The verdict in a sentence."""
+def _describe_verdict(forces: ForcesData) -> str:
+    """Return the verdict in a sentence."""
     if forces.trusted:
         return f"The readings follow the fitted law ({forces.model})."
     return f"Not trusted. {forces.verdict.partition(';')[0].rstrip('.')}."
 
 
-def _main(axes: Axes, forces: ForcesData) -> None:
-    """Output against input."""
+def _draw_forces(axes: Axes, forces: ForcesData) -> None:
+    """Draw output against input force."""
     every = np.concatenate([here.stroke for here in forces.places])
     if forces.by_bend:
         draw_against_wrap_angle(axes, forces, "law")
@@ -189,9 +189,9 @@ def _main(axes: Axes, forces: ForcesData) -> None:
         for i, stroke in enumerate(STROKES):
             if np.any(here.stroke == stroke) or not np.any(here.stroke):
                 line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, *line_over_read_loads(here, here.law[:, i]), color, linestyle=line, linewidth=1.0)
+                draw_quantiles(axes, *cut_to_read_loads(here, here.law[:, i]), color, linestyle=line, linewidth=1.0)
     load = forces.places[0].load
-    bends, pulled = wrap_angle_limits(forces) if forces.by_bend else (0.0, 0.0), forces.places[0].input_force.mean()
+    bends, pulled = find_wrap_angle_limits(forces) if forces.by_bend else (0.0, 0.0), forces.places[0].input_force.mean()
     unloaded = (bends, (pulled, pulled)) if forces.by_bend else (load, load)
     axes.plot(*unloaded, color=GRAY, linewidth=0.8, linestyle=NO_FRICTION, label="No friction")
     law = forces.places[0].law
@@ -217,8 +217,8 @@ def _main(axes: Axes, forces: ForcesData) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _strip(axes: Axes, forces: ForcesData) -> None:
-    """What readings are off the law."""
+def _draw_residuals(axes: Axes, forces: ForcesData) -> None:
+    """Draw the residuals of the readings."""
     off = np.concatenate([here.off for here in forces.places])
     limit = ROOM * float(np.nanmax(np.abs(off), initial=0.0)) or 1.0
     if len(forces.spread):
@@ -239,13 +239,13 @@ def _strip(axes: Axes, forces: ForcesData) -> None:
 
 
 def assign_colors(forces: ForcesData) -> list[tuple[ForcesAtBend, str, str]]:
-    """The places with lines of their own, with color and marker."""
+    """Return the places with lines of their own, with color and marker."""
     shown = [here for here in forces.places if here.shown]
     return [(here, SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) for i, here in enumerate(shown)]
 
 
 def draw_readings(axes: Axes, forces: ForcesData, value: str, name: bool = False) -> None:
-    """Readings of all places: filled while pulling, open while returning, crosses where held, gray without a line."""
+    """Draw readings of all places: filled while pulling, open while returning, crosses where held, gray without a line."""
     size = MARK if sum(len(here.stroke) for here in forces.places) < MANY else SMALL_MARK
     low, high = axes.get_ylim() if value == "apparent" else (-np.inf, np.inf)
     styles = {id(here): (color, marker) for here, color, marker in assign_colors(forces)}
@@ -264,8 +264,8 @@ def draw_readings(axes: Axes, forces: ForcesData, value: str, name: bool = False
             axes.plot([], [], marker=marker, color=color, markersize=MARK, label=here.label)
 
 
-def line_over_read_loads(here: ForcesAtBend, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Loads of a line and its quantiles there, from the lowest reading of the place to its highest."""
+def cut_to_read_loads(here: ForcesAtBend, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return loads and quantiles of a line from the lowest reading of the place to its highest."""
     loads = np.linspace(here.input_force.min(), here.input_force.max(), len(here.load))
     if here.load[1] / here.load[0] < here.load[-1] / here.load[-2] + EVEN:  # evenly spaced in the logarithm
         loads = np.geomspace(loads[0], loads[-1], len(loads))
@@ -273,7 +273,7 @@ def line_over_read_loads(here: ForcesAtBend, line: np.ndarray) -> tuple[np.ndarr
 
 
 def draw_against_wrap_angle(axes: Axes, forces: ForcesData, value: str) -> None:
-    """The law at the load of the readings, through all bends.
+    """Draw the law at the load of the readings, through all bends.
 
     Args:
         axes: Panel to draw on.
@@ -290,16 +290,16 @@ def draw_against_wrap_angle(axes: Axes, forces: ForcesData, value: str) -> None:
             draw_quantiles(axes, angles, np.array(rows).T, GRAY, linestyle="-" if stroke > 0 else RETURN_DASHES, linewidth=1.0)
 
 
-def wrap_angle_limits(forces: ForcesData) -> tuple[float, float]:
-    """An axis from no bend to beyond the largest."""
+def find_wrap_angle_limits(forces: ForcesData) -> tuple[float, float]:
+    """Return limits of an axis from no bend to beyond the largest."""
     return 0.0, 1.05 * max(float(here.bend.max()) for here in forces.places)
 
 
 def draw_apparent_friction(axes: Axes, forces: ForcesData) -> None:
-    """Apparent coefficient against the load, beside what the capstan equation says: a horizontal line."""
+    """Draw the apparent coefficient against the load, beside the horizontal line of the capstan equation."""
     load = forces.places[0].load
-    axes.set_xlim(*(wrap_angle_limits(forces) if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
-    axes.set_ylim(*_coefficient_limits(forces))
+    axes.set_xlim(*(find_wrap_angle_limits(forces) if forces.by_bend else (load[0] if forces.logarithmic else 0.0, load[-1])))
+    axes.set_ylim(*_find_coefficient_limits(forces))
     if forces.by_bend:
         draw_against_wrap_angle(axes, forces, "apparent_law")
     colored, any_curved = [] if forces.by_bend else assign_colors(forces), False
@@ -308,7 +308,7 @@ def draw_apparent_friction(axes: Axes, forces: ForcesData) -> None:
         for i, stroke in enumerate(STROKES):
             if np.any(here.stroke == stroke):
                 line = "-" if stroke > 0 else RETURN_DASHES
-                draw_quantiles(axes, *line_over_read_loads(here, here.apparent_law[:, i]), color, linestyle=line, linewidth=1.0)
+                draw_quantiles(axes, *cut_to_read_loads(here, here.apparent_law[:, i]), color, linestyle=line, linewidth=1.0)
         if np.isfinite(here.capstan) and not _is_constant(here):
             axes.axhline(here.capstan, color=color, linestyle=CAPSTAN_DOTS, linewidth=1.1)
             any_curved = True
@@ -319,26 +319,26 @@ def draw_apparent_friction(axes: Axes, forces: ForcesData) -> None:
 
 
 def _lines_coincide(forces: ForcesData) -> bool:
-    """Whether several places have one coefficient, so that their lines are one."""
+    """Return whether several places have one coefficient, so that their lines are one."""
     lines = np.array([middle(here.apparent_law) for here in forces.places if here.shown])
     return bool(len(lines) > 1 and np.ptp(lines) < SAME_COEFFICIENT * np.max(np.abs(lines)))
 
 
 def _is_constant(here: ForcesAtBend) -> bool:
-    """Whether the law is the capstan equation's: the same coefficient at all loads."""
+    """Return whether the law is the capstan equation's: the same coefficient at all loads."""
     line = middle(here.apparent_law)
     return bool(np.ptp(line) < SAME_COEFFICIENT * np.max(np.abs(line)))
 
 
 def count_beyond_axis(forces: ForcesData) -> int:
-    """How many readings are drawn on the edge, because their coefficients lie beyond it."""
+    """Count the readings that are drawn on the edge, because their coefficients lie beyond it."""
     readings = np.concatenate([here.apparent for here in forces.places])
-    low, high = _coefficient_limits(forces)
+    low, high = _find_coefficient_limits(forces)
     return int(np.sum((readings < low) | (readings > high)))
 
 
-def _coefficient_limits(forces: ForcesData) -> tuple[float, float]:
-    """From the readings but for a few far ones, and from the laws with their bands; far ones are drawn on the edge."""
+def _find_coefficient_limits(forces: ForcesData) -> tuple[float, float]:
+    """Return limits that show the readings but for a few far ones, and the laws with their bands."""
     readings = np.concatenate([here.apparent for here in forces.places])
     readings = readings[np.isfinite(readings)]
     if not len(readings):

@@ -40,7 +40,7 @@ _CITED = re.compile(rf"\[({'|'.join(REFERENCES)})\]")
 
 
 def methods_section(fit: Record) -> PageSection:
-    """The paragraphs with numbers in place of the keys of `REFERENCES`, and the references by these numbers."""
+    """Return the paragraphs with numbers in place of the keys of `REFERENCES`, and the references by these numbers."""
     paragraphs = [
         " ".join(filter(None, [_data_sentence(fit), _model_sentences(fit), _inference_sentences(fit)])),
         _prior_sentence(fit),
@@ -57,7 +57,7 @@ def methods_section(fit: Record) -> PageSection:
 
 
 def describe_counts(fit: Record) -> str:
-    """What was fitted to: '17 wrap angles and 4 efficiencies'."""
+    """Describe what was fitted to: '17 wrap angles and 4 efficiencies'."""
     description, tables = fit.dataset.description, fit.dataset.measurements
     entered = [find_term_kind(term.name).count_readings(term, description) for term in fit.model.terms]
     read = [kind.count_readings(table) for kind, table in iterate_tables(tables)]
@@ -65,7 +65,7 @@ def describe_counts(fit: Record) -> str:
 
 
 def describe_fitted_data(fit: Record) -> str:
-    """What was fitted to, and by which model where it is not the usual one, in a sentence."""
+    """Describe what was fitted to, and by which model where it is not the usual one."""
     description = fit.dataset.description
     geometry = f"; {description.geometry} geometry" if description.curved else ""
     model = f"; friction model {description.friction_model}" if description.friction_model != "capstan" else ""
@@ -75,12 +75,13 @@ def describe_fitted_data(fit: Record) -> str:
 
 
 def _data_sentence(fit: Record) -> str:
+    """Say what was fitted, by which version."""
     version = fit.provenance.versions.get("bowdenfit", "")
     return f"{describe_counts(fit)} of the cable were fitted jointly with bowdenfit {version}.".strip()
 
 
 def _model_sentences(fit: Record) -> str:
-    """Equations and scatter."""
+    """Describe equations and scatter."""
     description = fit.dataset.description
     sentences = [
         "Friction at the contacts in series followed F_out = F_in exp(-s sum_k mu_k theta_k), with s = +1 while pulling and -1 "
@@ -96,7 +97,7 @@ def _model_sentences(fit: Record) -> str:
 
 
 def _inference_sentences(fit: Record) -> str:
-    """How values and intervals came about."""
+    """Describe how values and intervals were computed."""
     squares = (
         "Least squares by Levenberg and Marquardt's method [optimistix], with profile intervals, on the same likelihood in JAX "
         "[jax]"
@@ -114,13 +115,14 @@ def _inference_sentences(fit: Record) -> str:
 
 
 def _refitted_phrase(fit: Record) -> str:
-    """What more was done for readings of which the weights cannot tell."""
+    """Describe the refits for readings that importance weights cannot leave out."""
     checks = check_readings(fit)
     n = sum(int(table.refitted.sum()) for table in checks.tables) if checks else 0
     return f", {n} of them against that of a fit without it" if n else ""
 
 
 def _sampler_phrase(posterior: Draws) -> str:
+    """Describe the sampler with its citations."""
     trajectories = values_by_key(posterior.trajectories) if posterior.trajectories else {}
     page = {
         "method": posterior.sampler,
@@ -133,6 +135,7 @@ def _sampler_phrase(posterior: Draws) -> str:
 
 
 def _convergence_sentence(fit: Record, posterior: Draws) -> str:
+    """Say which limits of convergence were reached."""
     settings = fit.dataset.description.sampler
     r_hat = "rank-normalized R-hat [r-hat]" if posterior.sampler == "nuts" else "rank-normalized, nested R-hat [r-hat] [nested]"
     limits = f"{r_hat} below {settings.target_r_hat:g} and effective sample sizes of at least {settings.target_ess}"
@@ -142,12 +145,13 @@ def _convergence_sentence(fit: Record, posterior: Draws) -> str:
 
 
 def _prior_sentence(fit: Record) -> str:
+    """Return the priors of all free parameters in a sentence."""
     shown = "; ".join(f"{p.name} {p.prior_text}" for p in fit.model.space.free)
     return f"Priors: {shown}." if fit.sampled is not None and shown else ""
 
 
 def sampler_text(sampler: dict[str, Any]) -> str:
-    """The sampler in a few words.
+    """Describe the sampler in a few words.
 
     Args:
         sampler: The page "sampler" of summary.json.
@@ -158,7 +162,7 @@ def sampler_text(sampler: dict[str, Any]) -> str:
 
 
 def sampler_sentences(page: dict[str, Any]) -> list[str]:
-    """How trajectories went, whether a second sampler agrees, and which to try instead; empty of most fits.
+    """Describe how trajectories went, whether a second sampler agrees, and which to try instead; empty of most fits.
 
     Args:
         page: What summary.json holds.
@@ -172,6 +176,7 @@ def sampler_sentences(page: dict[str, Any]) -> list[str]:
 
 
 def _trajectories(sampler: dict[str, Any]) -> str:
+    """Describe how the trajectories of NUTS went."""
     diverged = f"{sampler['diverged']} of {sampler['drawn']} trajectories diverged" if sampler["diverged"] else ""
     if sampler["diverged"] and not sampler["fine_diverged"]:
         diverged += f", none of the {sampler['fine']} of fine steps that reach where the others break off"

@@ -48,7 +48,7 @@ class Summary(Display, dict[str, Any]):
 
 
 def summarize(fit: Record) -> dict[str, Any]:
-    """Summary of a fit as plain data; NaN where a number does not exist is None.
+    """Summarize a fit as plain data; NaN where a number does not exist is None.
 
     Args:
         fit: The fit.
@@ -108,7 +108,7 @@ def summarize(fit: Record) -> dict[str, Any]:
 
 
 def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:
-    """How the draws came about, and what is recommended instead ("" if nothing is)."""
+    """Return how the draws were sampled, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
     shortfalls = describe_convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
     page = {
@@ -125,6 +125,7 @@ def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:
 
 
 def _parameter_row(fit: Record, name: str) -> dict[str, Any]:
+    """Return what is known of a parameter, as plain data."""
     parameter = next(p for p in fit.model.space.parameters if p.name == name)
     row: dict[str, Any] = {"unit": parameter.unit, "meaning": parameter.meaning, "prior": parameter.prior_text}
     if parameter.scaled_by:
@@ -146,16 +147,17 @@ def _parameter_row(fit: Record, name: str) -> dict[str, Any]:
 
 
 def contraction(fit: Record, name: str) -> float:
-    """How much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
+    """Return how much narrower the posterior is than the prior, in z: 1 where data decide, 0 where the prior alone speaks."""
     return float(1 - np.var(fit.posterior.z[..., fit.model.space.index[name]]))
 
 
 def curve_coefficients(fit: Record) -> dict[str, tuple[str, str]]:
-    """Unit and symbol of each derived curve coefficient."""
+    """Return unit and symbol of each derived curve coefficient."""
     return derived_units(fit.model)
 
 
 def _curve_row(fit: Record, name: str) -> dict[str, Any]:
+    """Return what is known of a derived curve coefficient, as plain data."""
     row: dict[str, Any] = {"unit": curve_coefficients(fit)[name][0]}
     if fit.sampled is not None:
         ordered = np.sort(fit.posterior.values[name], axis=None)  # some may be infinite, and are not to be interpolated
@@ -165,7 +167,7 @@ def _curve_row(fit: Record, name: str) -> dict[str, Any]:
 
 
 def _input_forces(fit: Record, term: Term) -> np.ndarray:
-    """At which input force each efficiency of a term holds [N], where friction depends on it: of a run, its weighted mean."""
+    """Return the input force at which each efficiency holds [N], where friction depends on it; of a run its weighted mean."""
     friction, data = fit.model.cable.friction, term.data
     if not friction.depends_on_load:
         return np.zeros(0)
@@ -178,7 +180,7 @@ def _input_forces(fit: Record, term: Term) -> np.ndarray:
 
 
 def _measured_efficiencies(fit: Record) -> list[dict[str, Any]]:
-    """Every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
+    """Return every measured efficiency beside what the fit says of it (as section 3.2 of the on-body paper does).
 
     The relative error is measured over predicted, less 1. Without draws the prediction is least squares'.
     """

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit.plots.captions import explain_symbols
+from bowdenfit.plots.curves import density, limits
 from bowdenfit.plots.layout import (
     EDGE,
     area_entry,
@@ -20,7 +21,7 @@ from bowdenfit.plots.layout import (
     wrap_words,
 )
 from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
-from bowdenfit.questions.summary.sampled_quantities import SampledQuantity, optimum_quantities, sampled_quantities
+from bowdenfit.questions import summary
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -39,6 +40,35 @@ SMOOTHING = 6.5  # bins, of one draw; less of n by the rate of the best kernel i
 
 
 @dataclass(frozen=True)
+class SampledQuantity:
+    """Draws of a parameter, or of the optimum.
+
+    Args:
+        label: Symbol with unit.
+        draws: The draws (walkers by draws).
+        bounds: Lowest and highest possible value.
+        symbol: Symbol alone, in matplotlib's math notation.
+        meaning: What it is, in words.
+    """
+
+    label: str
+    draws: np.ndarray
+    bounds: tuple[float, float]
+    symbol: str = ""
+    meaning: str = ""
+
+    def limits(self, share: float) -> tuple[float, float]:
+        """Return limits of an axis that shows the given share of the draws, within the bounds."""
+        low, high = limits(self.draws, share)
+        return max(low, self.bounds[0]), min(high, self.bounds[1])
+
+    def density(self, grid: np.ndarray, draws: np.ndarray | None = None) -> np.ndarray:
+        """Return the density of the draws, or of some of them, with its highest point at 1."""
+        height = density(self.draws if draws is None else draws, grid, *self.bounds)
+        return height / height.max()
+
+
+@dataclass(frozen=True)
 class Pairs:
     """Draws of what is shown, and what the optimum is the best of, such as "cable length"; empty without one."""
 
@@ -47,18 +77,18 @@ class Pairs:
 
 
 def data(fit: Record) -> Pairs | None:
-    """Coefficients and the rope first, what may be confounded with them next, then noise; at most eight with the optimum.
+    """Return coefficients and the rope first, what may be confounded with them next, then noise; eight with the optimum.
 
     None where there are no two to draw against each other.
     """
-    answer, route = optimum_quantities(fit), fit.dataset.description.route
-    quantities = sampled_quantities(fit, ROLES)[: MOST_QUANTITIES - len(answer)] + answer
+    answer, route = summary.collect_optimum_quantities(fit), fit.dataset.description.route
+    quantities = summary.collect_sampled_quantities(fit, ROLES)[: MOST_QUANTITIES - len(answer)] + answer
     best = route.variable.replace("_", " ") if route is not None and answer else ""
     return Pairs(quantities, best) if len(quantities) > 1 else None
 
 
 def caption(data: Pairs) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     return (
         "Corner plot: every two parameters against each other, and the distribution of each on the diagonal. Dark and light: "
         "the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two parameters "
@@ -161,6 +191,6 @@ def _draw_legend(first: Axes, remarks: list[str], room: float) -> None:
 
 
 def _select_quantities(data: Pairs, most: int) -> list[SampledQuantity]:
-    """So many quantities at most, the optimum among them."""
+    """Return at most so many quantities, the optimum among them."""
     every, last = data.quantities, 2 if data.best and most > 2 else 0
     return every if len(every) <= most else every[: most - last] + every[len(every) - last :]

@@ -44,13 +44,13 @@ class Residuals:
 
 
 def data(fit: Record) -> Residuals | None:
-    """What is shown; None where no efficiency was measured."""
+    """Return measured and predicted efficiencies; None where no efficiency was measured."""
     points = length.collect_efficiency_points(fit)
     return Residuals(points) if points else None
 
 
 def caption(data: Residuals) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n, has_draws = sum(len(points.labels) for points in data.points), len(data.points[0].predicted) > 1
     bars = (
         "bars: where a reading would lie with 50 % and 90 % probability if it were taken anew, on a new mounting where "
@@ -65,7 +65,7 @@ def caption(data: Residuals) -> str:
 
 @in_paper_style
 def draw(data: Residuals, width: float | None = None) -> Figure:
-    """Efficiencies by label beside their predictive intervals, and measured less predicted."""
+    """Draw efficiencies by label beside their predictive intervals, and measured less predicted."""
     page = width or WIDE
     labels = _shorten_labels(data.points, LABELS * page)
     inner = float(np.clip(ROW * len(labels), LEAST, MOST))
@@ -88,7 +88,7 @@ def draw(data: Residuals, width: float | None = None) -> Figure:
 
 
 def _shorten_labels(tables: tuple[EfficiencyPoints, ...], room: float) -> list[str]:
-    """The labels, their beginning left out where they are too long."""
+    """Return the labels, their beginning left out where they are too long."""
     labels = [label for points in tables for label in points.labels]
     longest = LONGEST
     while longest > 4 and max(text_width(shorten_name(label, longest)) for label in labels) > room:
@@ -97,7 +97,7 @@ def _shorten_labels(tables: tuple[EfficiencyPoints, ...], room: float) -> list[s
 
 
 def _draw_rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool) -> None:
-    """One row a measurement, the first on top."""
+    """Draw one row a measurement, the first on top."""
     measured = 100 * np.concatenate([t.measured for t in tables])
     predicted = 100 * np.concatenate([t.predicted for t in tables], axis=1)
     inside = np.concatenate([t.inside for t in tables])

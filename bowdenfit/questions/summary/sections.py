@@ -8,13 +8,20 @@ from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.next.words import TITLE
-from bowdenfit.questions.summary.answer import checked_readings, key_quantities, outlying_readings, summary_sentences
-from bowdenfit.questions.summary.brief import READING_HEADS, format_reading, say_no_outliers
+from bowdenfit.questions.summary.brief import (
+    READING_HEADS,
+    format_reading,
+    key_quantities,
+    say_no_outliers,
+    summary_sentences,
+)
 from bowdenfit.questions.summary.details import details_text, parameters_text
 from bowdenfit.questions.summary.methods import describe_fitted_data
 from bowdenfit.questions.summary.verdict import (
     assess_fit,
+    collect_checked_readings,
     distrust_warning,
+    find_outliers,
     interval_width_caveat,
     reasons_against,
     reasons_to_trust,
@@ -22,9 +29,12 @@ from bowdenfit.questions.summary.verdict import (
 )
 from bowdenfit.results.record import Record
 
+_HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
+_MOST_READINGS = 400  # readings in a table that someone may look through
+
 
 def answer_section(fit: Record) -> PageSection:
-    """What to do or what the coefficients are; of a fit that is not to be trusted that first, and why."""
+    """Return what to do or what the coefficients are; of a fit that is not to be trusted that first, and why."""
     fit_verdict, (first, *others) = assess_fit(fit), summary_sentences(fit)
     choices: tuple[PageTable, ...] = ()
     if fit.sampled is not None and fit.dataset.description.route is not None:
@@ -45,7 +55,7 @@ def answer_section(fit: Record) -> PageSection:
 
 
 def measured_section(fit: Record) -> PageSection:
-    """Every table, as `bowdenfit check` has it."""
+    """Return every table, as `bowdenfit check` describes it."""
     data = fit.dataset
     described = [(kind, kind.describe(table, data.description)) for kind, table in iterate_tables(data.measurements)]
     items = [line for kind, lines in described if not kind.heading for line in lines]
@@ -55,22 +65,16 @@ def measured_section(fit: Record) -> PageSection:
     )
 
 
-_HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
-
-
 def coefficients_section(fit: Record) -> PageSection | None:
-    """Coefficients of friction and of the rope; None where every one is stated."""
+    """Return the coefficients of friction and of the rope; None where every one is stated."""
     rows = tuple((q.name, q.value, q.interval, q.unit, q.description) for q in key_quantities(fit))
     folded = [("Every parameter, with what was assumed beforehand", parameters_text(fit)), ("Groups", groups_text(fit))]
     return prose_section("Coefficients", (), [PageTable(_HEADS, rows, left=(0, 3, 4))], folded=folded) if rows else None
 
 
-_MOST_READINGS = 400  # readings in a table that someone may look through
-
-
 def checks_section(fit: Record) -> PageSection | None:
-    """Readings that are off; folded, all readings and what the checks say in full. None without draws."""
-    outliers, readings = outlying_readings(fit), checked_readings(fit)
+    """Return the outliers; folded, all readings and what the checks say in full. None without draws."""
+    outliers, readings = find_outliers(fit), collect_checked_readings(fit)
     if not readings:
         return None
     heads = ("reading", *READING_HEADS)
@@ -85,13 +89,13 @@ def checks_section(fit: Record) -> PageSection | None:
 
 
 def next_step_section(fit: Record) -> PageSection | None:
-    """The next step with a fit that may be trusted; of another the reasons say it."""
+    """Return the next step with a fit that may be trusted; of another the reasons say it."""
     sentence = suggest_next_step(fit) if assess_fit(fit).trusted else ""
     return prose_section(TITLE, [sentence]) if sentence else None
 
 
 def provenance_section(fit: Record) -> PageSection:
-    """What it takes to make the same fit again."""
+    """Return what it takes to make the same fit again."""
     made, files = fit.provenance, fit.dataset.sha256
     versions = ", ".join(f"{name} {version}" for name, version in made.versions.items())
     when = f", finished {made.created}" if made.created else ""

@@ -1,4 +1,4 @@
-"""Whether independent ensembles agree and stand still: the path of each through the draws."""
+"""Trace plot: the path of every independent ensemble through the draws, which shows whether they agree."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from bowdenfit.plots.layout import (
     wrap_words,
 )
 from bowdenfit.plots.style import SERIES_COLORS, SERIES_LINES, SMALL, WIDE, WIDE_INTERVAL, in_paper_style
-from bowdenfit.questions.summary.sampled_quantities import SampledQuantity, optimum_quantities, sampled_quantities
+from bowdenfit.questions import summary
+from bowdenfit.questions.summary.pairs_figure import SampledQuantity
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -44,15 +45,15 @@ class Traces:
 
 
 def data(fit: Record) -> Traces | None:
-    """What is shown; None where no walker has a path."""
-    quantities = sampled_quantities(fit) + optimum_quantities(fit)[:1]
+    """Return the draws of every quantity; None where no walker has a path."""
+    quantities = summary.collect_sampled_quantities(fit) + summary.collect_optimum_quantities(fit)[:1]
     if fit.sampled is None or all(q.draws.shape[1] == 1 for q in quantities):
         return None
     return Traces(quantities, fit.posterior.n_ensembles)
 
 
 def caption(data: Traces) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     return (
         "Trace plot: the path of every parameter through the stored samples, a color for each independent start. Where the "
         "sampling has converged they lie on top of each other and drift neither up nor down. Right of each panel: the "
@@ -107,7 +108,7 @@ def _style(number: int) -> dict[str, Any]:
 
 
 def _group_draws(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where along the path, and which draws are summarized there (columns): all walkers', or a stretch of one chain."""
+    """Return places along the path, and the draws summarized there (columns): all walkers', or a stretch of a chain."""
     n_walkers, n = draws.shape
     if n_walkers > 1 or n < 2 * STRETCHES:
         steps = np.arange(0, n, -(-n // MOST_DRAWS))
@@ -122,7 +123,7 @@ def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
     trace.grid(visible=False)
     number_left(trace)
     number_below(trace, whole=True)
-    trace.set_ylabel(_in_two_lines(label), fontsize=SMALL, va="center")
+    trace.set_ylabel(_wrap_into_two_lines(label), fontsize=SMALL, va="center")
     if last:
         trace.set_xlabel("Stored sample", fontsize=SMALL, va="center")
     else:
@@ -130,15 +131,15 @@ def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
     place_labels(figure, trace, 0.5, 0.27)
 
 
-def _in_two_lines(label: str) -> str:
-    """A name beside a panel; of one that takes more lines the first and the last, which tells groups apart."""
+def _wrap_into_two_lines(label: str) -> str:
+    """Return a name in at most two lines; of a longer one the first and the last, which tells groups apart."""
     first, *others = wrap_words(label, ROW - 0.04).split("\n")
     between = "\N{HORIZONTAL ELLIPSIS} " if len(others) > 1 else ""
     return "\n".join([first, *(between + last for last in others[-1:])])
 
 
 def _legend_title(chains: bool) -> str:
-    """What lines and bands are."""
+    """Return what lines and bands are."""
     if chains:
         return f"Line: median of each {STRETCHES}th of the samples; shaded: its {WIDE_INTERVAL}; right of each panel: density"
     return f"Thick: median of the values at a sample; thin: their {WIDE_INTERVAL}; right of each panel: density"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from bowdenfit import results as results_door
 from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, Quantity, as_pair, number_with_unit, read_first
 from bowdenfit.questions import summary as room
 from bowdenfit.results.folder import DETAILS_TEXT, FIT, SUMMARY, SUMMARY_TEXT, read_page, read_text
@@ -32,13 +33,11 @@ def summary(results: Annotated[str | Path, RESULTS, PATH], *, full: bool = False
         shown = DETAILS_TEXT if full else SUMMARY_TEXT
         text, page = (read_text(folder / shown), read_page(folder / SUMMARY))
         return text, page
-    from bowdenfit.results.store import load
-
-    return load(folder)
+    return results_door.load(folder)
 
 
 def reply(results: "tuple[str, Any] | Record", options: Mapping[str, Any]) -> Reply:
-    """What is printed of a fit."""
+    """Return what is printed of a fit."""
     if isinstance(results, tuple):
         text, page = results
         return Reply(text, lambda: page, exit_code=0 if page["verdict"]["trusted"] else NOT_TRUSTED)

@@ -1,5 +1,6 @@
 """Whether a fit may be trusted, and if not, why; whatever the summary says is wrong is wrong here too."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,6 @@ from bowdenfit.questions.check.words import describe_assumed_widths, describe_mi
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates
-from bowdenfit.questions.summary.answer import outlying_readings
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals, few, filled, listed
@@ -55,10 +55,12 @@ _NO_MINIMUM = (
     "Least squares have found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
     "sampling needs none."
 )
-_COMPARABLE = 0.8  # of the largest conflict: beyond that either table may be the odd one out
+_COMPARABLE = 0.8  # share of the largest conflict beyond which either table may be wrong; a judgement
+
+
 @dataclass(frozen=True, repr=False)
 class Verdict(Display):
-    """Of one fit.
+    """Verdict on a fit.
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
@@ -87,7 +89,7 @@ class Verdict(Display):
 
 @cached_per_fit
 def assess_fit(fit: Record) -> Verdict:
-    """The verdict on a fit."""
+    """Return the verdict on a fit."""
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(describe_unidentified(fit)),
@@ -98,11 +100,11 @@ def assess_fit(fit: Record) -> Verdict:
         NOT_DESCRIBED: describe_lack_of_fit(fit),
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
-    return Verdict(by_kind, fit.sampled is not None, _doubts(fit))
+    return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit))
 
 
-def _doubts(fit: Record) -> tuple[str, ...]:
-    """Readings that lie far off, and tables that scatter otherwise than the fit says."""
+def _describe_doubts(fit: Record) -> tuple[str, ...]:
+    """Describe readings that lie far off, and tables that scatter otherwise than predicted."""
     checks = check_readings(fit)
     if checks is None:
         return ()
@@ -112,11 +114,24 @@ def _doubts(fit: Record) -> tuple[str, ...]:
 
 
 def _sentences(sentence: str) -> tuple[str, ...]:
+    """Return a sentence as a tuple; an empty one where there is none."""
     return (sentence,) if sentence else ()
 
 
+def collect_checked_readings(fit: Record) -> tuple[CheckedReading, ...]:
+    """Return every reading beside its prediction from all the others; none without draws."""
+    checks = check_readings(fit)
+    return checks.readings if checks else ()
+
+
+def find_outliers(fit: Record) -> Sequence[CheckedReading]:
+    """Return the outliers among the readings, the farthest first."""
+    checks = check_readings(fit)
+    return checks.outliers if checks else ()
+
+
 def verdict_text(verdict_on_fit: Verdict) -> str:
-    """Whether a fit may be trusted, and if not, why."""
+    """Say whether a fit may be trusted, and if not, why."""
     sentences = (
         [distrust_warning(verdict_on_fit), *reasons_against(verdict_on_fit)]
         if verdict_on_fit.troubles
@@ -126,13 +141,13 @@ def verdict_text(verdict_on_fit: Verdict) -> str:
 
 
 def distrust_warning(fit_verdict: Verdict) -> str:
-    """The first line of a fit that is not to be trusted; empty of one that is."""
+    """Return the first line of a fit that is not to be trusted; empty of one that is."""
     kinds = [words for kind, words in _PROBLEMS.items() if kind in fit_verdict.troubles]
     return f"DO NOT USE THESE NUMBERS: {listed(kinds)}." if kinds else ""
 
 
 def reasons_against(fit_verdict: Verdict) -> list[str]:
-    """Why not, without what only says how the computation went."""
+    """Return the reasons not to trust a fit, without what only says how the computation went."""
     sentences = [sentence for kind in _PROBLEMS if kind != NOT_CONVERGED for sentence in fit_verdict.troubles.get(kind, ())]
     if NOT_CONVERGED in fit_verdict.troubles:
         sentences.append(_NOT_YET_CONVERGED if fit_verdict.sampled else _NO_MINIMUM)
@@ -140,7 +155,7 @@ def reasons_against(fit_verdict: Verdict) -> list[str]:
 
 
 def reasons_to_trust(fit: Record) -> list[str]:
-    """What speaks for a fit that may be trusted, and what to keep in mind."""
+    """Return what speaks for a fit that may be trusted, and what to keep in mind."""
     if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
         return [_LEAST_SQUARES_ONLY.format(best)]
@@ -152,20 +167,20 @@ def reasons_to_trust(fit: Record) -> list[str]:
 
 
 def _trusted_sentence(fit_verdict: Verdict) -> str:
-    """Of a fit that may be trusted, and what speaks a little against it."""
+    """Say that a fit may be trusted, and what speaks a little against it."""
     return _IN_DOUBT.format(listed(fit_verdict.doubts)) if fit_verdict.doubts else _TRUSTED
 
 
 def suggest_next_step(fit: Record) -> str:
-    """What to do next with a fit that may be trusted; empty where there is nothing."""
-    checks, outliers = check_readings(fit), outlying_readings(fit)
+    """Suggest what to do next with a fit that may be trusted; empty where there is nothing."""
+    checks, outliers = check_readings(fit), find_outliers(fit)
     if checks is None:
         return ""
     if outliers:
-        return f"Next: look at how {_reading_name(outliers[0])} was measured and written down: it is far off (see below)."
+        return f"Next: look at how {_name_reading(outliers[0])} was measured and written down: it is far off (see below)."
     if describe_misfits(checks):
         return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
-    influential = few(map(_reading_name, checks.influential), most=2)  # how far on each differs from one seed to the next
+    influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
     remeasure = f"; in doubt, measure again what the fit leans on: {influential}" if influential else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
         return f"Next: nothing needs to be measured{remeasure}. bowdenfit next says what would narrow it."
@@ -174,25 +189,26 @@ def suggest_next_step(fit: Record) -> str:
     return f"Next: bowdenfit next says which measurement would tell most{remeasure}."
 
 
-def _reading_name(reading: CheckedReading) -> str:
+def _name_reading(reading: CheckedReading) -> str:
+    """Return the name of a reading."""
     return describe_reading(reading.table, reading.label)
 
 
 def interval_width_caveat(fit: Record) -> str:
-    """That few readings leave it to a prior how wide intervals are; empty where they do not."""
+    """Say that few readings leave it to a prior how wide intervals are; empty where they do not."""
     checks = check_readings(fit)
     return describe_assumed_widths(checks) if checks else ""
 
 
 def _prior_driven_sentence(fit: Record) -> str:
-    """Coefficients of friction that no measurement tells, because they were stated."""
+    """Name the coefficients of friction that no measurement determines."""
     friction = assess_identifiability(fit).groups.get("friction")
     names = friction.resting if friction is not None else []
     return f"Hardly measured, mostly as assumed beforehand: {listed(names)}." if names else ""
 
 
 def _correlation_sentence(fit: Record) -> str:
-    """The two parameters that are told apart least."""
+    """Name the two parameters that are most confounded."""
     pairs = confounded_pairs(fit)
     if not pairs:
         return ""
@@ -201,7 +217,7 @@ def _correlation_sentence(fit: Record) -> str:
 
 
 def _prior_conflict_sentence(fit: Record) -> str:
-    """Parameters about which readings and prior contradict each other."""
+    """Name the parameters about which readings and prior contradict each other."""
     checks = check_readings(fit)
     pulled = [s.parameter for s in checks.conflicts] if checks else []
     names = dict.fromkeys(pulled + [f.parameter for f in checks.prior_conflicts] if checks else [])
@@ -209,13 +225,13 @@ def _prior_conflict_sentence(fit: Record) -> str:
 
 
 def agreement_page(fit: Record) -> list[dict[str, Any]]:
-    """How well each table agrees with everything else, the odd one out first."""
+    """Return how well each table agrees with everything else, the most contradictory first."""
     disagreements = sorted(fit.least_squares.disagreements, key=lambda d: -d.conflict)
     return [values_by_key(d) | {"unit": _unit(fit, d)} for d in disagreements]
 
 
 def describe_contradiction(fit: Record) -> str:
-    """The table that is the odd one out, in a sentence; empty where all agree."""
+    """Name the table that contradicts the others; empty where all agree."""
     worst = max(fit.least_squares.disagreements, key=lambda d: d.conflict, default=None)
     if worst is None or worst.sds < NOTICEABLE_SDS:
         return ""
@@ -236,6 +252,6 @@ def describe_contradiction(fit: Record) -> str:
 
 
 def _unit(fit: Record, disagreement: Disagreement) -> str:
-    """Unit of the parameter, with a blank before it."""
+    """Return the unit of the parameter, with a blank before it."""
     unit = next(p.unit for p in fit.model.space.free if p.name == disagreement.parameter)
     return "" if unit == "1" else f" {unit}"

@@ -1,4 +1,4 @@
-"""Data of the figure of a table of forces: readings at each bend beside the fitted law, from the model and its draws."""
+"""Data of figures from the model and its draws: a table of forces beside the fitted law, and sampled quantities."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,20 +12,23 @@ from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.plots.curves import choose_evenly
+from bowdenfit.plots.curves import choose_evenly, support
+from bowdenfit.plots.style import axis_label
 from bowdenfit.questions.bends.curves import evaluate_curves, quantiles_of_draws
+from bowdenfit.questions.summary.brief import BETWEEN_MOUNTINGS
 from bowdenfit.questions.summary.forces_figure import ONE_BEND, STROKES, ForcesAtBend, ForcesData
+from bowdenfit.questions.summary.pairs_figure import SampledQuantity
 from bowdenfit.questions.summary.verdict import assess_fit
-from bowdenfit.results.record import Record
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
-MOST_PLACES, MOST_READINGS = 6, 1000
+MOST_PLACES, MOST_READINGS = 6, 1000  # bends in color, and readings, that a figure shows
 POINTS = 61  # of a line
-_LEAST_ANGLE = np.deg2rad(1.0)  # below which there is no apparent coefficient to speak of
+_LEAST_ANGLE = np.deg2rad(1.0)  # below which the apparent coefficient is noise
 _WIDE = 20.0  # ratio of the largest to the smallest load from which axes are logarithmic
 
 
 def collect_forces(fit: Record) -> ForcesData | None:
-    """Readings and law; None without a table of forces."""
+    """Return readings and law of a table of forces; None without one."""
     table = fit.dataset.measurements.table(ForceTable)
     if table is None:
         return None
@@ -35,9 +38,11 @@ def collect_forces(fit: Record) -> ForcesData | None:
     logarithmic = bool(high > _WIDE * low)
     load = np.geomspace(0.9 * low, 1.1 * high, POINTS) if logarithmic else np.linspace(0.02 * high, 1.05 * high, POINTS)
     draws = _predict_forces(fit, table, rows, rows[first], load)
-    bends = [_forces_at_bend(table, rows, group == i, label, load, draws, i, i in shown) for i, label in enumerate(labels)]
+    bends = [
+        _collect_forces_at_bend(table, rows, group == i, label, load, draws, i, i in shown) for i, label in enumerate(labels)
+    ]
     fit_verdict = assess_fit(fit)
-    spread = _spread(fit, load, draws) if fit.sampled is not None else np.zeros(0)
+    spread = _estimate_spread(fit, load, draws) if fit.sampled is not None else np.zeros(0)
     count = len(table.run) if len(rows) < len(table.run) else 0
     reason = next(iter(fit_verdict.reasons), "")
     model = fit.dataset.description.friction_model
@@ -64,7 +69,7 @@ def _group_rows(fit: Record, table: ForceTable, rows: np.ndarray) -> tuple[np.nd
 def _predict_forces(
     fit: Record, table: ForceTable, rows: np.ndarray, first: np.ndarray, load: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Law at each place, expected output of each row, and wrap angles, of some draws or of least squares alone."""
+    """Return the law at each place, expected outputs of the rows, and wrap angles, of some draws or of least squares."""
     cable, friction = fit.model.cable, fit.model.cable.friction
     arrays = collect_row_angles(cable.description, table, fit.dataset.measurements.table(AngleTable)).data
     arrays |= {"group": group_numbers(friction.groups, table.group, len(table.run))}
@@ -90,11 +95,11 @@ def _predict_forces(
     return evaluate_curves(fit, curves)
 
 
-def _forces_at_bend(
+def _collect_forces_at_bend(
     table: ForceTable, rows: np.ndarray, selected: np.ndarray, label: str, load: np.ndarray, draws: Mapping[str, np.ndarray],
     number: int, shown: bool,
 ) -> ForcesAtBend:  # fmt: skip
-    """Readings at one place, and the law there."""
+    """Return the readings at one place, and the law there."""
     force_in, force_out = table.input_force[rows[selected]], table.output_force[rows[selected]]
     stroke = table.stroke[rows[selected]]
     expected, bend = (np.median(draws[name][:, selected], axis=0) for name in ("rows", "bend"))
@@ -109,10 +114,36 @@ def _forces_at_bend(
     return ForcesAtBend(label, force_in, force_out, stroke, off, apparent, *lines, np.rad2deg(bend))
 
 
-def _spread(fit: Record, load: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-    """How far single readings scatter from the law, by their mountings and by the noise of the load cells."""
+def _estimate_spread(fit: Record, load: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return how far single readings scatter from the law, by their mountings and by the noise of the load cells."""
     values = {name: float(np.median(sampled)) for name, sampled in fit.draws().values.items()}
     fixed = {p.name: float(p.fixed or 0.0) for p in fit.model.space.fixed}
     tau, noise = ((values | fixed)[name] for name in (RUN_SCATTER, FORCE_NOISE))
     ratio, output = fit.dataset.description.sensors.noise_ratio, np.median(draws["law"][:, :, 0], axis=(0, 1))
     return np.asarray(100 * NORMAL_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + 1 / output**2)))
+
+
+def collect_sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:
+    """Return the sampled parameters, of the given roles in the given order, or all; none without draws."""
+    if fit.sampled is None:
+        return []
+    free, values = fit.model.space.free, fit.sampled.values
+    wanted = [p for role in roles for p in free if p.role == role] if roles else free
+    quantities = []
+    for p in wanted:
+        words = BETWEEN_MOUNTINGS if p.name == RUN_SCATTER else p.meaning
+        bounds = support(values[p.name]), np.inf
+        quantities.append(SampledQuantity(axis_label(p.symbol, p.unit), values[p.name], bounds, p.symbol, words))
+    return quantities
+
+
+def collect_optimum_quantities(fit: Record) -> list[SampledQuantity]:
+    """Return the optimal length and the efficiency there [%]; none without a route or draws."""
+    route, posterior = fit.dataset.description.route, fit.sampled
+    if route is None or posterior is None:
+        return []
+    length, efficiency = posterior.optimum[OPTIMAL_LENGTH], 100 * posterior.optimum[OPTIMAL_EFFICIENCY]
+    return [
+        SampledQuantity(axis_label("Optimum", route.unit), length, route.range),
+        SampledQuantity("Efficiency at\noptimum (%)", efficiency, (0.0, 100.0)),
+    ]

@@ -20,7 +20,7 @@ from bowdenfit.model import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.bent_cable import BentCable, bending_contact, has_stretch
-from bowdenfit.questions.predict.measured_range import measured_range
+from bowdenfit.questions.predict.measured_range import find_measured_range
 from bowdenfit.results.record import Record
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
@@ -254,7 +254,7 @@ def _measure_interpolation_error(curve: np.ndarray) -> float:
 
 def _describe_ranges(fit: Record, bent: bool) -> tuple[str, ...]:
     """Describe the loads, lengths and wrap angles of the measurements in words."""
-    limits, ranges = measured_range(fit), []
+    limits, ranges = find_measured_range(fit), []
     if bent:
         bends = np.rad2deg(elastic_answers(fit).measured_bends)
         ranges.append(f"wrap angles {bends[0]:.4g} to {bends[-1]:.4g} deg")

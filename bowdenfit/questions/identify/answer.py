@@ -30,6 +30,8 @@ _REMEDY = (
     "different proportions: measure at lengths (or routes) where one contact turns much more than the others, or measure one "
     "coefficient separately and state it under [friction.NAME] as measured."
 )
+_COLLINEAR = 1000.0  # condition number beyond which parameters are hardly distinguished; a judgement
+_CORRELATED = 0.9  # correlation beyond which two of them are hardly distinguished; a judgement
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,7 +59,7 @@ class Identifiability(Display):
     JSON: ClassVar = ("name", "basis", "sentences", "groups", ("profiles", "rises"))
 
     def sentences(self) -> list[str]:
-        """What is known, in words: friction first, and a remedy where something is not."""
+        """Describe what is known: friction first, and a remedy where something is not."""
         friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
         sentences = [describe_identified(friction, self.measured)] if friction else []
         if elastic is not None:
@@ -81,7 +83,7 @@ class Identifiability(Display):
 
 
 def describe_identified(analysis: CovarianceAnalysis, measured: bool, opening: str = "") -> str:
-    """What some parameters are known to, in one sentence.
+    """Describe what some parameters are known to, in one sentence.
 
     Args:
         analysis: What is known of them.
@@ -105,18 +107,14 @@ def describe_identified(analysis: CovarianceAnalysis, measured: bool, opening: s
 
 
 def describe_precision(known: ParameterContraction | Combination) -> str:
-    """How well a quantity is known: in percent where it is clear of zero, else in its unit."""
+    """Describe how well a quantity is known: in percent where it is clear of zero, else in its unit."""
     if abs(known.value) > 2 * known.sd:
         return f"to {significant(100 * known.sd / abs(known.value), 2)} %"
     return f"to ± {known.sd:z.{decimals(known.sd)}f}"
 
 
-_COLLINEAR = 1000.0  # condition number beyond which parameters are hardly told apart
-_CORRELATED = 0.9  # correlation beyond which two of them are
-
-
 def rebuild_identifiability(stored: Mapping[str, Any]) -> Identifiability:
-    """Identifiability from the plain data that are stored in a results folder; profiles are not stored."""
+    """Return identifiability from the plain data that are stored in a results folder; profiles are not stored."""
     groups = deserialize(dict[str, CovarianceAnalysis], stored["groups"])
     words = {"units": stored["units"], "meanings": stored["meanings"]}
     return Identifiability(stored["name"], stored["basis"], stored["measured"], groups, **words)
@@ -124,7 +122,7 @@ def rebuild_identifiability(stored: Mapping[str, Any]) -> Identifiability:
 
 @text_of.register(Identifiability)
 def identifiability_text(result: Identifiability) -> str:
-    """What measurements determine, for people: the answer first, then parameters and combinations."""
+    """Describe what measurements determine: the answer first, then parameters and combinations."""
     first, *others = result.sentences() or ["There is nothing to determine."]
     blocks = ["\n".join(filled(sentence) for sentence in [f"{result.name}: {first[0].lower()}{first[1:]}", *others])]
     for name, group in result.groups.items():
@@ -144,6 +142,7 @@ def identifiability_text(result: Identifiability) -> str:
 
 
 def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> str:
+    """Return the parameters of a group in a table, and which are hard to tell apart."""
     heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
     unit = {p.name: units.get(p.name, "1") for p in group.parameters}
     rows: list[tuple[str, ...]] = [
@@ -161,19 +160,20 @@ def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, s
 
 
 def _format_numbers(p: ParameterContraction) -> tuple[str, str, str]:
+    """Format value, standard deviation, and that of the prior."""
     digits = decimals(p.sd)
     return f"{p.value:z.{digits}f}", f"± {p.sd:z.{digits}f}", f"± {p.prior_sd:z.{digits}f}"
 
 
 def _describe_source(share: float) -> str:
-    """What settles it: measurements, or what was assumed before."""
+    """Describe what determines a value: measurements, its prior, or both."""
     if share < IDENTIFIABLE:
         return f"measurements ({percent(1 - share, 0)})"
     return f"assumption ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (assumption {percent(share, 0)})"
 
 
 def _combination_table(group: CovarianceAnalysis) -> str:
-    """Independent combinations, the best determined first; of a single parameter there is nothing more to say."""
+    """Return independent combinations in a table, the best determined first; empty of a single parameter."""
     if len(group.directions) < 2:
         return ""
     rows = [(combination.words, *_format_sum(combination)) for combination in group.directions]
@@ -181,5 +181,6 @@ def _combination_table(group: CovarianceAnalysis) -> str:
 
 
 def _format_sum(d: Combination) -> tuple[str, str]:
+    """Format the value and standard deviation of a combination."""
     digits = decimals(d.sd)
     return f"{d.value:z.{digits}f}", f"± {d.sd:z.{digits}f}"

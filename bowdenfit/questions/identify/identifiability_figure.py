@@ -26,7 +26,7 @@ _SMALLEST_WEIGHT = 0.05  # weight below which a cell of the map is left empty
 
 
 def caption(identifiability: Identifiability) -> str:
-    """What is drawn, in plain words."""
+    """Describe what is drawn, in plain words."""
     n = sum(len(group.parameters) for group in identifiability.groups.values())
     text = (
         "Left: of what was open about each parameter beforehand (the variance of its prior), the share that the measurements "
@@ -43,7 +43,7 @@ def caption(identifiability: Identifiability) -> str:
 
 @in_paper_style
 def draw(identifiability: Identifiability) -> Figure:
-    """One row of panels for each group of parameters: who speaks for each, and what each combination consists of.
+    """Draw a row of panels for each group of parameters: prior shares, and the combinations that are determined.
 
     Profiles of the friction coefficients are a last row of panels.
     """
@@ -69,7 +69,7 @@ def draw(identifiability: Identifiability) -> Figure:
 
 
 def _draw_profile(axes: Axes, profile: Profile, first: bool) -> None:
-    """Rise of the sum of squares; where it stays flat the readings say nothing."""
+    """Draw the rise of the sum of squares; where it stays flat the readings say nothing."""
     axes.plot(profile.values, profile.rise, color=BLUE)
     axes.axhline(_RISE_AT_90, color=GRAY, linestyle="--", linewidth=0.8)
     axes.set_ylim(-0.5, _HIGHEST_RISE)
@@ -82,6 +82,7 @@ def _draw_profile(axes: Axes, profile: Profile, first: bool) -> None:
 
 
 def _draw_shares(axes: Axes, name: str, group: CovarianceAnalysis) -> None:
+    """Draw the shares of prior and measurements in what is known of each parameter."""
     names = [p.name for p in group.parameters]
     percent = np.array([100 * max(p.contraction, 0.0) for p in group.parameters])
     rows = np.arange(len(names))
@@ -96,7 +97,7 @@ def _draw_shares(axes: Axes, name: str, group: CovarianceAnalysis) -> None:
 
 
 def _draw_combinations(axes: Axes, group: CovarianceAnalysis) -> None:
-    """Map of the weights, in units of the priors' standard deviations; columns are combinations."""
+    """Draw a map of the weights, in units of the priors' standard deviations; columns are combinations."""
     names, prior_sd = [p.name for p in group.parameters], {p.name: p.prior_sd for p in group.parameters}
     weights = np.array([[d.weights.get(n, 0.0) * prior_sd[n] for n in names] for d in group.directions]).T
     weights = weights / np.maximum(np.sqrt(np.sum(weights**2, axis=0)), 1e-300)
@@ -125,10 +126,11 @@ def _draw_combinations(axes: Axes, group: CovarianceAnalysis) -> None:
 
 
 def _shorten_name(name: str, room: float, size: float = SMALL) -> str:
-    """A parameter's name as words, its end left out where there is no room for it [in]."""
+    """Return a parameter's name as words, its end left out where there is no room for it [in]."""
     return wrap_words(name.replace("_", " "), room, size, most=1)
 
 
 def _format_share(share: float) -> str:
+    """Format a share in percent."""
     percent = 100 * share
     return f"{percent:.0f}" if percent >= 9.5 else f"{percent:.1f}" if percent >= 0.095 else "<0.1"

@@ -18,16 +18,16 @@ from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import listed, significant
 
 BASIS_DRAWS = "what the fit found"
-_STEP = 1e-4  # of z, from which a slope is told to a part in 10^8
+_STEP = 1e-4  # step of z, which determines a slope to a part in 10^8
 
 
 _ROLES = {"friction", "friction_model", "sensor", "angle", "elastic"}
-_CONFOUNDED = 0.9  # correlation beyond which two parameters are said to be confounded
-_WELL_KNOWN = 0.1  # relative standard deviation below which a positive quantity is known well
-_WORTH_SAYING = 0.5  # the combination must be known to less than this share of what it would be without the correlation
+_CONFOUNDED = 0.9  # correlation beyond which two parameters are said to be confounded; a judgement
+_WELL_KNOWN = 0.1  # relative standard deviation below which a positive quantity is known well; a judgement
+_WORTH_SAYING = 0.5  # largest sd of a combination over that of its first parameter that is worth a sentence; a judgement
 @cached_per_fit
 def assess_identifiability(fit: Record) -> Identifiability:
-    """What a fit knows, from its draws.
+    """Return what a fit determines, from its draws.
 
     Args:
         fit: A fit with a posterior.
@@ -49,7 +49,7 @@ def assess_identifiability(fit: Record) -> Identifiability:
 def identifiability_at_maximum(
     model: Model, start: MaximumPosterior, basis: str, measured: bool, profiles: tuple[Profile, ...] = ()
 ) -> Identifiability:
-    """What measurements will tell, or tell before sampling: from the Fisher information at one point.
+    """Return what measurements determine before sampling, from the Fisher information at one point.
 
     Args:
         model: The model.
@@ -67,12 +67,12 @@ def identifiability_at_maximum(
 
 
 def _parameter_meanings(model: Model) -> dict[str, str]:
-    """What each parameter is, in words."""
+    """Return what each parameter is, in words."""
     return {p.name: p.meaning for p in model.space.free}
 
 
 def _adjust_for_student(model: Model, covariance: np.ndarray) -> np.ndarray:
-    """The covariance, with the information of Student-t readings: nu / (nu + 3) of what residuals near zero suggest."""
+    """Return the covariance with the information of Student-t readings: nu / (nu + 3) of that of residuals near zero."""
     description = model.description
     if description.noise != "student":
         return covariance
@@ -82,16 +82,17 @@ def _adjust_for_student(model: Model, covariance: np.ndarray) -> np.ndarray:
 
 @cached_per_fit
 def values_program(fit: Record) -> DrawFunction:
-    """Named values of many z, in shown units; a fit that samples has one already."""
+    """Return the program from many z to named values in shown units; a fit that samples has one already."""
     return fit.programs.values if fit.programs else _compile_values(fit.model)
 
 
 def _compile_values(model: Model) -> DrawFunction:
+    """Compile the map from z to named values."""
     return for_each_draw(value_function(model), model.space.size, run_once=True)
 
 
 def _linearize(model: Model, values_of: DrawFunction, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values of the free parameters at z and their change with it, which is the prior's sd there; in shown units."""
+    """Return the free parameters at z and their slopes, which are standard deviations of the priors there; in shown units."""
     values = values_of(z + _STEP * np.array([[0.0], [-1.0], [1.0]]))
     value, below, above = np.column_stack([values[p.name] for p in model.space.free])
     slope = (above - below) / (2 * _STEP)
@@ -101,7 +102,7 @@ def _linearize(model: Model, values_of: DrawFunction, z: np.ndarray) -> tuple[np
 def _analyze_groups(
     model: Model, value: np.ndarray, covariance: np.ndarray, prior_sd: np.ndarray
 ) -> dict[str, CovarianceAnalysis]:
-    """Knowledge of every group, in shown units."""
+    """Analyze the covariance of every group, in shown units."""
     analyses = {}
     for group, roles in GROUPS.items():
         which = np.array([i for i, p in enumerate(model.space.free) if p.role in roles], dtype=int)
@@ -112,7 +113,7 @@ def _analyze_groups(
 
 
 def describe_unidentified(fit: Record) -> str:
-    """Which friction coefficients the measurements do not tell, in a sentence; empty where they tell all.
+    """Name the friction coefficients that the measurements do not determine; empty where they determine all.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
     that it rests on that. The same holds for what the data sheet of a load cell says.
@@ -120,7 +121,7 @@ def describe_unidentified(fit: Record) -> str:
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _has_stated_prior(fit, p.name)]
     if fit.sampled is None:
         return _unidentified_sentence(
-            [name for name in names if _undetermined(fit, name) or _may_be_zero_or_usual(fit, name)], None
+            [name for name in names if _is_undetermined(fit, name) or _may_be_zero_or_usual(fit, name)], None
         )
     friction = assess_identifiability(fit).groups.get("friction")
     if friction is None:
@@ -129,7 +130,9 @@ def describe_unidentified(fit: Record) -> str:
     unidentified = [
         n
         for n in names
-        if share[n] > PRIOR_DOMINATED or _as_wide_as_prior(fit, n) or (_undetermined(fit, n) and n in friction.unidentified)
+        if share[n] > PRIOR_DOMINATED
+        or _is_as_wide_as_prior(fit, n)
+        or (_is_undetermined(fit, n) and n in friction.unidentified)
     ]
     if not unidentified and not friction.identified and not friction.determined:
         return _unidentified_sentence(names, None, " in good part")
@@ -137,13 +140,13 @@ def describe_unidentified(fit: Record) -> str:
     return _unidentified_sentence(unidentified, combination)
 
 
-def _as_wide_as_prior(fit: Record, name: str) -> bool:
-    """Whether a coefficient's draws are as wide as its prior in the sampler's coordinates."""
+def _is_as_wide_as_prior(fit: Record, name: str) -> bool:
+    """Return whether a coefficient's draws are as wide as its prior in the sampler's coordinates."""
     return float(np.var(fit.draws().z[..., fit.model.space.index[name]])) > PRIOR_DOMINATED
 
 
-def _undetermined(fit: Record, name: str) -> bool:
-    """Whether least squares without priors leaves a coefficient open altogether."""
+def _is_undetermined(fit: Record, name: str) -> bool:
+    """Return whether least squares without priors leaves a coefficient open altogether."""
     estimates = fit.least_squares.estimates
     stated = (p for p in fit.model.space.free if p.role == "sensor" and not p.scaled_by)
     if any(estimates[p.name].remark == UNDETERMINED for p in stated):
@@ -152,7 +155,7 @@ def _undetermined(fit: Record, name: str) -> bool:
 
 
 def _may_be_zero_or_usual(fit: Record, name: str) -> bool:
-    """Whether least squares runs to no friction at all and does not exclude what its prior thinks usual either.
+    """Return whether least squares runs to no friction at all and does not exclude what its prior thinks usual either.
 
     A contact that hardly rubs is one of which more is excluded; that contradictory readings do so is as likely.
     """
@@ -163,6 +166,7 @@ def _may_be_zero_or_usual(fit: Record, name: str) -> bool:
 
 
 def _unidentified_sentence(names: list[str], combination: Combination | None, how_much: str = "") -> str:
+    """Return the sentence about coefficients that are not identified, with a remedy."""
     if not names:
         return ""
     them = listed(names)
@@ -180,7 +184,7 @@ def _unidentified_sentence(names: list[str], combination: Combination | None, ho
 
 
 def _has_stated_prior(fit: Record, name: str) -> bool:
-    """Whether the description says something of a coefficient beyond naming it."""
+    """Return whether the description says something of a coefficient beyond naming it."""
     return name in fit.dataset.description.friction
 
 
@@ -214,7 +218,7 @@ class ConfoundedPair:
         return f"{self.first} {sign} {significant(abs(self.factor))} {self.second}"
 
     def sentence(self) -> str:
-        """What to say of it."""
+        """Return the pair and its combination in a sentence."""
         digits = int(np.clip(1 - np.floor(np.log10(max(self.sd, 1e-12))), 0, 8))
         return (
             f"The measurements hardly tell {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); what "
@@ -224,7 +228,7 @@ class ConfoundedPair:
 
 
 def confounded_pairs(fit: Record) -> list[ConfoundedPair]:
-    """Pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
+    """Return pairs of parameters whose draws lie along a line, the closest first; empty without draws."""
     if fit.sampled is None:
         return []
     names = [
@@ -236,12 +240,13 @@ def confounded_pairs(fit: Record) -> list[ConfoundedPair]:
 
 
 def _is_well_known(fit: Record, name: str) -> bool:
-    """Whether a parameter is known well by itself, so that what it is correlated with does not matter."""
+    """Return whether a parameter is known well by itself, so that its correlations do not matter."""
     draws = fit.posterior.values[name]
     return bool(np.std(draws) < _WELL_KNOWN * np.abs(np.median(draws)))
 
 
 def _analyze_pair(fit: Record, first: str, second: str) -> ConfoundedPair:
+    """Return the correlation of two parameters, and the combination of them that is known best."""
     a, b = fit.posterior.values[first].ravel(), fit.posterior.values[second].ravel()
     covariance = np.cov(a, b)
     factor = -covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0

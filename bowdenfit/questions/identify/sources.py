@@ -28,7 +28,7 @@ _PROFILE_SDS, _PROFILE_POINTS = 4.0, 21  # profiles span four standard deviation
 
 
 def identify_source(source: str | Path | Dataset | Record, reading: Reading) -> Identifiability:
-    """Identifiability of a fit, of a data set by least squares, or of a plan.
+    """Return identifiability of a fit, of a data set by least squares, or of a plan.
 
     Args:
         source: A fit or its results folder, a data set, or a cable.toml with [design].
@@ -39,6 +39,7 @@ def identify_source(source: str | Path | Dataset | Record, reading: Reading) -> 
 
 
 def _identify(source: str | Path | Dataset | Record, reading: Reading) -> Identifiability:
+    """Return identifiability of a fit, of a data set by least squares, or of a plan, with 64-bit floats."""
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
         source = load(Path(source))
     if isinstance(source, Record):
@@ -51,7 +52,7 @@ def _identify(source: str | Path | Dataset | Record, reading: Reading) -> Identi
 
 
 def _is_plan(path: Path) -> bool:
-    """Whether a file is a plan: a description with [design]."""
+    """Return whether a file is a plan: a description with [design]."""
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
     try:
@@ -61,7 +62,7 @@ def _is_plan(path: Path) -> bool:
 
 
 def _identify_fit(fit: Record) -> Identifiability:
-    """Identifiability from the draws of a fit, with profiles of its friction coefficients."""
+    """Return identifiability from the draws of a fit, with profiles of its friction coefficients."""
     from_draws = assess_identifiability(fit)
     posterior = LogDensity(fit.model)
     objective = make_objective(posterior)
@@ -69,7 +70,7 @@ def _identify_fit(fit: Record) -> Identifiability:
 
 
 def _friction_profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, ...]:
-    """Profiles of the friction coefficients, over four standard deviations on both sides."""
+    """Return profiles of the friction coefficients, over four standard deviations on both sides."""
     space, sd = posterior.model.space, np.sqrt(np.diag(best.covariance))
     which = [i for i, p in enumerate(space.free) if p.role == "friction"]
     steps = np.linspace(-_PROFILE_SDS, _PROFILE_SDS, _PROFILE_POINTS)
@@ -77,7 +78,7 @@ def _friction_profiles(posterior: Any, objective: Any, best: Any) -> tuple[Any, 
 
 
 def _identify_tables(data: Dataset) -> Identifiability:
-    """Identifiability from the Fisher information at the maximum of the posterior of a data set."""
+    """Return identifiability from the Fisher information at the maximum of the posterior of a data set."""
     posterior = LogDensity(build_model(data))
     objective = make_objective(posterior)
     best = find_maximum_posterior(posterior, objective)
@@ -86,7 +87,7 @@ def _identify_tables(data: Dataset) -> Identifiability:
 
 
 def _identify_plan(path: Path) -> Identifiability:
-    """Identifiability from the Fisher information of noise-free readings at the design of a plan."""
+    """Return identifiability from the Fisher information of noise-free readings at the design of a plan."""
     plan = read_bench(path)
     tables = empty_tables(plan.description, plan.design)
     space = build_model(Dataset(plan.description, tables, {})).space

@@ -51,12 +51,13 @@ def identify(
 
 
 def _reply(result: "Identifiability", options: dict[str, Any]) -> Reply:
+    """Return what the command line prints."""
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
     return Reply(room.identifiability_text(result), lambda: result, notes, csv=result.to_csv)
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
-    """For people, who are not shown the profiles, which need the model."""
+    """Return the reply of a stored answer, for people alone: profiles need the model."""
     if "identify" not in answers or any(value for name, value in options.items() if name != "source"):
         return None
     return Reply(room.identifiability_text(room.rebuild_identifiability(answers["identify"])))

@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.bends.answer import elastic_answers, friction_arm
-from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range, note_outside_bends
+from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range, note_outside_bends
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import listed
@@ -25,7 +25,7 @@ _LIMIT, _SPRING = "--friction-limit", "--spring"
 
 @dataclass(frozen=True)
 class BendQuery:
-    """What is asked at wrap angles, in internal units.
+    """A question at wrap angles, in internal units.
 
     Args:
         wrap_angles: Wrap angles [rad].
@@ -58,7 +58,7 @@ def make_query(
     stroke: str = "pull",
     spring: StatedNumber = None,
 ) -> BendQuery:
-    """A question from numbers with units; wrap angles are those measured at if none is named.
+    """Return a question at wrap angles from numbers with units; the measured angles if none is named.
 
     Raises:
         UsageError: A number is negative, or has a unit of another kind.
@@ -83,6 +83,7 @@ def make_query(
 
 
 def _to_internal(stated: tuple[float, str], dimension: str, option: str, least: float) -> float:
+    """Convert a number with its unit to the internal unit."""
     try:
         value = stated[0] * conversion_factor(stated[1], dimension)
     except DatasetError as error:
@@ -93,7 +94,7 @@ def _to_internal(stated: tuple[float, str], dimension: str, option: str, least: 
 
 
 def predict_at_wrap_angles(fit: Record, quantity: str, query: BendQuery) -> list[Row]:
-    """One row a wrap angle, or one row in all for the preload window.
+    """Return predictions, a row for each wrap angle, or one row in all for the preload window.
 
     Args:
         fit: The fit.
@@ -127,9 +128,9 @@ def _refuse_irrelevant_options(quantity: str, query: BendQuery) -> None:
 
 
 def _interval_rows(fit: Record, query: BendQuery, columns: Mapping[str, np.ndarray], words: Sequence[str] = ()) -> list[Row]:
-    """Median, moments and interval of the first quantity, the others with their names before; what `words` and ranges say."""
+    """Return median, moments and interval of every quantity, one row a wrap angle; keys of the first have no prefix."""
     rows, outside = [], note_outside_bends(fit)
-    of_load = measured_range(fit).notes(None, query.input_force) if query.stated_force else []
+    of_load = find_measured_range(fit).notes(None, query.input_force) if query.stated_force else []
     for i, angle in enumerate(np.rad2deg(query.wrap_angles)):
         row: Row = {"wrap_angle_deg": float(f"{angle:.9g}")}
         for k, (name, draws) in enumerate(columns.items()):
@@ -141,57 +142,64 @@ def _interval_rows(fit: Record, query: BendQuery, columns: Mapping[str, np.ndarr
     return rows
 
 
-def _efficiency(fit: Record, query: BendQuery) -> list[Row]:
-    force, words = _output_force_draws(fit, query)
+def _predict_efficiency(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the efficiency."""
+    force, words = _draw_output_forces(fit, query)
     return _interval_rows(fit, query, {"efficiency": force / query.input_force}, words)
 
 
-def _output_force(fit: Record, query: BendQuery) -> list[Row]:
-    force, words = _output_force_draws(fit, query)
+def _predict_output_force(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the output force."""
+    force, words = _draw_output_forces(fit, query)
     return _interval_rows(fit, query, {"output_force_N": force}, words)
 
 
-def _output_force_draws(fit: Record, query: BendQuery) -> tuple[np.ndarray, list[str]]:
-    """Output forces of every draw: a rope is slack, and a loop is held by friction, where nothing is left."""
+def _draw_output_forces(fit: Record, query: BendQuery) -> tuple[np.ndarray, list[str]]:
+    """Return output forces of every draw; where nothing is left, a rope is slack, and a loop is held by friction."""
     force = elastic_answers(fit).output_force(query.wrap_angles, query.input_force, query.stroke, query.preload)
     return clip_to_tension(force, query.input_force, "held by friction" if fit.model.cable.is_loop else "slack")
 
 
-def _input_force(fit: Record, query: BendQuery) -> list[Row]:
-    """Input force for the output force that is wanted: friction alone holds it where none is needed."""
+def _predict_input_force(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the input force for a wanted output force; 0 where friction alone holds it."""
     assert query.output_force is not None  # the verb refuses the question without
     force = elastic_answers(fit).input_force(query.wrap_angles, query.output_force, query.stroke, query.preload)
     force, words = clip_to_tension(force, query.output_force, "held by friction alone")
-    limits = measured_range(fit)
+    limits = find_measured_range(fit)
     notes = [limits.notes(None, load) for load in np.median(force, axis=0)]
     words = ["; ".join(note for note in (word, *note) if note) for word, note in zip(words, notes, strict=True)]
     return _interval_rows(fit, query, {"input_force_N": force}, words)
 
 
-def _preload(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_preload(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict preload and slack."""
     preload, slack = elastic_answers(fit).preload(query.wrap_angles, query.preload)
     rows = _interval_rows(fit, query, {"preload_N": preload, "slack_mm": slack})
     return [row | {"slack_probability": float(np.mean(slack[:, i] > 0))} for i, row in enumerate(rows)]
 
 
-def _friction(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_friction(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the force felt in free motion."""
     friction, (arm, unit) = elastic_answers(fit).friction(query.wrap_angles, query.preload), friction_arm(fit)
     return _interval_rows(fit, query, {f"friction_{unit.replace('*', '_')}": arm * friction})
 
 
-def _slack_load(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_slack_load(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the input force at which the return side of a loop goes slack."""
     _require_loop(fit, "slack-load")
     return _interval_rows(fit, query, {"slack_load_N": elastic_answers(fit).slack_load(query.wrap_angles, query.preload)})
 
 
 def _require_loop(fit: Record, quantity: str) -> None:
+    """Refuse a cable that is not a loop."""
     if not fit.model.cable.is_loop:
         raise UsageError(
             f'--quantity {quantity} is asked of pull-pull loops; this cable has no kind = "loop" under [cable].'
         )
 
 
-def _position(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_position(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict position error and lost motion."""
     error, lost_motion = elastic_answers(fit).position(query.wrap_angles, query.input_force, query.preload)
     columns = {"position_error_mm": error, "lost_motion_mm": lost_motion}
     arm, unit = friction_arm(fit)
@@ -200,7 +208,8 @@ def _position(fit: Record, query: BendQuery) -> list[Row]:
     return _interval_rows(fit, query, columns)
 
 
-def _stiffness(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_stiffness(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the stiffness at the load side."""
     stiffness = elastic_answers(fit).stiffness(query.wrap_angles, query.input_force, query.preload, query.spring)
     columns = {"stiffness_N_per_mm": stiffness}
     arm, unit = friction_arm(fit)
@@ -209,8 +218,8 @@ def _stiffness(fit: Record, query: BendQuery) -> list[Row]:
     return _interval_rows(fit, query, columns)
 
 
-def _dynamic_range(fit: Record, query: BendQuery) -> list[Row]:
-    """Largest torque of the device over the friction felt in free motion."""
+def _predict_dynamic_range(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the largest torque of the device over the friction felt in free motion."""
     _require_loop(fit, "dynamic-range")
     if not query.stated_force:
         raise UsageError("--quantity dynamic-range needs the largest force at the motor, as --input-force 100N.")
@@ -218,28 +227,30 @@ def _dynamic_range(fit: Record, query: BendQuery) -> list[Row]:
     return _interval_rows(fit, query, {"dynamic_range": ratio})
 
 
-def _preload_window(fit: Record, query: BendQuery) -> list[Row]:
+def _predict_preload_window(fit: Record, query: BendQuery) -> list[Row]:
+    """Predict the preload window."""
     ends = float(query.wrap_angles.min()), float(query.wrap_angles.max())
     force = query.input_force if query.stated_force else 0.0
     window = elastic_answers(fit).preload_window(ends, force, query.friction)
     row: Row = {"from_deg": window.bends[0], "to_deg": window.bends[1], "input_force_N": force}
-    row |= _quantiles("lowest", window.lowest, "N")
+    row |= _format_quantiles("lowest", window.lowest, "N")
     if window.highest is not None:
-        row |= _quantiles("highest", window.highest, "N")
-    row |= {"best_N": window.best} | _quantiles("felt", window.felt, window.friction_unit.replace("*", "_"))
+        row |= _format_quantiles("highest", window.highest, "N")
+    row |= {"best_N": window.best} | _format_quantiles("felt", window.felt, window.friction_unit.replace("*", "_"))
     return [row | {"possible": window.possible, "in_words": window.sentence()}]
 
 
-def _quantiles(prefix: str, interval: Interval, unit: str) -> Row:
+def _format_quantiles(prefix: str, interval: Interval, unit: str) -> Row:
+    """Return median, moments and quantiles of draws as cells of a row."""
     return {f"{prefix}_{name}_{unit}": getattr(interval, name) for name in ("median", "q05", "q95")}
 
 
 class _PredictedQuantity(NamedTuple):
-    """A quantity.
+    """A quantity that can be predicted at wrap angles.
 
     Args:
-        rows: Of the table.
-        depends_on: What may be stated, besides the output force that an input force is asked for.
+        rows: Function that returns the rows of the table.
+        depends_on: Options that may be stated, besides the output force that an input force is asked for.
     """
 
     rows: Callable[[Record, BendQuery], list[Row]]
@@ -248,15 +259,15 @@ class _PredictedQuantity(NamedTuple):
 
 QUANTITIES: Mapping[str, _PredictedQuantity] = MappingProxyType(
     {
-        "efficiency": _PredictedQuantity(_efficiency, (_FORCE, _STROKE, _PRELOAD)),
-        "output-force": _PredictedQuantity(_output_force, (_FORCE, _STROKE, _PRELOAD)),
-        "input-force": _PredictedQuantity(_input_force, (_STROKE, _PRELOAD)),
-        "preload": _PredictedQuantity(_preload, (_PRELOAD,)),
-        "friction": _PredictedQuantity(_friction, (_PRELOAD,)),
-        "slack-load": _PredictedQuantity(_slack_load, (_PRELOAD,)),
-        "position": _PredictedQuantity(_position, (_FORCE, _PRELOAD)),
-        "stiffness": _PredictedQuantity(_stiffness, (_FORCE, _PRELOAD, _SPRING)),
-        "dynamic-range": _PredictedQuantity(_dynamic_range, (_FORCE, _PRELOAD)),
-        "preload-window": _PredictedQuantity(_preload_window, (_FORCE, _LIMIT)),
+        "efficiency": _PredictedQuantity(_predict_efficiency, (_FORCE, _STROKE, _PRELOAD)),
+        "output-force": _PredictedQuantity(_predict_output_force, (_FORCE, _STROKE, _PRELOAD)),
+        "input-force": _PredictedQuantity(_predict_input_force, (_STROKE, _PRELOAD)),
+        "preload": _PredictedQuantity(_predict_preload, (_PRELOAD,)),
+        "friction": _PredictedQuantity(_predict_friction, (_PRELOAD,)),
+        "slack-load": _PredictedQuantity(_predict_slack_load, (_PRELOAD,)),
+        "position": _PredictedQuantity(_predict_position, (_FORCE, _PRELOAD)),
+        "stiffness": _PredictedQuantity(_predict_stiffness, (_FORCE, _PRELOAD, _SPRING)),
+        "dynamic-range": _PredictedQuantity(_predict_dynamic_range, (_FORCE, _PRELOAD)),
+        "preload-window": _PredictedQuantity(_predict_preload_window, (_FORCE, _LIMIT)),
     }
 )

@@ -18,12 +18,12 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.rows import read_angle
 from bowdenfit.questions.bends.bent_cable import bending_contact
 from bowdenfit.questions.predict.lengths import to_newtons
-from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range
+from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
 from bowdenfit.results.record import Record
 from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import counted
 
-_MOST_ANGLES = 512  # of a gait; of more so many quantiles stand for them
+_MOST_ANGLES = 512  # angles of a gait; of more, 512 quantiles stand for them
 _TORQUE = "torque_N_m"
 _STROKES = {"pull": 1.0, "return": -1.0}
 
@@ -58,7 +58,7 @@ class Gait:
 def make_gait(
     fit: Record, contact: str | None, angles: Sequence[tuple[float, str]], file: str | Path | None, column: str | None
 ) -> Gait:
-    """The gait that is asked for.
+    """Return the gait that is asked for.
 
     Args:
         fit: The fit.
@@ -80,7 +80,7 @@ def make_gait(
             "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "
             "them as --gait FILE; name one of the two."
         )
-    angles_rad, arms = (_stated_angles(angles), None) if file is None else _read_gait(Path(file), column)
+    angles_rad, arms = (_convert_angles(angles), None) if file is None else _read_gait(Path(file), column)
     if len(angles_rad) <= _MOST_ANGLES:
         return Gait(number, contacts[number], angles_rad, len(angles_rad), arms)
     middles = (np.arange(_MOST_ANGLES) + 0.5) / _MOST_ANGLES * len(angles_rad) - 0.5
@@ -90,7 +90,8 @@ def make_gait(
     return Gait(number, contacts[number], kept_angles, len(angles_rad), kept_arms)
 
 
-def _stated_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
+def _convert_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
+    """Return stated wrap angles in rad."""
     try:
         angles_rad = np.array([value * conversion_factor(unit, "angle") for value, unit in angles])
     except DatasetError as error:
@@ -101,7 +102,7 @@ def _stated_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
 
 
 def _read_gait(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray | None]:
-    """Wrap angles of a table [rad], and moment arms where it has some [mm]."""
+    """Read wrap angles of a table [rad], and moment arms where it has some [mm]."""
     table = read_table(path)
     named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
     columns = find_columns(table, (Quantity("wrap_angle", "angle"), Quantity("moment_arm", "length")), named)
@@ -122,7 +123,7 @@ def predict_over_gait(
     stroke: str = "pull",
     output_force: tuple[float, str] | None = None,
 ) -> list[dict[str, Any]]:
-    r"""Efficiency, output force or input force at route values: the mean over a gait, and of it the least and the most.
+    r"""Predict efficiency, output force or input force at route values: the mean over a gait, and its extremes.
 
     With an input force and moment arms the torque at the joint too,
     :math:`\tau(\varphi) = r(\varphi) F_\text{in} e^{-\Lambda(\theta(\varphi))}`.
@@ -135,7 +136,7 @@ def predict_over_gait(
         stroke: "pull" or "return".
         output_force: Force and unit that is wanted, of which the input force is predicted.
     """
-    route, limits = fit.dataset.description.route, measured_range(fit)
+    route, limits = fit.dataset.description.route, find_measured_range(fit)
     friction = fit.model.cable.friction
     force, divisor, name, slack_word = friction.conditions.reference_force, 1.0, "efficiency", "slack"
     if output_force is not None:
@@ -151,15 +152,15 @@ def predict_over_gait(
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
-        row |= _interval_cells(name, forces["mean"][:, i] / divisor)
+        row |= _format_interval(name, forces["mean"][:, i] / divisor)
         mounting = np.quantile(forces["mounted"][:, i] / divisor, (0.05, 0.95))
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])} | of_load
         if len(gait.angles) > 1:
             for which in ("least", "most"):
-                row |= _interval_cells(f"{which}_{name}", forces[which][:, i] / divisor, f"{which}_{name}_")
+                row |= _format_interval(f"{which}_{name}", forces[which][:, i] / divisor, f"{which}_{name}_")
         if name == "output_force_N" and gait.arms is not None:
             for which in ("", "most_"):
-                row |= _interval_cells(f"{which}{_TORQUE}", forces[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
+                row |= _format_interval(f"{which}{_TORQUE}", forces[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
         load = None if name == "efficiency" else float(np.median(forces["mean"][:, i])) if output_force else force
         notes = [words[i], gait.description, *limits.notes(None if route is None else float(length), load)]
         if route is not None:
@@ -169,7 +170,8 @@ def predict_over_gait(
     return rows
 
 
-def _interval_cells(name: str, draws: np.ndarray, prefix: str = "") -> dict[str, float]:
+def _format_interval(name: str, draws: np.ndarray, prefix: str = "") -> dict[str, float]:
+    """Return the interval of draws as cells of a row."""
     interval = Interval.of(np.maximum(draws, 0.0))
     return {name: interval.median} | {f"{prefix}{key}": getattr(interval, key) for key in ("mean", "sd", "q05", "q95")}
 
@@ -177,7 +179,7 @@ def _interval_cells(name: str, draws: np.ndarray, prefix: str = "") -> dict[str,
 def _forces_over_gait(
     fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: float, *, inverse: bool
 ) -> dict[str, np.ndarray]:
-    """Forces at the other end [N] of every draw (rows) at route values (columns): the mean, in a new mounting, and the ends."""
+    """Return forces at the other end [N], draws by route values: the mean, in a new mounting, and the extremes."""
     model, cable = fit.model, fit.model.cable
     function: Callable[..., Array] = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 

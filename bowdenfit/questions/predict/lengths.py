@@ -11,7 +11,7 @@ from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
-from bowdenfit.questions.predict.measured_range import clip_to_tension, measured_range
+from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
 
@@ -25,7 +25,7 @@ def predict_at_lengths(
     stroke: str = "pull",
     output_force: tuple[float, str] | None = None,
 ) -> list[dict[str, Any]]:
-    """Efficiency or a force at route values; a note says what lies outside the measurements, and where a rope is slack.
+    """Predict efficiency or a force at route values; a note says what lies outside the measurements or where a rope is slack.
 
     Args:
         fit: The fit.
@@ -37,7 +37,7 @@ def predict_at_lengths(
     Raises:
         UsageError: A force is not a positive force, or there is no posterior.
     """
-    route, sign, limits = fit.dataset.description.route, _STROKES[stroke], measured_range(fit)
+    route, sign, limits = fit.dataset.description.route, _STROKES[stroke], find_measured_range(fit)
     name, force, divisor, stated_force = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
     if input_force is not None:
         name, force = "output_force_N", (stated_force := to_newtons(input_force, "--input-force"))
@@ -76,7 +76,7 @@ def predict_at_lengths(
 
 
 def choose_route_values(fit: Record, lengths: Sequence[float | NumberWithUnit] | None) -> np.ndarray:
-    """Route values to predict at, by default those of the description; any one number without a route.
+    """Return route values to predict at, by default those of the description; any one number without a route.
 
     Raises:
         UsageError: There are none, or one is no number.
@@ -91,7 +91,7 @@ def choose_route_values(fit: Record, lengths: Sequence[float | NumberWithUnit] |
 
 
 def to_route_unit(route: Route | None, lengths: Sequence[float | NumberWithUnit] | None) -> list[float]:
-    """Route values in the unit of the route.
+    """Convert route values to the unit of the route.
 
     Args:
         route: The route; None without one.
@@ -119,7 +119,7 @@ def to_route_unit(route: Route | None, lengths: Sequence[float | NumberWithUnit]
 
 
 def _output_forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Force at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
+    """Return forces at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
     route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
     if not inverse and route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
         return fit.along_route.mean, fit.along_route.mounted
@@ -131,7 +131,7 @@ def _output_forces(fit: Record, lengths: np.ndarray, force: float, sign: int, in
 
 
 def to_newtons(force: tuple[float, str], option: str) -> float:
-    """A positive force [N].
+    """Convert a positive force to N.
 
     Raises:
         UsageError: It is none.

@@ -11,14 +11,14 @@ from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.results.record import Record
 from bowdenfit.words import percent
 
-_ROUNDING = 1e-6  # of an end of a range, by which a number may miss it
-_SURELY, _HARDLY = 0.995, 0.005  # shares of the draws
+_ROUNDING = 1e-6  # share of an end of a range by which a number may miss it, above rounding of units
+_SURELY, _HARDLY = 0.995, 0.005  # shares of the draws beyond which a percentage would round to 100 or 0
 Range = tuple[float, float] | None
 
 
 @dataclass(frozen=True)
 class MeasuredRange:
-    """What a cable was measured at, from the lowest to the highest; None where it was not.
+    """Ranges that a cable was measured in, from the lowest to the highest; None where it was not.
 
     Args:
         lengths: Route values of wrap angles and of friction.
@@ -31,7 +31,7 @@ class MeasuredRange:
     unit: str
 
     def notes(self, length: float | None, input_force: float | None) -> list[str]:
-        """What lies outside, in words.
+        """Describe what lies outside.
 
         Args:
             length: Route value; None without a route.
@@ -43,8 +43,8 @@ class MeasuredRange:
         return [note for note in notes if note]
 
 
-def measured_range(fit: Record) -> MeasuredRange:
-    """What the tables of a fit were measured at."""
+def find_measured_range(fit: Record) -> MeasuredRange:
+    """Return the ranges in which a fit's tables were measured."""
     measurements, route = fit.dataset.measurements, fit.dataset.description.route
     tables = list(iterate_tables(measurements))
     friction = [(kind, table) for kind, table in tables if isinstance(kind, FrictionKind)]
@@ -55,13 +55,13 @@ def measured_range(fit: Record) -> MeasuredRange:
 
 
 def note_outside_bends(fit: Record) -> Callable[[float], str]:
-    """Function of a wrap angle [rad] that says that nothing was measured there; empty where something was."""
+    """Return a function of a wrap angle [rad] that notes where nothing was measured; its note is empty elsewhere."""
     span = _finite_range([np.rad2deg(elastic_answers(fit).measured_bends)])
     return lambda angle: _note_outside(float(np.rad2deg(angle)), span, "wrap angles", "deg")
 
 
 def clip_to_tension(force: np.ndarray, input_force: float, slack_word: str = "slack") -> tuple[np.ndarray, list[str]]:
-    """Forces of a rope, which pulls or is slack but never pushes, and for each column what is said of it.
+    """Return forces of a rope, which pulls or is slack but never pushes, and a note for each column.
 
     Args:
         force: Forces by draws (rows), negative where nothing is left [N].
@@ -77,12 +77,14 @@ def clip_to_tension(force: np.ndarray, input_force: float, slack_word: str = "sl
 
 
 def _finite_range(parts: list[np.ndarray]) -> Range:
+    """Return the lowest and highest finite value; None without any."""
     values = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
     known = values[np.isfinite(values)]
     return (float(np.min(known)), float(np.max(known))) if len(known) else None
 
 
 def _note_outside(value: float | None, span: Range, what: str, unit: str) -> str:
+    """Note that a value lies outside a range; empty where it does not."""
     if value is None or span is None:
         return ""
     slack = _ROUNDING * max(abs(span[0]), abs(span[1]))

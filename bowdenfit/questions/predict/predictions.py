@@ -12,7 +12,7 @@ _MOUNTING, _PROBABILITY = "mounting", "_probability"
 
 
 def predictions_text(rows: Sequence[Row]) -> str:
-    """Predictions for people: the answer in a sentence, of several places in a table, and what lies outside.
+    """Describe predictions: the answer in a sentence, of several places in a table, and what lies outside.
 
     Args:
         rows: One a place.
@@ -29,7 +29,7 @@ def predictions_text(rows: Sequence[Row]) -> str:
 
 
 def column_units(row: Row) -> dict[str, str]:
-    """Units of the columns, "1" of numbers without one; moments and quantiles have that of what stands before them."""
+    """Return units of the columns, "1" of plain numbers; moments and quantiles have that of their quantity."""
     units, unit = dict[str, str](), "1"
     for name, value in row.items():
         if isinstance(value, float):
@@ -40,7 +40,7 @@ def column_units(row: Row) -> dict[str, str]:
 
 
 def _quantities(row: Row) -> list[str]:
-    """Names of what is predicted: the first has its mean under that name, the others after their own."""
+    """Return names of what is predicted: the first has its mean under that name, the others after their own."""
     names = list(row)
     return [names[names.index("mean") - 1], *(name for name in names if f"{name}_mean" in row)]
 
@@ -52,7 +52,7 @@ def _position_name(row: Row) -> str | None:
 
 
 def _name_and_unit(name: str) -> tuple[str, str]:
-    """A column's name in words, and its unit; efficiencies are shown in percent."""
+    """Return a column's name in words, and its unit; efficiencies are shown in percent."""
     if name.endswith("efficiency"):
         return name.replace("_", " "), "%"
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
@@ -63,13 +63,13 @@ def _name_and_unit(name: str) -> tuple[str, str]:
 
 
 def _position_text(row: Row) -> str:
-    """'470 mm'"""
+    """Return such as '470 mm'."""
     name = _position_name(row)
     return f"{row[name]:.6g} {_name_and_unit(name)[1]}" if name is not None else "the nominal wrap angles"
 
 
 def _format_value(row: Row, name: str, variant: str = "") -> tuple[str, str]:
-    """Median and interval of a quantity, to the digits that the interval has; or of it in one mounting."""
+    """Format median and interval of a quantity to the digits that the interval has; or those in one mounting."""
     prefix = "" if name == _quantities(row)[0] else f"{name}_"
     scale = 100.0 if _name_and_unit(name)[1] == "%" else 1.0
     value, low, high = (scale * row[key] for key in (name, f"{variant or prefix}q05", f"{variant or prefix}q95"))
@@ -80,7 +80,7 @@ def _format_value(row: Row, name: str, variant: str = "") -> tuple[str, str]:
 
 
 def _single_prediction(row: Row) -> list[str]:
-    """The predictions of one place in sentences."""
+    """Describe the predictions at one place in sentences."""
     lines = []
     for name in _quantities(row):
         (words, unit), (value, interval) = _name_and_unit(name), _format_value(row, name)
@@ -97,7 +97,7 @@ def _single_prediction(row: Row) -> list[str]:
 
 
 def _highest_and_lowest(rows: Sequence[Row]) -> str:
-    """Where the first quantity is highest and where lowest; of places outside the curves only where all are."""
+    """Say where the first quantity is highest and lowest; among places outside the curves only where all are."""
     name, inside = _quantities(rows[0])[0], [row for row in rows if row.get("in_range", True)]
     words, unit = _name_and_unit(name)
     which = "" if len(inside) == len(rows) else ", inside the curves" if inside else ", all outside the curves"
@@ -112,7 +112,7 @@ def _highest_and_lowest(rows: Sequence[Row]) -> str:
 
 
 def _prediction_table(rows: Sequence[Row]) -> str:
-    """All places."""
+    """Return the predictions at all places in a table."""
     name = next(iter(rows[0]))  # of several places it is there
     words, unit = _name_and_unit(name)
     heads, *cells = zip([f"{words} ({unit})", *(f"{row[name]:.6g}" for row in rows)], *_table_columns(rows), strict=True)
@@ -120,7 +120,7 @@ def _prediction_table(rows: Sequence[Row]) -> str:
 
 
 def _table_columns(rows: Sequence[Row]) -> Iterator[list[str]]:
-    """Columns with their headings."""
+    """Return the columns with their headings."""
     for name in _quantities(rows[0]):
         words, unit = _name_and_unit(name)
         known = [_format_value(row, name) for row in rows]
@@ -134,7 +134,7 @@ def _table_columns(rows: Sequence[Row]) -> Iterator[list[str]]:
 
 
 def _note_lines(rows: Sequence[Row]) -> list[str]:
-    """What holds of all, and what lies outside where."""
+    """Return notes that hold of all places, and what lies outside where."""
     of_load = rows[0].get("at_input_force_N")
     notes = [] if of_load is None else [f"At an input force of {significant(of_load)} N, because friction depends on the load."]
     for note in dict.fromkeys(row["note"] for row in rows if row["note"]):

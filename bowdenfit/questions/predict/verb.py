@@ -130,7 +130,7 @@ def _refuse_bend_options(
 
 
 def _choose_quantity(named: QuantityName | None, input_force: Quantity | None, output_force: Quantity | None) -> QuantityName:
-    """What is asked for, where it is not named: what the stated force tells of the other end.
+    """Return what is predicted, where it is not named: what the stated force determines at the other end.
 
     Raises:
         UsageError: Forces of both ends are stated, or one that the quantity does not follow from.
@@ -149,11 +149,12 @@ def _choose_quantity(named: QuantityName | None, input_force: Quantity | None, o
 
 
 def _reply(rows: list[dict[str, Any]], _: object = None) -> Reply:
+    """Return what the command line prints."""
     return Reply(room.predictions_text(rows), lambda: rows, csv=lambda: csv_text(rows))
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:
-    """Efficiencies while pulling, at lengths that can be bought."""
+    """Return stored efficiencies while pulling, at lengths that can be bought; None of anything else."""
     stored_rows = {length: row for length, row in answers.get("predict", ()) if None not in row.values()}
     other_options = any(options[name] not in (None, (), []) for name in _NOT_STORED)
     lengths = options["lengths"] or tuple(stored_rows)

@@ -19,7 +19,7 @@ from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.physics.loop import dynamic_range
 from bowdenfit.physics.stretch import stiffness_with_springs
-from bowdenfit.questions.bends.bent_cable import BentCable, bending_contact, has_preload, has_stretch
+from bowdenfit.questions.bends.bent_cable import BentCable, find_bent_contact, has_preload, has_stretch
 from bowdenfit.questions.bends.preload_window import TAUT, PreloadWindow
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values
 
@@ -27,7 +27,7 @@ _WINDOW_BENDS = (
     25  # wrap angles across a range of bends on which extremes are searched; between them answers are smooth
 )
 _MAX_BENDS = 5  # wrap angles shown in a summary
-_QUANTILES = 0.5, 0.05, 0.95
+_QUANTILES = 0.5, 0.05, 0.95  # in the order of the columns
 _UNITS = {
     "preload": "N", "friction": "N", "slack_load": "N", "efficiency": "1", "position_error": "mm", "lost_motion": "mm",
     "stiffness": "N/mm",
@@ -52,7 +52,7 @@ class ElasticAnswers(Display):
     @cached_property
     def contact(self) -> int:
         """Number of the contact that a wrap angle refers to."""
-        return bending_contact(self.fit.model)
+        return find_bent_contact(self.fit.model)
 
     def bend_to(self, wrap_angles: Sequence[float] | np.ndarray) -> BentCable:
         """Return the cable bent to wrap angles [rad].

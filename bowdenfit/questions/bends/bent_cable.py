@@ -37,6 +37,7 @@ class BentCable:
         return self.model.cable.elasticity
 
     def _angles(self, values: Values) -> Float[Array, "bends contacts"]:
+        """Wrap angles of all contacts at the bends [rad]."""
         route = self.model.description.route
         middle = jnp.full_like(self.wrap_angle, route.middle if route else 0.0)
         return self.model.cable.wrap_angles(values, middle).at[:, self.contact].set(self.wrap_angle)
@@ -162,8 +163,8 @@ class BentCable:
         return self.elastic.tension(values, self.elastic.extension(values, preload) - lengthened)
 
 
-def bending_contact(model: Model) -> int:
-    """Number of the contact that a wrap angle without a name means: the only one, or the only one measured row by row.
+def find_bent_contact(model: Model) -> int:
+    """Return the number of the contact that a wrap angle refers to: the only one, or the only one measured row by row.
 
     Raises:
         UsageError: There are several.
@@ -179,10 +180,10 @@ def bending_contact(model: Model) -> int:
 
 
 def has_stretch(model: Model) -> bool:
-    """Whether the model has a rope that stretches."""
+    """Return whether the model has a rope that stretches."""
     return STIFFNESS in {p.name for p in model.space.parameters}
 
 
 def has_preload(model: Model) -> bool:
-    """Whether the model has a preload."""
+    """Return whether the model has a preload."""
     return PRELOAD in {p.name for p in model.space.parameters}

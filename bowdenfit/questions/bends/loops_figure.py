@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Forces of the loop"
-MOST, MOST_COLUMNS = 6, 3
+MOST, MOST_COLUMNS = 6, 3  # wrap angles that are shown, and panels in a row
 LEAST_NAMED = 1.5  # in, width of a panel with names of the branches
 WORD_ROOM = 0.075  # share of a panel's width that a word along the line takes
 RECORDED = 2  # times the stroke of a block of a recording, which are many

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Force at the motor against displacement"
-MOST, MOST_COLUMNS = 6, 3
+MOST, MOST_COLUMNS = 6, 3  # runs that are shown, and panels in a row
 _POINTS = 150  # of the loop of a run, at least
 # stroke, name, marker, size [pt], color
 _STROKES = ((1, "Read while pulling", "o", 3.2, BLUE), (-1, "Read on the return", "s", 3.0, VERMILLION))

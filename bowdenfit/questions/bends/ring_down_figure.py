@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Ring-down of the joint"
-MOST, MOST_COLUMNS = 6, 3
+MOST, MOST_COLUMNS = 6, 3  # runs that are shown, and panels in a row
 _POINTS = 400  # of the curve of a run
 
 

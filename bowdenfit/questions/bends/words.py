@@ -10,7 +10,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers, friction_arm, has_elastic_answers
-from bowdenfit.questions.bends.bent_cable import bending_contact
+from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.bends.preload_window import PreloadWindow
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import filled, significant, table
@@ -81,7 +81,7 @@ def elastic_overview(fit: Record) -> ElasticOverview | None:
 def has_answers_at_bends(fit: Record) -> bool:
     """Return whether there are answers at wrap angles, and a wrap angle says which contact is bent."""
     try:
-        bending_contact(fit.model)
+        find_bent_contact(fit.model)
     except UsageError:
         return False
     return has_elastic_answers(fit)

@@ -115,7 +115,7 @@ def _check_table(fit: Record, term: Term, in_band: float, generator: np.random.G
     """
     draws = (fit.posterior.log_likelihood[term.name], fit.posterior.replicated[term.name])
     log_likelihood, replicated = (part.reshape(-1, len(term.labels)) for part in draws)
-    reading, at_most = readings_of(term)
+    reading, at_most = collect_readings(term)
     predicted = predict_left_out(log_likelihood, replicated, reading, at_most, fit.posterior.n_effective)
     pit = draw_randomized_pit(predicted, generator)
     uniformity = check_uniformity(pit, in_band) if len(reading) >= _MIN_READINGS else None
@@ -144,7 +144,7 @@ def _prior_sensitivities(fit: Record) -> tuple[Sensitivity, ...]:
 
 
 def _weakly_identified_noise(fit: Record) -> dict[str, tuple[int, int]]:
-    """Noise scales with hardly more readings than coefficients: numbers of readings and coefficients, by name."""
+    """Return noise scales with hardly more readings than coefficients: numbers of readings and coefficients, by name."""
     coefficients = sum(p.role == "friction" for p in fit.model.space.free)
     readings: dict[str, int] = {}
     for term in fit.model.terms:
@@ -153,7 +153,7 @@ def _weakly_identified_noise(fit: Record) -> dict[str, tuple[int, int]]:
     return {n: (readings[n], coefficients) for n in noise if 0 < readings.get(n, 0) <= coefficients + _FEW_SPARE}
 
 
-def readings_of(term: Term) -> tuple[np.ndarray, np.ndarray]:
+def collect_readings(term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Return the readings of a table, upper limits where only these are known, and a mask of such limits."""
     reading, limit = term.observed().copy(), term.data.get("limit", np.zeros(0))
     at_most = np.isnan(reading)

@@ -122,6 +122,7 @@ def caption(tables: tuple[CheckedTable, ...]) -> str:
 
 
 def _rows_in_words(n_tables: int) -> str:
+    """Return how many rows the figure has, in words."""
     return "one table" if n_tables == 1 else f"a row for each of {n_tables} tables"
 
 

@@ -90,7 +90,7 @@ def _far_reading_sentence(names: Sequence[str]) -> str:
 
 
 def _describe_departure(fit: Record, departure: Departure) -> str:
-    """'The model does not describe ...: the loss is 12 % larger ... What to do.'"""
+    """Return such as 'The model does not describe ...: the loss is 12 % larger ... What to do.'"""
     if departure.against == ZERO:
         return _describe_drift(departure)
     readings = find_readings(departure.table)
@@ -117,16 +117,17 @@ def _describe_drift(departure: Departure) -> str:
 
 
 def _readable_column(column: str) -> str:
+    """Return the name of a column as words."""
     return column.replace("_", " ")
 
 
 def _percent_excess(excess: float) -> str:
-    """'12 % larger'"""
+    """Return such as '12 % larger'."""
     return f"{significant(100 * abs(excess), 2)} % {'larger' if excess >= 0 else 'smaller'}"
 
 
 def _odds(p_value: float) -> str:
-    """'one healthy fit of 5,000'"""
+    """Return such as 'one healthy fit of 5,000'."""
     if p_value < 1e-6:
         return "less than one healthy fit of a million"
     return f"one healthy fit of {float(f'{1 / p_value:.1g}'):,.0f}"

@@ -16,7 +16,7 @@ from bowdenfit.kinds.covariates import collect_covariates
 from bowdenfit.kinds.term import Term
 from bowdenfit.model import Model, build_model
 from bowdenfit.questions.check import prior_figure
-from bowdenfit.questions.check.answer import readings_of
+from bowdenfit.questions.check.answer import collect_readings
 from bowdenfit.questions.check.prior_figure import PriorPredictive, PriorTable
 from bowdenfit.questions.figure_files import write_figure
 from bowdenfit.results.along_route import route_grid
@@ -30,7 +30,7 @@ _DRAWS = 4096  # so that 20 of them lie beyond each of the outer quantiles
 WORTH_WARNING = (
     0.2  # share of readings outside the central 99 %: by Markov's inequality in at most 1 of 20 good data sets
 )
-_MAX_NAMED_OUTSIDE = 3
+_MAX_NAMED_OUTSIDE = 3  # readings outside that are named; the others are counted
 
 
 def predict_from_priors(dataset: Dataset, seed: int = 0) -> PriorPredictive:
@@ -102,13 +102,14 @@ def _draw_from_priors(model: Model, z: np.ndarray, seed: int) -> dict[str, Any]:
 
 
 def _quantiles(draws: np.ndarray) -> np.ndarray:
+    """Return the quantiles of draws over the first axis."""
     return np.nanquantile(np.where(np.isfinite(draws), draws, np.nan), QUANTILES, axis=0)
 
 
 def _prior_table(dataset: Dataset, term: Term, draws: np.ndarray) -> PriorTable:
     """Return the readings of a table beside their quantiles; a reading that is only a bound is outside if it is too low."""
     naming = find_readings(term.name)
-    scale, (reading, at_most) = naming.shown_scale, readings_of(term)
+    scale, (reading, at_most) = naming.shown_scale, collect_readings(term)
     quantiles, reading = scale * _quantiles(draws), scale * reading
     outside = (reading < quantiles[0]) | (~at_most & (reading > quantiles[-1]))
     positions = collect_covariates(dataset.description, dataset.measurements, term)
@@ -157,6 +158,7 @@ def _name_readings(table: PriorTable, outside: list[int]) -> str:
 
 
 def _reading_and_range(table: PriorTable, i: int) -> str:
+    """Return a reading and the range that the priors allow it, in words."""
     low, high = table.quantiles[0][i], table.quantiles[-1][i]
     read = f"{significant(table.reading[i])}, " if table.reading[i] == table.reading[i] else ""
     return f" [{read}priors {significant(low)} to {significant(high)}]"

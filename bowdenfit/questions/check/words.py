@@ -94,7 +94,7 @@ def _describe_outliers(checks: Checks) -> str:
 
 
 def _describe_reading(reading: CheckedReading) -> str:
-    """'efficiency at 550 mm: measured 67.8 %, expected 68.1 % without it (90 % interval ..., z = -0.2, k = 0.6)'"""
+    """Return such as 'efficiency at 550 mm: measured 67.8 %, expected 68.1 % without it (90 % interval ..., k = 0.6)'."""
     expected, low, high = (value_with_unit(reading, getattr(reading, key)) for key in ("expected", "q05", "q95"))
     measured = f"{'at most' if reading.is_bound else 'measured'} {value_with_unit(reading, reading.reading)}"
     z = f", z = {reading.z:+.1f}" if isfinite(reading.z) else ""
@@ -123,6 +123,7 @@ def _describe_influential(checks: Checks) -> str:
 
 
 def _one(n: int) -> str:
+    """Return what one of so many readings is called."""
     return "it" if n == 1 else "one of them"
 
 
@@ -208,7 +209,7 @@ def _describe_widths(checks: Checks) -> list[str]:
 
 
 def _width_sentence(parameter: str, affected: list[tuple[str, WidthSensitivity]], checks: Checks) -> str:
-    """'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with twice its scale and ...'"""
+    """Return such as 'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with ...'."""
     name, width = max(affected, key=lambda entry: entry[1].size)
     others = [other for other, _ in affected if other != name]
     more = f"; less so {listed(others)}" if others else ""
@@ -223,10 +224,12 @@ def _width_sentence(parameter: str, affected: list[tuple[str, WidthSensitivity]]
 
 
 def _quantity_name(quantity: str) -> str:
+    """Return the name of a quantity in words."""
     return _ANSWERS.get(quantity, quantity)
 
 
 def _quantity_and_prior(s: Sensitivity) -> str:
+    """Return the name of a quantity, and of the parameter whose prior matters where that is another."""
     name = _quantity_name(s.quantity)
     return name if s.parameter == s.quantity else f"{name} (that of {s.parameter})"
 

@@ -19,7 +19,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.model import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
-from bowdenfit.questions.bends.bent_cable import BentCable, bending_contact, has_stretch
+from bowdenfit.questions.bends.bent_cable import BentCable, find_bent_contact, has_stretch
 from bowdenfit.questions.predict.measured_range import find_measured_range
 from bowdenfit.results.record import Record
 
@@ -231,7 +231,7 @@ def _choose_points(fit: Record, points: int) -> tuple[TablePoints, bool]:
     if route is not None:
         return TablePoints(route.variable, route.unit, np.linspace(*route.range, points)), False
     try:
-        bending_contact(fit.model)
+        find_bent_contact(fit.model)
     except UsageError:
         return TablePoints("place", "", np.zeros(1)), False
     bends = elastic_answers(fit).measured_bends
@@ -305,7 +305,7 @@ def _tabulate_draws(
 def _compute_exponent_and_preload(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> tuple[Array, Array]:
     """Return exponent [1] and preload [N] of one draw at wrap angles or route positions."""
     if bent:
-        cable = BentCable(model, bending_contact(model), points)
+        cable = BentCable(model, find_bent_contact(model), points)
         return cable.exponent(values), cable.preload(values)[0]
     angles = model.cable.wrap_angles(values, points)
     preload = model.cable.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
@@ -317,7 +317,7 @@ def _compute_stiffness(model: Model, values: Mapping[str, Array], points: Array,
     if not (bent and has_stretch(model)):
         return jnp.zeros(0)
     load = 0.0 if model.cable.is_loop else model.cable.friction.conditions.reference_force
-    return BentCable(model, bending_contact(model), points).stiffness(values, load)
+    return BentCable(model, find_bent_contact(model), points).stiffness(values, load)
 
 
 def _compute_effective_exponents(friction: FrictionModel, values: Mapping[str, Array], own: Array, middle: Array) -> Array:

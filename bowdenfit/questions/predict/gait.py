@@ -16,7 +16,7 @@ from bowdenfit.files.tables import read_table
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.rows import read_angle
-from bowdenfit.questions.bends.bent_cable import bending_contact
+from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.predict.lengths import to_newtons
 from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
 from bowdenfit.results.record import Record
@@ -74,7 +74,7 @@ def make_gait(
     contacts = [c.name for c in fit.dataset.description.contact]
     if contact is not None and contact not in contacts:
         raise UsageError(f"--contact {contact!r}: there is no such contact{suggest_name(contact, contacts)}")
-    number = bending_contact(fit.model) if contact is None else contacts.index(contact)
+    number = find_bent_contact(fit.model) if contact is None else contacts.index(contact)
     if bool(angles) == (file is not None):
         raise UsageError(
             "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "

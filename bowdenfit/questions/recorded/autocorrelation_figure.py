@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Autocorrelation of the residuals"
-MOST_COLUMNS = 4
+MOST_COLUMNS = 4  # panels in a row
 LEAST_BLOCKS, MOST_LAGS = 8, 60  # blocks of a recording with an autocorrelation, and lags that are shown
 NORMAL_95 = 1.96  # standard deviations either way that hold 95 % of a normal distribution
 MOST_STEMS = 60  # lags that have a stem each; with more, a line alone

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Output against input force of the recordings"
-MOST_COLUMNS = 4
+MOST_COLUMNS = 4  # panels in a row
 WITHOUT_INTERVAL = 0.05  # uncertainty that sets the digits of an exponent without interval
 # stroke, name, marker, size [pt] and color
 STROKES = (

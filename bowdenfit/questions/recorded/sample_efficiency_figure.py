@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Efficiency sample by sample"
-MOST_COLUMNS = 4
+MOST_COLUMNS = 4  # panels in a row
 EDGE = 0.12  # of the panel's width, right of the samples
 SHARE = 0.998  # of the samples, within the axis
 

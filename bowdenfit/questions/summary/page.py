@@ -24,7 +24,7 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.results.record import Draws, Record
 from bowdenfit.results.serialization import plain_data, values_by_key
 
-SCHEMA = 1
+SCHEMA = 1  # of summary.json; counts up when its shape or meaning changes
 
 
 class Summary(Display, dict[str, Any]):

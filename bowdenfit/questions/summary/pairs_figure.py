@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
 HEADING = "Corner plot: which parameters are correlated"
-MOST_QUANTITIES = 8
+MOST_QUANTITIES = 8  # a judgement: more panels are too small to read
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}

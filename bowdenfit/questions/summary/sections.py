@@ -46,7 +46,7 @@ def answer_section(fit: Record) -> PageSection:
         "first": first,
         "others": others,
         "warning": distrust_warning(fit_verdict),
-        "why": [each for each in (*reasons_to_trust(fit), interval_width_caveat(fit)) if each]
+        "why": [reason for reason in (*reasons_to_trust(fit), interval_width_caveat(fit)) if reason]
         if fit_verdict.trusted
         else reasons_against(fit_verdict),
         "choices": choices,

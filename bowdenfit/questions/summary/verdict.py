@@ -84,7 +84,7 @@ class Verdict(Display):
         return tuple(sentence for sentences in self.troubles.values() for sentence in sentences)
 
     def _table(self) -> Rows:
-        return [{"trouble": kind, "reason": reason} for kind, said in self.troubles.items() for reason in said], {}
+        return [{"trouble": kind, "reason": reason} for kind, reasons in self.troubles.items() for reason in reasons], {}
 
 
 @cached_per_fit

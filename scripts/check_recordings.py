@@ -62,10 +62,10 @@ def shown(fit: bf.Fit, mountings: int) -> Shown:
     if fit.sampled is not None:
         found = fit.parameter("mu")
         return Shown(found.median, found.q05, found.q95, mountings - 1 or MANY)
-    told = fit.least_squares.estimates["mu"]
-    errors = (told.upper - told.lower) / 2 / told.standard_error
+    estimate = fit.least_squares.estimates["mu"]
+    errors = (estimate.upper - estimate.lower) / 2 / estimate.standard_error
     freedom = brentq(lambda f: stdtrit(f, 0.95) - errors, 0.5, MANY) if errors > stdtrit(MANY, 0.95) else MANY
-    return Shown(told.value, told.lower, told.upper, freedom)
+    return Shown(estimate.value, estimate.lower, estimate.upper, freedom)
 
 
 def ending(bench: RecordedBench, folder: Path, seed: int, sampled: bool) -> tuple[str, float, str]:

@@ -1,7 +1,7 @@
-"""Numbers of the on-body measurements that pages tell in sentences, from fits beside the published one.
+"""Numbers of the on-body measurements that pages quote in sentences, from fits beside the published one.
 
-`scripts/publish.py` writes them to `fits/published/on-body-exoskeleton/told.json`; `tests/support/told.py` says in which
-sentences they stand, and holds the pages to them.
+`scripts/publish.py` writes them to `fits/published/on-body-exoskeleton/quoted.json`; `tests/support/quoted_sentences.py` says
+in which sentences they stand, and holds the pages to them.
 """
 
 import shutil
@@ -28,13 +28,13 @@ def numbers(published: bf.Fit, place: Path) -> dict[str, str]:
         "mistaken": bf.fit(mistaken, **again),
         "mistaken_student": bf.fit(mistaken, noise="student", **again),
     }
-    told = {"least_squares": str(bf.fit(DATA, mcmc=False, **again))}
-    told |= {f"{name}_length": length(fit) for name, fit in fits.items()}
-    told |= {f"{name}_mu3": span(fit, "mu3") for name, fit in {"plain": published, **fits}.items()}
-    told |= {f"{name}_trusted": str(fit.verdict().trusted) for name, fit in fits.items()}
-    told |= {f"without_{name}": share(fits["without"], name) for name in ("mu1", "mu2", "mu3")}
+    quoted = {"least_squares": str(bf.fit(DATA, mcmc=False, **again))}
+    quoted |= {f"{name}_length": length(fit) for name, fit in fits.items()}
+    quoted |= {f"{name}_mu3": span(fit, "mu3") for name, fit in {"plain": published, **fits}.items()}
+    quoted |= {f"{name}_trusted": str(fit.verdict().trusted) for name, fit in fits.items()}
+    quoted |= {f"without_{name}": share(fits["without"], name) for name in ("mu1", "mu2", "mu3")}
     compared = bf.compare({"continuous": published, "published": fits["published"]})
-    return told | {"compared": str(compared).partition("\n\n")[0].replace("\n", " ")} | to_measure(published)
+    return quoted | {"compared": str(compared).partition("\n\n")[0].replace("\n", " ")} | to_measure(published)
 
 
 def changed(folder: Path, file: str) -> Path:

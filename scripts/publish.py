@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import on_body_numbers  # noqa: E402
+import quoted_sentences  # noqa: E402
 import snippets  # noqa: E402
-import told  # noqa: E402
 
 PUBLISHED = ROOT / "fits" / "published"
 FIRST = "on-body-exoskeleton"
@@ -42,9 +42,9 @@ def main() -> None:
             publish(name, fits / name, figure, further)
         if "--pages" not in sys.argv:
             compare(fits)
-            tell(fits, Path(place))
+            write_quoted_numbers(fits, Path(place))
         replace_printed(Path(place))
-        print(*told.missing(), sep="\n")
+        print(*quoted_sentences.missing(), sep="\n")
 
 
 def publish(name: str, fitted: Path, figure: str, further: tuple[str, ...]) -> None:
@@ -79,13 +79,13 @@ def compare(place: Path) -> None:
     (PUBLISHED / name / "comparison.txt").write_text(comparison_text(found), encoding="utf-8")
 
 
-def tell(fits: Path, place: Path) -> None:
-    """Numbers that pages tell in sentences; those that tell others are printed at the end."""
+def write_quoted_numbers(fits: Path, place: Path) -> None:
+    """Write the numbers that pages quote in sentences; those that quote others are printed at the end."""
     import bowdenfit as bf
 
     numbers = on_body_numbers.numbers(bf.load(fits / FIRST), place)
     text = json.dumps(numbers, indent=1, ensure_ascii=False)
-    (PUBLISHED / FIRST / "told.json").write_text(f"{text}\n", encoding="utf-8")
+    (PUBLISHED / FIRST / "quoted.json").write_text(f"{text}\n", encoding="utf-8")
 
 
 def replace_printed(place: Path) -> None:

@@ -275,7 +275,7 @@ def test_a_fit_that_has_not_converged_exits_with_3_and_says_why(run, on_body, tm
     settings = [option for key in few for option in ("--set", f"sampler.{key}")]
     code, out, err = run("fit", on_body, "--output", tmp_path / "fit", "--seed", 1, "--no-figures", *settings)
     assert code == 3
-    assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
+    assert "DO NOT USE THESE NUMBERS: the fit has not converged" in " ".join(out.split())
     assert "should be worth at least 300" in run("summary", tmp_path / "fit", "--full")[1]
     assert (tmp_path / "fit" / "fit.json").exists()
     plot = ("plot", "--figure", "efficiency", "--format", "svg")

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import told
+import quoted_sentences
 
 from bowdenfit.cli import bowdenfit as program
 
@@ -20,8 +20,8 @@ def test_the_readme_shows_what_the_first_fit_prints():
 
 
 def test_what_pages_tell_in_sentences_is_what_fits_say():
-    assert told.missing() == []
-    assert len(list(told.sentences())) > 20
+    assert quoted_sentences.missing() == []
+    assert len(list(quoted_sentences.sentences())) > 20
 
 
 def test_the_readme_is_short_and_its_links_and_those_of_the_guides_lead_somewhere():

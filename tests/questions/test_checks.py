@@ -205,11 +205,11 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
     sensitivity = Sensitivity("mu2", "mu2", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths)
     told = [describe_prior_influence(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
     assert told == [
-        "The prior of tau sets widths, because 4 readings must also determine 3 coefficients: the 90 % interval of mu2 would "
-        "be 1.38 times as wide with twice its scale and 0.71 times as wide with half of it. "
-        "Widths also follow the prior of mu2.",
-        "The prior of mu2 sets widths: the 90 % interval of mu2 would be 1.40 times as wide with twice its scale and 0.70 "
-        "times as wide with half of it. Widths also follow the prior of tau.",
+        "Interval widths depend on the prior of tau, because 4 readings must also determine 3 coefficients: the 90 % interval "
+        "of mu2 would be 1.38 times as wide with twice the scale of that prior and 0.71 times as wide with half of it. "
+        "Interval widths also depend on the prior of mu2.",
+        "Interval widths depend on the prior of mu2: the 90 % interval of mu2 would be 1.40 times as wide with twice the scale "
+        "of that prior and 0.70 times as wide with half of it. Interval widths also depend on the prior of tau.",
     ]
 
 
@@ -217,10 +217,14 @@ def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_
     def said(doubled, told_by):
         widths = (WidthSensitivity("tau", doubled, 0.95, 0.1, 0.1),)
         return describe_assumed_widths(
-            Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by)
+            Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by),
+            {"tau": "scatter between mountings"},
         )
 
-    assert said(1.5, {"tau": (2, 1)}) == "Widths follow the prior of the noise tau; add readings (2 for 1 coefficient)."
+    assert said(1.5, {"tau": (2, 1)}) == (
+        "Interval widths depend on the prior of tau (scatter between mountings), with only 2 readings for 1 coefficient: add "
+        "readings."
+    )
     assert said(1.1, {"tau": (2, 1)}) == said(1.5, {}) == ""
 
 
@@ -291,12 +295,12 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     assert len(describe_checks(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
 
 
-def test_in_doubt_what_the_fit_leans_on_is_to_be_measured_again(fit):
-    leant_on = [reading.label for reading in fit.checks.readings if reading.pareto_k > 0.7]
+def test_in_doubt_influential_readings_are_to_be_repeated(fit):
+    influential = [reading.label for reading in fit.checks.readings if reading.pareto_k > 0.7]
     said = suggest_next_step(fit)
-    shown = [label for label in leant_on if label in said]
-    assert "in doubt, measure again what the fit leans on: " in said and len(shown) == min(2, len(leant_on)) > 0
-    assert (f" and {len(leant_on) - 2} more." in said) == (len(leant_on) > 2)
+    shown = [label for label in influential if label in said]
+    assert "if in doubt, first repeat the most influential reading" in said and len(shown) == min(2, len(influential)) > 0
+    assert (f" and {len(influential) - 2} more." in said) == (len(influential) > 2)
 
 
 def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):

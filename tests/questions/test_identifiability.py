@@ -123,7 +123,7 @@ def test_coefficients_that_cannot_be_told_apart_are_not_trusted(two_turns, tmp_p
     code, out, _ = run("fit", two_turns, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", *SET)
     assert code == 3
     said = " ".join(out.split())
-    assert "DO NOT USE THESE NUMBERS: the measurements do not tell every coefficient" in said
+    assert "DO NOT USE THESE NUMBERS: the measurements do not determine every coefficient" in said
     assert "do not tell mu_a and mu_b apart: what they determine is mu_a + 0.5 mu_b" in said
     page = json.loads((tmp_path / "fit" / "summary.json").read_text())
     assert page["verdict"]["converged"] is True
@@ -157,7 +157,7 @@ def test_a_fit_that_has_not_converged_is_not_trusted(on_body, tmp_path, run):
     settings = ["--set", "sampler.max_steps=200", "--set", "sampler.n_walkers=64"]
     code, out, _ = run("fit", on_body, "-o", tmp_path / "fit", "--seed", 1, "--no-figures", *settings)
     assert code == 3
-    assert "DO NOT USE THESE NUMBERS: the computation has not settled" in " ".join(out.split())
+    assert "DO NOT USE THESE NUMBERS: the fit has not converged" in " ".join(out.split())
     code, _, err = run("length", tmp_path / "fit")
     assert "not converged" in err
 

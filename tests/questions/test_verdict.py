@@ -117,7 +117,7 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     page = summary_text(normal)
     assert faults(page) == [] and "Off: 1 of 26 readings" in page and re.search(r"82(\.0)? deg", page)
     assert student.verdict().trusted
-    assert student.verdict().doubts == ("free_sheath_angle at 480 mm lies far from what the others say",)
+    assert student.verdict().doubts == ("free_sheath_angle at 480 mm lies far from what the other readings predict",)
     assert answer_section(student).context["doubtful"]
     for text in (summary_text(student), repr(student.verdict())):
         assert "against the model, but free_sheath_angle at 480 mm lies far from" in " ".join(text.split())
@@ -136,7 +136,7 @@ def test_readings_that_scatter_far_less_than_was_stated_are_not_said_to_agree(st
     text = " ".join(summary_text(fit).split())
     assert fit.verdict().trusted
     assert ("but the readings of efficiencies scatter less than the fit says" in text) == said
-    assert ("Next: look at what is stated of the noise" in text) == said
+    assert ("Next: look at the noise that is stated" in text) == said
     assert ("the readings agree with the model" in text) != said
 
 

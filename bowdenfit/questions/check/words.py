@@ -1,6 +1,6 @@
 """The checks of a fit in sentences: coverage of the intervals, outliers, influential readings, priors."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from bowdenfit.inference.prior_sensitivity import Sensitivity, WidthSensitivity
@@ -13,9 +13,9 @@ _MAX_NAMED = 3  # readings named in a sentence; the others are counted
 _ONE_IN = (
     "ten"  # of fits with few readings: correlated readings, which predict each other, miss their intervals together
 )
-_HEADING = """Fit checks: every reading against its prediction from all the others
+_HEADING = """Leave-one-out checks: every reading against its prediction from all others
 (z: deviation in standard deviations; k: Pareto k, influential above 0.7)"""
-_ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency there"}
+_ANSWERS = {"optimal_length": "the best length", "optimal_efficiency": "the efficiency at the best length"}
 
 
 def describe_checks(checks: Checks | None) -> str:
@@ -117,8 +117,9 @@ def _describe_influential(checks: Checks) -> str:
     if not influential:
         return ""
     return (
-        f"Influential: {few(map(_name_reading, influential))} (k above 0.7). Without {_one(len(influential))} the answer would "
-        "change markedly, so repeat that measurement first if in doubt."
+        f"{'Influential reading' if len(influential) == 1 else 'Influential readings'}: {few(map(_name_reading, influential))} "
+        f"(k above 0.7). Without {_one(len(influential))} the answer would change markedly, so repeat that measurement "
+        "first if in doubt."
     )
 
 
@@ -151,8 +152,13 @@ def describe_prior_influence(checks: Checks) -> str:
     return " ".join(part for part in sentences if part)
 
 
-def describe_assumed_widths(checks: Checks) -> str:
-    """Say that widths follow the prior of a noise scale which too few readings determine; empty where they do not."""
+def describe_assumed_widths(checks: Checks, meanings: Mapping[str, str]) -> str:
+    """Say that widths depend on the prior of a noise scale which too few readings determine; empty where they do not.
+
+    Args:
+        checks: The checks.
+        meanings: What each parameter is, by name.
+    """
     names = [
         name
         for name in checks.weakly_identified_noise
@@ -161,8 +167,8 @@ def describe_assumed_widths(checks: Checks) -> str:
     if not names:
         return ""
     readings, coefficients = _readings_and_coefficients(checks, names[0])
-    n_readings = readings.partition(" ")[0]
-    return f"Widths follow the prior of the noise {listed(names)}; add readings ({n_readings} for {coefficients})."
+    priors = listed([f"{name} ({meanings[name]})" if name in meanings else name for name in names])
+    return f"Interval widths depend on the prior of {priors}, with only {readings} for {coefficients}: add readings."
 
 
 def _readings_and_coefficients(checks: Checks, noise: str) -> tuple[str, str]:
@@ -179,8 +185,8 @@ def _describe_conflicts(checks: Checks) -> str:
         return ""
     far = max(abs(value) for value in sds.values())
     return (
-        f"Prior and readings contradict each other about {listed(list(sds))}: the estimate lies {far:.1f} standard "
-        f"deviations of the prior from its middle{_with_wider_prior(conflicts)}. Check the prior, its unit first."
+        f"Prior and readings disagree about {listed(list(sds))}: the estimate lies {far:.1f} standard deviations of the "
+        f"prior from its median{_with_wider_prior(conflicts)}. Check the prior, its unit first."
     )
 
 
@@ -199,11 +205,12 @@ def _describe_widths(checks: Checks) -> list[str]:
     )
     sentences = [_width_sentence(name, by_parameter[name], checks) for name in names[:1]]
     if names[1:]:
-        sentences.append(f"Widths also follow the prior{'s' if len(names) > 2 else ''} of {listed(names[1:])}.")
+        sentences.append(f"Interval widths also depend on the prior{'s' if len(names) > 2 else ''} of {listed(names[1:])}.")
     unknown = list(dict.fromkeys(name for s in checks.sensitivities for name in s.undetermined))
     if unknown:
         sentences.append(
-            f"How widths follow the prior of {listed(unknown)} cannot be computed from these draws (k above 0.7)."
+            f"How interval widths depend on the prior of {listed(unknown)} cannot be computed from these draws (Pareto k above "
+            "0.7)."
         )
     return sentences
 
@@ -218,9 +225,9 @@ def _width_sentence(parameter: str, affected: list[tuple[str, WidthSensitivity]]
         if parameter in checks.weakly_identified_noise
         else ""
     )
-    ratios = (("twice its scale", width.doubled), ("half of it", width.halved))
+    ratios = (("twice the scale of that prior", width.doubled), ("half of it", width.halved))
     changes = listed([f"{ratio:.2f} times as wide with {what}" for what, ratio in ratios if isfinite(ratio)])
-    return f"The prior of {parameter} sets widths{why}: the 90 % interval of {name} would be {changes}{more}."
+    return f"Interval widths depend on the prior of {parameter}{why}: the 90 % interval of {name} would be {changes}{more}."
 
 
 def _quantity_name(quantity: str) -> str:

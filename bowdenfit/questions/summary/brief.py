@@ -16,6 +16,7 @@ from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
 from bowdenfit.questions.summary.verdict import (
+    BETWEEN_MOUNTINGS,
     assess_fit,
     collect_checked_readings,
     distrust_warning,
@@ -37,7 +38,6 @@ _MORE = "Everything else: bowdenfit summary --full"
 _KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
 _FEW = 3  # coefficients and contrasts that the answer names
 _COEFFICIENT = "friction coefficient"
-BETWEEN_MOUNTINGS = "scatter between mountings"
 
 
 def summary_text(fit: Record) -> str:
@@ -116,14 +116,14 @@ def _outlier_lines(fit: Record) -> list[str]:
     if not outliers:
         return [filled(say_no_outliers(readings))] if len(readings) > 1 else []
     rows = [format_reading(reading) for reading in outliers[:_MOST_OUTLIERS]]
-    heads = (f"Off: {len(outliers)} of {len(readings)} readings", *READING_HEADS)
+    heads = (f"Outliers: {len(outliers)} of {counted(len(readings), 'reading')}", *READING_HEADS)
     more = len(outliers) - len(rows)
     return [*table(heads, rows).splitlines(), *([f"and {more} more"] if more > 0 else [])]
 
 
 def say_no_outliers(readings: Sequence[CheckedReading]) -> str:
     """Say that every reading agrees with all the others."""
-    return f"None of {len(readings)} readings is off."
+    return f"None of {len(readings)} readings is an outlier." if len(readings) > 1 else "The reading is not an outlier."
 
 
 def format_reading(reading: CheckedReading) -> tuple[str, str, str, str]:
@@ -199,7 +199,7 @@ def _format_posterior(interval: Interval) -> tuple[str, str]:
 def _format_estimate(estimate: Estimate) -> tuple[str, str]:
     """Format an estimate of least squares and its 90 % interval."""
     if not estimate.identified:
-        return "unknown", "not told"
+        return "unknown", "not determined"
     digits = decimals(2 * NORMAL_90 * estimate.standard_error)
     interval = f"{estimate.lower:z.{digits}f} to {estimate.upper:z.{digits}f}"
     return f"{estimate.value:z.{digits}f}", interval if "nan" not in interval and "inf" not in interval else "not known"
@@ -211,7 +211,7 @@ def _coefficient_sentence(fit: Record) -> str:
     coefficients = [q for q in key_quantities(fit) if q.name != RUN_SCATTER]
     shown = [q for q in coefficients if names[q.name].role == "friction"] or coefficients
     if not shown:
-        return "Nothing was to be found: every coefficient is stated."
+        return "Nothing was fitted: every coefficient is stated."
     if len(shown) == 1:
         (only,) = shown
         what = (

@@ -15,10 +15,9 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import choose_evenly, support
 from bowdenfit.plots.style import axis_label
 from bowdenfit.questions.bends.curves import evaluate_curves, quantiles_of_draws
-from bowdenfit.questions.summary.brief import BETWEEN_MOUNTINGS
 from bowdenfit.questions.summary.forces_figure import ONE_BEND, STROKES, ForcesAtBend, ForcesData
 from bowdenfit.questions.summary.pairs_figure import SampledQuantity
-from bowdenfit.questions.summary.verdict import assess_fit
+from bowdenfit.questions.summary.verdict import BETWEEN_MOUNTINGS, assess_fit
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 
 MOST_PLACES, MOST_READINGS = 6, 1000  # bends in color, and readings, that a figure shows

@@ -28,6 +28,7 @@ from bowdenfit.questions.summary.verdict import (
     suggest_next_step,
 )
 from bowdenfit.results.record import Record
+from bowdenfit.words import counted
 
 _HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
 _MOST_READINGS = 400  # readings in a table that someone may look through
@@ -78,12 +79,13 @@ def checks_section(fit: Record) -> PageSection | None:
     if not readings:
         return None
     heads = ("reading", *READING_HEADS)
-    outlier_table = PageTable(heads, tuple(map(format_reading, outliers)), f"Off: {len(outliers)} of {len(readings)} readings")
+    caption = f"Outliers: {len(outliers)} of {counted(len(readings), 'reading')}"
+    outlier_table = PageTable(heads, tuple(map(format_reading, outliers)), caption)
     all_readings = PageTable(heads, tuple(map(format_reading, readings[:_MOST_READINGS])))
     heading = "All readings" if len(readings) <= _MOST_READINGS else f"The first {_MOST_READINGS} of {len(readings)} readings"
     folded: list[tuple[str, str | PageTable]] = [
-        (f"{heading} beside what all the others say of each", all_readings),
-        ("What the checks say, with their numbers", describe_checks(check_readings(fit))),
+        (f"{heading} beside the prediction from all the others (leave-one-out)", all_readings),
+        ("The leave-one-out checks, with their numbers", describe_checks(check_readings(fit))),
     ]
     return prose_section("Checks", [say_no_outliers(readings) if not outliers else ""], [outlier_table], folded=folded)
 

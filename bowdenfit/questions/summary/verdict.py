@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
@@ -30,31 +31,33 @@ COPIED, COARSE = "made of copied readings", "finer than its readings"
 
 
 _PROBLEMS = {
-    NOT_CONVERGED: "the computation has not settled",
+    NOT_CONVERGED: "the fit has not converged",
     CONTRADICTORY: "the measurements contradict each other",
-    IMPOSSIBLE: "some of the readings cannot be",
+    IMPOSSIBLE: "some of the readings are physically impossible",
     COPIED: "some of the readings are copies of others",
     COARSE: "the readings are too coarse for such intervals",
     NOT_DESCRIBED: "the model does not describe these readings",
-    NOT_IDENTIFIABLE: "the measurements do not tell every coefficient",
+    NOT_IDENTIFIABLE: "the measurements do not determine every coefficient",
 }
-_TRUSTED = "You can trust this: the computation has settled, and the readings agree with the model and with each other."
+_TRUSTED = "You can trust this: the fit has converged, and the readings agree with the model and with each other."
+_TRUSTED_ALONE = "You can trust this: the fit has converged, and the reading agrees with the model."
 _IN_DOUBT = (
-    "The computation has settled, and nothing speaks clearly against the model, but {}, by more than chance does in one fit of "
-    "a hundred. You can trust this once you know why."
+    "The fit has converged, and nothing speaks clearly against the model, but {}, by more than happens by chance in one fit "
+    "of a hundred. You can trust this once you know why."
 )
 _LEAST_SQUARES_ONLY = (
-    "Nothing speaks against these numbers, but they are least squares alone{}. A mistake in a single reading, such as "
+    "Nothing speaks against these numbers, but they come from least squares alone{}. A mistake in a single reading, such as "
     "two of them exchanged, may go unseen; fit again without --no-mcmc for the full answer."
 )
 _NOT_YET_CONVERGED = (
-    "The numbers still move, and may be far off. Let it go on with the same command and --resume; if that does not end it, "
-    "state what you know of the coefficients in cable.toml."
+    "The numbers still change as sampling goes on, and may be far off. Continue with the same command and --resume; if that "
+    "does not help, state what you know about the coefficients in cable.toml."
 )
 _NO_MINIMUM = (
-    "Least squares have found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
-    "sampling needs none."
+    "Least squares found no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc: "
+    "sampling needs no minimum."
 )
+BETWEEN_MOUNTINGS = "scatter between mountings"  # what tau is, in the words of a page
 _COMPARABLE = 0.8  # share of the largest conflict beyond which either table may be wrong; a judgement
 
 
@@ -109,7 +112,8 @@ def _describe_doubts(fit: Record) -> tuple[str, ...]:
     if checks is None:
         return ()
     outliers = [describe_reading(reading.table, reading.label) for reading in checks.outliers]
-    sentences = [f"{few(outliers)} {'lies' if len(outliers) == 1 else 'lie'} far from what the others say"] if outliers else []
+    lie = "lies" if len(outliers) == 1 else "lie"
+    sentences = [f"{few(outliers)} {lie} far from what the other readings predict"] if outliers else []
     return (*sentences, *describe_misfits(checks))
 
 
@@ -159,7 +163,9 @@ def reasons_to_trust(fit: Record) -> list[str]:
     if fit.sampled is None:
         best = ", without a best length" if fit.dataset.description.route is not None else ""
         return [_LEAST_SQUARES_ONLY.format(best)]
-    return [_trusted_sentence(assess_fit(fit))] + [
+    checks, fit_verdict = check_readings(fit), assess_fit(fit)
+    is_alone = checks is not None and len(checks.readings) == 1 and not fit_verdict.doubts
+    return [_TRUSTED_ALONE if is_alone else _trusted_sentence(fit_verdict)] + [
         sentence
         for sentence in (_prior_driven_sentence(fit), _correlation_sentence(fit), _prior_conflict_sentence(fit))
         if sentence
@@ -177,16 +183,17 @@ def suggest_next_step(fit: Record) -> str:
     if checks is None:
         return ""
     if outliers:
-        return f"Next: look at how {_name_reading(outliers[0])} was measured and written down: it is far off (see below)."
+        return f"Next: look at how {_name_reading(outliers[0])} was measured and written down: it is an outlier (see below)."
     if describe_misfits(checks):
-        return "Next: look at what is stated of the noise of these readings; checks.png shows where each of them lies."
+        return "Next: look at the noise that is stated for these readings; checks.png shows where each of them lies."
     influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
-    remeasure = f"; in doubt, measure again what the fit leans on: {influential}" if influential else ""
+    what = "reading" if len(checks.influential) == 1 else "readings"
+    remeasure = f"; if in doubt, first repeat the most influential {what}: {influential}" if influential else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
-        return f"Next: nothing needs to be measured{remeasure}. bowdenfit next says what would narrow it."
+        return f"Next: nothing needs to be measured{remeasure}. bowdenfit next ranks further measurements."
     if not has_candidates(fit):
-        return f"Next: any measurement of another kind or at other bends would tell more{remeasure}."
-    return f"Next: bowdenfit next says which measurement would tell most{remeasure}."
+        return f"Next: a measurement of another kind, or at other bends, would add more{remeasure}."
+    return f"Next: bowdenfit next says which measurement would help most{remeasure}."
 
 
 def _name_reading(reading: CheckedReading) -> str:
@@ -197,14 +204,15 @@ def _name_reading(reading: CheckedReading) -> str:
 def interval_width_caveat(fit: Record) -> str:
     """Say that few readings leave it to a prior how wide intervals are; empty where they do not."""
     checks = check_readings(fit)
-    return describe_assumed_widths(checks) if checks else ""
+    meanings = {p.name: BETWEEN_MOUNTINGS if p.name == RUN_SCATTER else p.meaning for p in fit.model.space.free}
+    return describe_assumed_widths(checks, meanings) if checks else ""
 
 
 def _prior_driven_sentence(fit: Record) -> str:
     """Name the coefficients of friction that no measurement determines."""
     friction = assess_identifiability(fit).groups.get("friction")
     names = friction.resting if friction is not None else []
-    return f"Hardly measured, mostly as assumed beforehand: {listed(names)}." if names else ""
+    return f"Determined mostly by the prior (what was assumed beforehand): {listed(names)}." if names else ""
 
 
 def _correlation_sentence(fit: Record) -> str:
@@ -213,7 +221,7 @@ def _correlation_sentence(fit: Record) -> str:
     if not pairs:
         return ""
     pair = pairs[0]
-    return f"{pair.first} and {pair.second} are hardly told apart; {pair.combination} is known much better than each."
+    return f"{pair.first} and {pair.second} are strongly correlated; {pair.combination} is known much better than either."
 
 
 def _prior_conflict_sentence(fit: Record) -> str:
@@ -221,7 +229,8 @@ def _prior_conflict_sentence(fit: Record) -> str:
     checks = check_readings(fit)
     pulled = [s.parameter for s in checks.conflicts] if checks else []
     names = dict.fromkeys(pulled + [f.parameter for f in checks.prior_conflicts] if checks else [])
-    return f"The readings contradict what was assumed of {listed(list(names))} beforehand; check its unit." if names else ""
+    contradicted = f"The readings contradict the prior of {listed(list(names))} (what was assumed beforehand); check its unit."
+    return contradicted if names else ""
 
 
 def agreement_page(fit: Record) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ PLACES = {"mu1": "free sheath", "mu2": "squeezed sheath", "mu3": "bracket edge"}
 
 def sentences() -> Iterator[tuple[Path, str]]:
     """Each page with a sentence that must stand in it."""
-    told = json.loads((PUBLISHED / "told.json").read_text(encoding="utf-8"))
+    quoted = json.loads((PUBLISHED / "quoted.json").read_text(encoding="utf-8"))
     summary = json.loads((PUBLISHED / "summary.json").read_text(encoding="utf-8"))
     details = one_line((PUBLISHED / "details.txt").read_text(encoding="utf-8"))
     found, best = summary["parameters"], summary["optimal"]["length"]
@@ -23,21 +23,21 @@ def sentences() -> Iterator[tuple[Path, str]]:
     low, middle, high = (f"{best[key]:.0f}" for key in ("q05", "median", "q95"))
     yield STORY, f"The best length is {middle} mm (90 % interval {low} to {high} mm)"
     yield STORY, f"one curve gives {low} to {high} mm"
-    yield STORY, f"the best length over {interval(told['published_length'])} (90 % interval)"
-    yield STORY, f"The best length would stay: {told['without_length'].partition(';')[0]})"
-    yield STORY, f"the answer is the same: {told['student_length'].partition(';')[0]})"
-    for start in ("These measurements determine", "efficiency at 550 mm: measured", "The prior of tau sets widths"):
+    yield STORY, f"the best length over {interval(quoted['published_length'])} (90 % interval)"
+    yield STORY, f"The best length would stay: {quoted['without_length'].partition(';')[0]})"
+    yield STORY, f"the answer is the same: {quoted['student_length'].partition(';')[0]})"
+    for start in ("These measurements determine", "efficiency at 550 mm: measured", "Interval widths depend on the prior"):
         yield STORY, sentence(details, start)
     for name in ("mu1", "mu3"):
-        yield STORY, f"{name} {'would be known ' if name == 'mu1' else ''}to {told[f'without_{name}']}"
+        yield STORY, f"{name} {'would be known ' if name == 'mu1' else ''}to {quoted[f'without_{name}']}"
     yield STORY, f"Least squares alone would have claimed {' and '.join(least_squares(details))}"
-    yield STORY, f"profile interval for mu1, which takes that into account, is {profile(told['least_squares'], 'mu1')}"
-    yield STORY, told["compared"].partition(" Prefer")[0]
+    yield STORY, f"profile interval for mu1, which takes that into account, is {profile(quoted['least_squares'], 'mu1')}"
+    yield STORY, quoted["compared"].partition(" Prefer")[0]
     for target in ("length", "mu3"):
-        yield STORY, sentence(one_line(told[f"next_{target}"]), "Measure the efficiency", "now to ± ")
-    yield TRUST, f"{dashed(told['plain_mu3'])} to {dashed(told['mistaken_mu3'])} and ends with exit code 3"
-    yield TRUST, f"with Student noise it is {dashed(told['mistaken_student_mu3'])}"
-    yield TRUST, re.findall(r"known to (± [\d.]+ mm, now to ± [\d.]+ mm)", one_line(told["next_length"]))[0]
+        yield STORY, sentence(one_line(quoted[f"next_{target}"]), "Measure the efficiency", "now to ± ")
+    yield TRUST, f"{dashed(quoted['plain_mu3'])} to {dashed(quoted['mistaken_mu3'])} and ends with exit code 3"
+    yield TRUST, f"with Student noise it is {dashed(quoted['mistaken_student_mu3'])}"
+    yield TRUST, re.findall(r"known to (± [\d.]+ mm, now to ± [\d.]+ mm)", one_line(quoted["next_length"]))[0]
 
 
 def missing() -> list[str]:

@@ -105,6 +105,7 @@ class Picture:
         title: Its heading, which stands for it where it is not seen.
         caption: What it shows, in plain words.
         charts: The same to zoom into, one after the other; none where that does not pay.
+        chart_caption: What the charts show, which have no panels.
         folded: Whether only those who ask for it see it.
     """
 
@@ -112,6 +113,7 @@ class Picture:
     title: str
     caption: str
     charts: tuple[Chart, ...] = ()
+    chart_caption: str = ""
     folded: bool = False
 
 

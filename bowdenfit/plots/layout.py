@@ -242,19 +242,43 @@ LETTER = 0.053  # in, width of a character of a number
 LEAST_SPACE = 1.1 * LETTER / NUMBER_SPACE  # of that from one number to the next, where there would be one number else
 
 
-def number_below(axes: Axes, whole: bool = False) -> None:
+def ticks_below(limits: tuple[float, float], width: float, whole: bool = False) -> tuple[np.ndarray, list[str]]:
+    """Return the tick values of a lower axis, and their texts.
+
+    Args:
+        limits: Of the axis.
+        width: Of the panel [in].
+        whole: Whether only whole numbers make sense.
+    """
+    return ticks(limits, lambda texts: width / NUMBER_SPACE / max(map(len, texts)), whole, TICK / width)
+
+
+def ticks_left(limits: tuple[float, float], height: float) -> tuple[np.ndarray, list[str]]:
+    """Return the tick values of a left axis, and their texts.
+
+    Args:
+        limits: Of the axis.
+        height: Of the panel [in].
+    """
+    return ticks(limits, lambda _: height / NUMBER_ROW)
+
+
+def number_below(axes: Axes, whole: bool = False, upright: bool = False) -> None:
     """Put tick numbers on the lower axis of a panel.
 
     Args:
         axes: The panel, with its limits and in its place.
         whole: Whether only whole numbers make sense.
+        upright: Whether numbers stand upright, where two of them are too wide for the panel.
     """
     width = _size(axes)[0]
     low, high = axes.get_xlim()
-    most = width / NUMBER_SPACE
-    values, texts = ticks((low, high), lambda texts: most / max(map(len, texts)), whole, TICK / width)
+    values, texts = ticks_left((low, high), width) if upright else ticks_below((low, high), width, whole)
     axes.set_xticks(values, texts)
-    axes.tick_params(axis="x", length=72 * TICK, pad=72 * 0.8 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
+    turn = 90 if upright else 0
+    axes.tick_params(axis="x", length=72 * TICK, pad=72 * 0.8 * TICK, width=0.6, labelsize=LEAST, labelrotation=turn)
+    if upright:
+        return
     for label, value in zip(axes.get_xticklabels(), values, strict=True):  # at the ends they are moved inwards
         half, position = LETTER * len(label.get_text()) / 2, width * (value - low) / (high - low)
         inwards = float(np.clip(position, half - TICK, max(width - half + TICK, half - TICK))) - position
@@ -264,7 +288,7 @@ def number_below(axes: Axes, whole: bool = False) -> None:
 def number_left(axes: Axes) -> None:
     """Put tick numbers on the left axis of a panel that has its limits and position."""
     height = _size(axes)[1]
-    axes.set_yticks(*ticks(axes.get_ylim(), lambda _: height / NUMBER_ROW))
+    axes.set_yticks(*ticks_left(axes.get_ylim(), height))
     axes.tick_params(axis="y", length=72 * TICK, pad=72 * 0.6 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
 
 
@@ -321,6 +345,6 @@ def ticks(
 
 def _texts(values: np.ndarray, step: float) -> list[str]:
     """Return numbers as text with the decimals of their step."""
-    decimals = next((d for d in range(5) if abs(round(step, d) - step) < 1e-6 * step), None)
+    decimals = next((d for d in range(7) if abs(round(step, d) - step) < 1e-6 * step), None)
     shown = [f"{v + 0.0:.3g}" if decimals is None or step >= 1e5 else f"{v + 0.0:.{decimals}f}" for v in values]
     return [text.replace("-", "\N{MINUS SIGN}") for text in shown]

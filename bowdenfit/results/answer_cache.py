@@ -17,7 +17,7 @@ from bowdenfit.inputs import refuse_special
 from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIGURES, FIT, POSTERIOR, read_page, read_text, write_text
 from bowdenfit.words import filled, printable
 
-SCHEMA = 6  # counted up with every change of what one of the questions answers, and of how figures look
+SCHEMA = 7  # counted up with every change of what one of the questions answers, and of how figures look
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once
 CAPTIONS = "captions.txt"

@@ -10,6 +10,7 @@ import jax
 import numpy as np
 
 from bowdenfit.dataset import Dataset
+from bowdenfit.description.defaults import THIN
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.compilation import compile_program
@@ -76,6 +77,11 @@ class Draws(Display):
     def n_effective(self) -> float:
         """Smallest effective sample size (bulk) of all quantities."""
         return min((d.ess_bulk for d in self.diagnostics.values()), default=float(self.z[..., 0].size))
+
+    @property
+    def stored_steps(self) -> tuple[int, int]:
+        """First and last step whose draws are stored, the others evenly between: of walkers the second half of the path."""
+        return (self.steps // 2 + THIN if self.sampler == "emcee" else 1), self.steps
 
     @property
     def flat_z(self) -> np.ndarray:

@@ -107,7 +107,7 @@ def paper_data(length_draws=None):
         "efficiency": EfficiencyAlongRoute(LABEL, RANGE, band, (points,), optimum(lengths), lengths),
         "coefficients": friction,
         "pairs": Pairs([positive(c) for c in (*friction, *noise)] + answer, "cable length"),
-        "traces": Traces([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES),
+        "traces": Traces([positive(c) for c in (*friction, *noise, shape)] + answer[:1], ENSEMBLES, 310, 600),
         "residuals": Residuals((points,)),
     }
 
@@ -115,7 +115,7 @@ def paper_data(length_draws=None):
 def without_route(data):
     (points,), first = data["residuals"].points, data["coefficients"][:1]
     points = dataclasses.replace(points, route=np.full(4, np.nan), inside=np.ones(4, dtype=bool))
-    paths = Traces([positive(first[0])], ENSEMBLES)
+    paths = Traces([positive(first[0])], ENSEMBLES, 310, 600)
     return {"coefficients": first, "traces": paths, "residuals": Residuals((points,))}
 
 
@@ -271,8 +271,8 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
         ("efficiency", {"Cable length (mm)", "Efficiency (%)", "Density (1/mm)", "Probability (%)"}),
         ("coefficients", {r"$\mu_1$", r"$\mu_2$", r"$\mu_3$", "Density"}),
         ("pairs", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Efficiency at\noptimum (%)"}),
-        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Stored sample"}),
-        ("residuals", {"Efficiency (%)", "Measured less predicted median\n(percentage points)"}),
+        ("traces", {r"$\mu_1$", r"$\sigma_\theta$ (deg)", "Optimum (mm)", "Step of the sampler"}),
+        ("residuals", {"Efficiency (%)", "Measured minus predicted median\n(percentage points)"}),
     ],
 )
 def test_names_and_units_are_the_same_everywhere(name, labels):
@@ -435,7 +435,7 @@ def test_traces_tell_a_stray_ensemble():
     stray = first.draws.copy()
     stray[: WALKERS // ENSEMBLES] += 0.05
     moved = dataclasses.replace(first, draws=stray)
-    figure = drawn("traces", {"traces": Traces([moved], ENSEMBLES)})
+    figure = drawn("traces", {"traces": Traces([moved], ENSEMBLES, 310, 600)})
     medians = [line.get_ydata().mean() for line in figure.axes[0].lines if line.get_linewidth() == 1.0]
     assert len(medians) == ENSEMBLES
     assert medians[0] > max(medians[1:]) + 0.04

@@ -71,14 +71,18 @@ class CheckedTable:
 
 
 def data(fit: Record) -> tuple[CheckedTable, ...] | None:
-    """Return the readings of every table; None without draws, or of a single reading, whose scatter shows nothing."""
+    """Return the readings of every table that has several; None without draws, and without such a table."""
     checks = room.check_readings(fit)
-    return checked_tables(checks) if checks is not None and len(checks.readings) > 1 else None
+    return (checked_tables(checks) or None) if checks is not None else None
 
 
 def checked_tables(checks: Checks) -> tuple[CheckedTable, ...]:
-    """Return the readings of each table as they are shown."""
-    return tuple(_show_table(t, [r.outlier for r in checks.readings if r.table == t.table]) for t in checks.tables)
+    """Return the readings of each table as they are shown, without tables of a single reading, whose scatter shows nothing."""
+    return tuple(
+        _show_table(table, [r.outlier for r in checks.readings if r.table == table.table])
+        for table in checks.tables
+        if len(table.labels) > 1
+    )
 
 
 def _show_table(table: TableChecks, outlier: list[bool]) -> CheckedTable:
@@ -108,16 +112,17 @@ def caption(tables: tuple[CheckedTable, ...]) -> str:
     n = sum(len(table.labels) for table in tables)
     probabilities = [table.probability for table in tables if len(table.at)]
     distribution = (
-        "First panel of a row: empirical distribution (ECDF) of where the readings lie in their predictions, minus the uniform "
-        "one that is expected; if the model is right, the whole line stays in the band with at least "
+        "First panel of a row: empirical distribution (ECDF) of the predicted probabilities of the readings (probability "
+        "integral transform), minus the uniform one that is expected; if the model is right, the whole line stays in the band "
+        "with at least "
         f"{percent(min(probabilities))} probability. Other panels: "
         if probabilities
         else "Each panel: "
     )
     return (
-        f"Leave-one-out check: whether the readings scatter as predicted, {_rows_in_words(len(tables))}. {distribution}"
-        "deviation of each reading from its prediction by all the others, in standard deviations, against where it was taken; "
-        f"there should be no trend. n = {counted(n, 'reading')}."
+        f"Whether the readings scatter as predicted, {_rows_in_words(len(tables))}. {distribution}deviation of each reading "
+        "from its prediction by all the others, in standard deviations, against where it was taken; there should be no trend, "
+        f"and about one reading in twenty lies beyond two. n = {counted(n, 'reading')}."
     )
 
 

@@ -110,22 +110,53 @@ def data(fit: Record) -> EfficiencyAlongRoute | None:
 
 def caption(data: EfficiencyAlongRoute) -> str:
     """Describe what is drawn, in plain words."""
-    n, has_draws = sum(len(points.labels) for points in data.points), not data.efficiency.is_line
-    best = data.optimum
+    n, best = sum(len(points.labels) for points in data.points), data.optimum
+    return " ".join(filter(None, (
+        _describe_curve(data),
+        _describe_circles(n),
+        describe_strip("in percent of the input force") if n else "",
+        "Panels below: probability density of the best length"
+        + (", and probability of each length on offer to be the best." if best.choices else ".") if best else "",
+        _describe_window(data),
+    )))  # fmt: skip
+
+
+def describe_efficiency_chart(data: EfficiencyAlongRoute) -> str:
+    """Describe the chart of the report, which has no panels."""
+    n, best = sum(len(points.labels) for points in data.points), data.optimum
+    line = f"Orange line: best {best.what}." if best else ""
+    return " ".join(filter(None, (_describe_curve(data), _describe_circles(n), line, _describe_window(data))))
+
+
+def _describe_curve(data: EfficiencyAlongRoute) -> str:
+    """Return the sentences that explain the curve and its bands."""
+    has_draws = not data.efficiency.is_line
     return " ".join(filter(None, (
         "Efficiency of the cable, output over input force, against the length.",
         "Line: median; bands: the intervals that hold the efficiency of the cable with 50 % and 90 % probability."
         if has_draws else "Line: least squares.",
         "Dotted: nine of ten runs lie between these lines, because no two mountings are alike."
         if data.new_run is not None else "",
-        describe_strip("in percent of the input force") if n else "",
-        f"Dots: measured, n = {n}." if n else "No efficiency was measured along the route.",
         f"The curve holds at {data.at_input_force:g} N input force." if data.at_input_force is not None else "",
-        "Below: where the best length lies"
-        + (", and with which probability each length on offer is the best." if best.choices else ".") if best else "",
-        f"Green: lengths that are within {percent(best.window.within)} of the best with {percent(best.window.probability)} "
-        "probability." if best and np.isfinite(best.window.start) else "",
     )))  # fmt: skip
+
+
+def _describe_circles(n: int) -> str:
+    """Return the sentence that explains the measured points, of which there are `n`."""
+    if not n:
+        return "No efficiency was measured along the route."
+    return f"Circles: measured, n = {n}; open ones lie outside the range of the curves."
+
+
+def _describe_window(data: EfficiencyAlongRoute) -> str:
+    """Return the sentence that explains the lengths that are good enough; empty without such."""
+    best = data.optimum
+    if best is None or not np.isfinite(best.window.start):
+        return ""
+    window = best.window
+    return (
+        f"Green: lengths that are within {percent(window.within)} of the best with {percent(window.probability)} probability."
+    )
 
 
 @in_paper_style

@@ -108,14 +108,14 @@ def _show_over_time(trace: RecordingTrace) -> OverTime:
 def caption(recordings: tuple[OverTime, ...]) -> str:
     """Describe what is drawn, in plain words."""
     band = (
-        "the band holds it with 90 % probability, a new mounting included"
+        "90 % predictive interval, for a new mounting"
         if len(recordings[0].predicted) > 1
-        else ("the dashed line is the least-squares prediction")
+        else "the dashed line is the least-squares prediction"
     )
     return (
-        f"Both forces over time of {counted(len(recordings), 'recording')}, (of many, some evenly chosen): black the "
-        f"measured output, gray the measured input, blue what the cable would give out at this input ({band}), orange the "
-        "fit with this recording's own mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
+        f"Both forces over time of {counted(len(recordings), 'recording')} (of many, some evenly chosen are drawn). Black: the "
+        f"measured output; gray: the measured input; blue: the output predicted for this input ({band}); orange: the fit with "
+        "this recording's own mounting. Shading: what the rope does. Marks: samples that were left out, by reason. "
         f"n = {sum(len(r.time) for r in recordings)} blocks of samples."
     )
 
@@ -246,6 +246,16 @@ def _mark_left_out(axes: Axes, recording: OverTime) -> None:
         draw_marks(
             axes, recording.time[at] - start, on_edge, FLAGS["saturated"], "Block at the end of a range", "white"
         )
+
+
+def describe_recordings_charts(recordings: tuple[OverTime, ...]) -> str:
+    """Describe the charts of the report, one recording at a time."""
+    band = "band: 90 % predictive interval, for a new mounting" if len(recordings[0].predicted) > 1 else "least squares"
+    return (
+        f"Both forces over time, one of {counted(min(len(recordings), MOST_CHARTS), 'recording')} at a time. Black: the "
+        f"measured output; gray, dashed: the measured input; blue: the output predicted for this input ({band}); orange: "
+        "the fit with this recording's own mounting. Shading: what the rope does. Open circles: samples that were left out."
+    )
 
 
 def make_recordings_charts(recordings: tuple[OverTime, ...]) -> tuple[Chart, ...]:

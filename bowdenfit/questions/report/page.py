@@ -17,12 +17,12 @@ from bowdenfit.questions.figures import (
     warning_mark,
     write_figure_files,
 )
-from bowdenfit.questions.length.efficiency_figure import make_efficiency_chart
+from bowdenfit.questions.length.efficiency_figure import describe_efficiency_chart, make_efficiency_chart
 from bowdenfit.questions.loss import loss_section
 from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import ranking_section
-from bowdenfit.questions.recorded.recordings_figure import make_recordings_charts
+from bowdenfit.questions.recorded.recordings_figure import describe_recordings_charts, make_recordings_charts
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.sections import (
     answer_section,
@@ -42,9 +42,9 @@ ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_se
 BELOW_FIGURES = (methods_section, provenance_section)
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
-CHARTS: dict[str, Callable[[Any], tuple[Chart, ...]]] = {
-    "efficiency": make_efficiency_chart,
-    "recordings": make_recordings_charts,
+CHARTS: dict[str, tuple[Callable[[Any], tuple[Chart, ...]], Callable[[Any], str]]] = {  # charts of a figure, and their caption
+    "efficiency": (make_efficiency_chart, describe_efficiency_chart),
+    "recordings": (make_recordings_charts, describe_recordings_charts),
 }
 
 
@@ -60,8 +60,11 @@ def figures_section(figures: dict[str, Any]) -> PageSection | None:
 
 
 def _figure_picture(name: str, data: Any) -> Picture:
-    charts = CHARTS[name](data) if name in CHARTS else ()
-    return Picture(name, FIGURES[name].HEADING, figure_caption(name, data), charts, name in FOLDED)
+    heading, caption, folded = FIGURES[name].HEADING, figure_caption(name, data), name in FOLDED
+    if name not in CHARTS:
+        return Picture(name, heading, caption, folded=folded)
+    make_charts, describe_charts = CHARTS[name]
+    return Picture(name, heading, caption, make_charts(data), describe_charts(data), folded)
 
 
 def report_page(fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None) -> HtmlPage:

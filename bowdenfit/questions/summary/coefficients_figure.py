@@ -90,7 +90,7 @@ def caption(parameters: tuple[Coefficient, ...]) -> str:
         "measurements and priors considered; dashed: by the prior alone; square with bar: the least-squares estimate with its "
         "standard error. Above each panel stand the median and the interval that holds the value with 90 % probability. "
         f"{explain_symbols((p.symbol, p.meaning) for p in parameters)}"
-        f"n = {parameters[0].draws.size} sampled values."
+        f"n = {parameters[0].draws.size} draws from the posterior."
     )
 
 

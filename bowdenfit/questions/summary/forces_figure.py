@@ -131,9 +131,9 @@ def caption(forces: ForcesData) -> str:
     edge = f"On its edge: {counted(beyond, 'reading')} beyond it. " if beyond else ""
     return (
         f"Output against {'the wrap angle, all about one input force' if forces.by_bend else 'input force'}, a color for each "
-        f"bend; {band}. Below: how far each reading is off its line, in percent, "
-        "with the band in which nine of ten single readings should lie. Beside: the friction coefficient that each reading by "
-        f"itself would have by the capstan equation; where that equation holds it is the same at all loads. {edge}"
+        f"bend; {band}. Strip below: residuals, each reading relative to its line, in percent, with the band in which nine of "
+        "ten single readings should lie. Last panel: the apparent friction coefficient, that of each reading by itself by the "
+        f"capstan equation; where that equation holds, it is the same at all loads. {edge}"
         f"n = {counted(n, 'reading')}."
     )
 

@@ -18,9 +18,12 @@ from bowdenfit.plots.layout import (
     number_below,
     number_left,
     place_labels,
+    text_width,
+    ticks_below,
+    ticks_left,
     wrap_words,
 )
-from bowdenfit.plots.style import BLUE, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.style import BLUE, LEAST, SMALL, WIDE, in_paper_style
 from bowdenfit.questions import summary
 
 if TYPE_CHECKING:
@@ -32,7 +35,9 @@ MOST_QUANTITIES = 8  # a judgement: more panels are too small to read
 SHARE = 0.996  # of the draws, within the axes
 ROLES = ("friction", "elastic", "friction_model", "angle", "sensor", "noise")
 FILLS = {0.68: "#5E9FCB", 0.95: "#C3DCEE"}
-LEFT, BOTTOM, GAP = 0.62, 0.62, 0.09  # in, margins, and between panels
+LEFT, BOTTOM, GAP = 0.62, 0.62, 0.09  # in, margins at least, and between panels
+NAMES = 0.38  # in, of the left margin, for names in two lines and the marks of the axis
+UPRIGHT = 0.07  # in, height of a number that does not stand upright
 LARGEST, SMALLEST = 1.45, 0.66  # in, of a panel with its gap
 MARK = 0.26  # in, of a color in the key, with the gap to its words
 BINS = 32  # of each axis, in two dimensions
@@ -90,12 +95,12 @@ def data(fit: Record) -> Pairs | None:
 def caption(data: Pairs) -> str:
     """Describe what is drawn, in plain words."""
     return (
-        "Corner plot: every two parameters against each other, and the distribution of each on the diagonal. Dark and light: "
-        "the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two parameters "
-        "are correlated: the measurements determine a combination of them better than either. Dashed: median and 90 % "
-        "interval. "
+        "Every two parameters of the posterior against each other, and the distribution of each on the diagonal. Dark and "
+        "light blue: the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two "
+        "parameters are correlated: the measurements determine a combination of them better than either. Dashed: median and "
+        "90 % interval. "
         f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
-        f"n = {data.quantities[0].draws.size} sampled values."
+        f"n = {data.quantities[0].draws.size} draws from the posterior."
     )
 
 
@@ -105,13 +110,16 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
     page = width or WIDE
     quantities = _select_quantities(data, int((page - LEFT - GAP) / SMALLEST))
     n = len(quantities)
-    size = (page - LEFT - GAP) / n
+    left = _left_margin(quantities, (page - LEFT - GAP) / n - GAP)
+    size = (page - left - GAP) / n
     size = size if width else min(LARGEST, size)
-    figure = empty_page(LEFT + GAP + size * n, BOTTOM + GAP + size * n)
+    upright = _height_of_upright_numbers(quantities, size - GAP)
+    bottom = BOTTOM + max(0.0, upright - UPRIGHT)
+    figure = empty_page(left + GAP + size * n, bottom + GAP + size * n)
     panels = {}
     for row, column in np.argwhere(np.tri(n)).tolist():
         axes = panels[row, column] = axes_at(
-            figure, LEFT + size * column, BOTTOM + size * (n - 1 - row), size - GAP, size - GAP
+            figure, left + size * column, bottom + size * (n - 1 - row), size - GAP, size - GAP
         )
         axes.set_xlim(quantities[column].limits(SHARE))
         axes.grid(visible=False)
@@ -123,9 +131,23 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
             axes.set_ylim(quantities[row].limits(SHARE))
             _draw_credible_regions(axes, quantities[column], quantities[row])
     for i, quantity in enumerate(quantities):
-        _label_axes(figure, panels[n - 1, i], panels[i, 0] if i else None, quantity.label, size)
-    _draw_legend(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - LEFT - size - GAP - MARK - EDGE)
+        label = wrap_words(quantity.label, size - 0.2 * GAP, most=2)
+        _label_axes(figure, panels[n - 1, i], panels[i, 0] if i else None, label, left - 0.16, upright)
+    _draw_legend(panels[0, 0], _remarks(data, n), figure.get_size_inches()[0] - left - size - GAP - MARK - EDGE)
     return figure
+
+
+def _left_margin(quantities: list[SampledQuantity], height: float) -> float:
+    """Return the left margin in which names stand beside the widest number of panels of some height [in]."""
+    texts = [text for q in quantities[1:] for text in ticks_left(q.limits(SHARE), height)[1]]
+    return max(LEFT, NAMES + max((text_width(text, LEAST) for text in texts), default=0.0))
+
+
+def _height_of_upright_numbers(quantities: list[SampledQuantity], width: float) -> float:
+    """Return the height of the numbers below panels of some width [in]; 0 where two of each fit side by side."""
+    if all(len(ticks_below(q.limits(SHARE), width)[1]) > 1 for q in quantities):
+        return 0.0
+    return max(text_width(text, LEAST) for q in quantities for text in ticks_left(q.limits(SHARE), width)[1])
 
 
 def _draw_marginal(axes: Axes, quantity: SampledQuantity) -> None:
@@ -161,16 +183,25 @@ def _draw_credible_regions(axes: Axes, across: SampledQuantity, up: SampledQuant
     )
 
 
-def _label_axes(figure: Figure, below: Axes, left: Axes | None, label: str, size: float) -> None:
-    """Write numbers and a name below a column of panels, and left of a row."""
-    label = wrap_words(label, size - 0.2 * GAP, most=2)
-    number_below(below)
+def _label_axes(figure: Figure, below: Axes, left: Axes | None, label: str, apart: float, upright: float) -> None:
+    """Write numbers and a name below a column of panels, and left of a row.
+
+    Args:
+        figure: The page.
+        below: The lowest panel of the column.
+        left: The first panel of the row; None on the first row.
+        label: The name.
+        apart: From the axis to a name on its left [in].
+        upright: Height of the numbers below, where they stand upright, else 0 [in].
+    """
+    under = 0.2 + max(0.0, upright - UPRIGHT)
+    number_below(below, upright=upright > 0)
     below.set_xlabel(label, fontsize=SMALL, va="top")
     if left:
         number_left(left)
         left.set_ylabel(label, fontsize=SMALL, va="center")
-        place_labels(figure, left, LEFT - 0.16, 0.2)
-    place_labels(figure, below, LEFT - 0.16, 0.2)
+        place_labels(figure, left, apart, under)
+    place_labels(figure, below, apart, under)
 
 
 def _remarks(data: Pairs, shown: int) -> list[str]:

@@ -58,14 +58,14 @@ def caption(data: Residuals) -> str:
         if has_draws else "the line is the least-squares prediction."
     )  # fmt: skip
     return (
-        f"Left: every measured efficiency beside its prediction; {bars} Right: measured less predicted, in percentage points. "
+        f"Left: every measured efficiency beside its prediction; {bars} Right: measured minus predicted, in percentage points. "
         f"n = {counted(n, 'efficiency', 'efficiencies')}."
     )
 
 
 @in_paper_style
 def draw(data: Residuals, width: float | None = None) -> Figure:
-    """Draw efficiencies by label beside their predictive intervals, and measured less predicted."""
+    """Draw efficiencies by label beside their predictive intervals, and measured minus predicted."""
     page = width or WIDE
     labels = _shorten_labels(data.points, LABELS * page)
     inner = float(np.clip(ROW * len(labels), LEAST, MOST))
@@ -78,7 +78,7 @@ def draw(data: Residuals, width: float | None = None) -> Figure:
     _draw_rows(main, data.points, residual=False)
     _draw_rows(strip, data.points, residual=True)
     main.set_xlabel("Efficiency (%)")
-    strip.set_xlabel(f"Measured less {what}\n(percentage points)" if page > WIDE / 2 else "Residual\n(percentage points)")
+    strip.set_xlabel(f"Measured minus {what}\n(percentage points)" if page > WIDE / 2 else "Residual\n(percentage points)")
     every = -(-len(labels) // int(inner / (0.85 * ROW)))
     main.set_yticks(range(0, len(labels), every), labels[::every])
     main.set_ylim(len(labels) - 0.4, -0.6)

@@ -38,10 +38,19 @@ PANEL, ROW, MARGINAL = 0.68, 0.84, 0.5  # in, height of a panel, of a row, width
 
 @dataclass(frozen=True)
 class Traces:
-    """Draws (walkers, ordered by ensemble, first) of every sampled parameter and of the optimal length."""
+    """Draws (walkers, ordered by ensemble, first) of every sampled parameter and of the optimal length.
+
+    Args:
+        quantities: The draws.
+        n_ensembles: Number of independent ensembles.
+        first_step: Step of the sampler after which the first draw was stored.
+        last_step: The same of the last draw; the others are evenly between.
+    """
 
     quantities: list[SampledQuantity]
     n_ensembles: int
+    first_step: int
+    last_step: int
 
 
 def data(fit: Record) -> Traces | None:
@@ -49,16 +58,16 @@ def data(fit: Record) -> Traces | None:
     quantities = summary.collect_sampled_quantities(fit) + summary.collect_optimum_quantities(fit)[:1]
     if fit.sampled is None or all(q.draws.shape[1] == 1 for q in quantities):
         return None
-    return Traces(quantities, fit.posterior.n_ensembles)
+    return Traces(quantities, fit.posterior.n_ensembles, *fit.posterior.stored_steps)
 
 
 def caption(data: Traces) -> str:
     """Describe what is drawn, in plain words."""
     return (
-        "Trace plot: the path of every parameter through the stored samples, a color for each independent start. Where the "
-        "sampling has converged they lie on top of each other and drift neither up nor down. Right of each panel: the "
-        f"distribution of each. {explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
-        f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} sampled values."
+        "The path of every parameter over the steps of the sampler, a color and line style for each independent start "
+        "(ensemble or chain). Where the sampling has converged, the paths lie on top of each other and drift neither up nor "
+        f"down. Right of each panel: the density of each. {explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
+        f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} draws from the posterior."
     )
 
 
@@ -79,7 +88,7 @@ def draw(data: Traces, width: float | None = None) -> Figure:
         left, bottom = LEFT + column * page / columns, BOTTOM + (rows - 1 - row) * ROW
         inner = page / columns - LEFT - RIGHT - MARGINAL
         trace = axes_at(figure, left, bottom, inner, PANEL)
-        trace.set(xlim=(1.0, quantity.draws.shape[1]), ylim=quantity.limits(SHARE))
+        trace.set(xlim=(data.first_step, data.last_step), ylim=quantity.limits(SHARE))
         marginal = axes_at(figure, left + inner + 0.04, bottom, MARGINAL - 0.06, PANEL, sharey=trace)
         marginal.set_axis_off()
         for number, draws in enumerate(np.split(quantity.draws, data.n_ensembles)):
@@ -92,7 +101,9 @@ def draw(data: Traces, width: float | None = None) -> Figure:
 def _draw_ensemble(trace: Axes, marginal: Axes, quantity: SampledQuantity, draws: np.ndarray, number: int) -> None:
     """Draw one ensemble in the panel of a quantity, and the density of its draws beside it."""
     style = _style(number)
-    steps, grouped = _group_draws(draws)
+    shares, grouped = _group_draws(draws)
+    first, last = trace.get_xlim()
+    steps = first + shares * (last - first)
     low, median, high = np.quantile(grouped, (0.05, 0.5, 0.95), axis=0)
     trace.fill_between(steps, low, high, facecolor=style["color"], alpha=0.07 if len(draws) > 1 else 0.03, linewidth=0)
     if len(draws) > 1:
@@ -108,14 +119,14 @@ def _style(number: int) -> dict[str, Any]:
 
 
 def _group_draws(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return places along the path, and the draws summarized there (columns): all walkers', or a stretch of a chain."""
+    """Return places along the path (0 to 1), and the draws summarized there (columns): all walkers', or a stretch of a chain."""
     n_walkers, n = draws.shape
     if n_walkers > 1 or n < 2 * STRETCHES:
-        steps = np.arange(0, n, -(-n // MOST_DRAWS))
-        return 1.0 + steps, draws[:, steps]
+        chosen = np.arange(0, n, -(-n // MOST_DRAWS))
+        return chosen / max(n - 1, 1), draws[:, chosen]
     length = n // STRETCHES
     stretches = draws[0, : STRETCHES * length].reshape(STRETCHES, length)
-    return 1.0 + length * (np.arange(STRETCHES) + 0.5), stretches.T
+    return length * (np.arange(STRETCHES) + 0.5) / n, stretches.T
 
 
 def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
@@ -125,7 +136,7 @@ def _label_axes(figure: Figure, trace: Axes, label: str, last: bool) -> None:
     number_below(trace, whole=True)
     trace.set_ylabel(_wrap_into_two_lines(label), fontsize=SMALL, va="center")
     if last:
-        trace.set_xlabel("Stored sample", fontsize=SMALL, va="center")
+        trace.set_xlabel("Step of the sampler", fontsize=SMALL, va="center")
     else:
         trace.tick_params(labelbottom=False)
     place_labels(figure, trace, 0.5, 0.27)
@@ -141,8 +152,8 @@ def _wrap_into_two_lines(label: str) -> str:
 def _legend_title(chains: bool) -> str:
     """Return what lines and bands are."""
     if chains:
-        return f"Line: median of each {STRETCHES}th of the samples; shaded: its {WIDE_INTERVAL}; right of each panel: density"
-    return f"Thick: median of the values at a sample; thin: their {WIDE_INTERVAL}; right of each panel: density"
+        return f"Line: median of each {STRETCHES}th of the chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
+    return f"Thick: median of the walkers at a step; thin: their {WIDE_INTERVAL}; right of each panel: density"
 
 
 def _draw_legend(figure: Figure, n_ensembles: int, key: str) -> None:

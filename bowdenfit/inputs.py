@@ -51,7 +51,7 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
             ) from None
         return  # whoever opens it says that it is missing
     if stat.S_ISREG(mode) and os.path.realpath(path).startswith(_SYSTEM_FOLDERS):
-        raise error(f"{path.name} is no file on a disk but made by the system while it is read; copy it, and name that.")
+        raise error(f"{path.name} is not a file on disk but is made by the system as it is read; copy it, and name the copy.")
     for is_so, what in _SPECIAL.items():
         if is_so(mode):
             raise error(f"{path.name} is {what}, not a file; copy what it gives into a file, and name that.")

@@ -9,7 +9,7 @@ twenty, hung weights or cells, and what goes wrong on benches. In each
   refusal or a verdict that names the cause;
 - the models are fitted to one session by sampling and compared: no wrong one may be preferred clearly;
 - the right model is fitted to `--intervals` sessions by the batch engine, with the priors of the first of them: 90 % intervals
-  must hold the truth as often as chance allows, at 99 % for all of them together.
+  must contain the truth as often as chance allows, at 99 % for all of them together.
 
 Prints a table, writes its rows into a file between two marks (`--write fits/README.md`; those of other laboratories stay), and
 ends with 1 if anything is wrong.
@@ -33,7 +33,7 @@ import bowdenfit as bf  # noqa: E402
 from bowdenfit.words import table  # noqa: E402
 
 START, END = "<!-- twelve laboratories: written by scripts/check_benches.py -->", "<!-- end of twelve laboratories -->"
-HEADS = ("laboratory", "verdicts right", "compared", "90 % intervals that hold the truth", "wrong")
+HEADS = ("laboratory", "verdicts right", "compared", "90 % intervals that contain the truth", "wrong")
 TOGETHER = 0.01  # probability that chance alone makes one of all rates of a run look wrong
 
 

@@ -56,7 +56,7 @@ class Conditions:
         if not self.shows_loads:
             raise DescriptionError(
                 f'friction_model has "{option}", but no force table or recording shows at which loads it was measured; '
-                "efficiencies alone say nothing of it: leave it out, or add forces."
+                "efficiencies alone say nothing about it: leave it out, or add forces."
             )
 
 

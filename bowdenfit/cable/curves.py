@@ -93,7 +93,7 @@ class GaussianCurve(Curve):
 
     coefficients = ("a", "b", "c")
     heading = "Gaussian curves A exp(-((l - B)/C)^2)"
-    not_limited = "the data also allow an exponential, at which A, B and C are infinite; a, b and c above say it all."
+    not_limited = "the data also allow an exponential, for which A, B and C are infinite; use a, b and c above."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
         """Return the level a (log rad), slope b and curvature c >= 0 of the logarithm of the angle.
@@ -164,7 +164,7 @@ class LogisticCurve(Curve):
 
     coefficients = ("a", "k", "s")
     heading = "Logistic curves A / (1 + exp(-(l - B)/C))"
-    not_limited = "the data also allow an exponential, at which A and B are infinite; a, k and s above say it all."
+    not_limited = "the data also allow an exponential, for which A and B are infinite; use a, k and s above."
 
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
         """Return the level a (log rad), steepness k, and the share s of the plateau reached in the middle of the range."""

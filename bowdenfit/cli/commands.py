@@ -212,7 +212,7 @@ INIT_HELP = """Start a data set: by questions, from files, or from an example.
 In a terminal it asks for the files that you measured, and for what they do
 not say: which contacts there are, where their wrap angles come from, what the
 columns are, and their units. With --from it asks only for what these files do
-not say, and where nobody can be asked it refuses what is not said. Without
+not say, and without a terminal it refuses to guess the rest. Without
 files and without a terminal it writes a template to fill in.
 
   init my-cable                       questions, from the first to the command

@@ -172,7 +172,7 @@ class Description(Display, Frozen):
         if len(laws) > 1 and any(laws):
             yield (
                 f"stretch.friction {self.stretch.friction!r} acts in {len(laws)} contacts, and by the "
-                f"{next(filter(None, laws))} law their wrap angles together do not tell the friction of the rope; leave "
+                f"{next(filter(None, laws))} law their wrap angles together do not determine the friction of the rope; leave "
                 "stretch.friction out, for a coefficient of its own"
             )
         freedom = type(self).model_fields["student_degrees_of_freedom"].default
@@ -180,8 +180,8 @@ class Description(Display, Frozen):
             yield 'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
         if self.by_group and self.stretch.friction is not None:
             yield (
-                "stretch.friction is a coefficient that groups have one each of, and the stretch is of no group; leave it out, "
-                "for a coefficient of its own"
+                "stretch.friction is a coefficient of which each group has its own, and the stretch belongs to no group; leave "
+                "it out, for a coefficient of its own"
             )
         if self.cable.kind == "loop" and self.friction_model != "capstan":
             yield 'the equations of a loop hold for friction_model = "capstan" only; leave it out, or fit one rope alone'

@@ -220,7 +220,7 @@ def _known(key: str, stated: QuantityValue) -> Known:
     if sd is None and of.is_measured:
         raise DescriptionError(
             f"device.toml, {key}: {stated.value:g} {stated.unit} has no sd, and the answer is a probability over what is known "
-            f"of it; write sd = ... beside it, as in {of.example}."
+            f"about it; write sd = ... beside it, as in {of.example}."
         )
     return Known(stated.to(of.dimension) * factor, 0.0 if sd is None else sd * factor)
 
@@ -262,12 +262,12 @@ def _check(place: str, key: Key, stated: QuantityValue) -> None:
         raise DescriptionError(f"{place}: {error}.") from None
     if stated.value < 0 or (stated.value == 0 and not key.may_be_zero):
         raise DescriptionError(
-            f"{place}: {written} is not possible of the {key.meaning}; write one such as {key.example}."
+            f"{place}: {written} is not possible for the {key.meaning}; write one such as {key.example}."
         )
     if stated.sd is not None and not key.is_measured:
         raise DescriptionError(f"{place}: the {key.meaning} is set, not measured; leave its sd out.")
     if stated.sd is not None and stated.sd > stated.value > 0:
         raise DescriptionError(
-            f"{place}: an sd of {stated.sd:g} is more than the {written} themselves, so that nothing is known of it; "
+            f"{place}: an sd of {stated.sd:g} is more than the {written} themselves, so that nothing is known about it; "
             "measure it, or write an sd of less."
         )

@@ -13,7 +13,7 @@ _LONGEST_NAME = 80  # characters, a line of a terminal
 def _nameable(name: str) -> str:
     """Return a name that can be printed and told apart."""
     if not name.strip():
-        raise ValueError("the name is empty; write one that tells it from the others")
+        raise ValueError("the name is empty; write one that differs from the others")
     if len(name) > _LONGEST_NAME:
         raise ValueError(f"the name has {len(name)} characters; at most {_LONGEST_NAME} fit into tables and figures")
     hidden = [letter for letter in name if unicodedata.category(letter) in {"Cc", "Cf", "Cs", "Zl", "Zp"}]

@@ -221,7 +221,7 @@ def parse_dates(texts: Iterable[str], source: str) -> Vector:
         dates = pandas.to_datetime(written, format=form, dayfirst="." in first[:3], utc=True)
     except ValueError as error:
         raise DatasetError(
-            f"{source}: a cell is no date or time like the others ({error}); correct it, or write the time in seconds."
+            f"{source}: a cell is not a date or time like the others ({error}); correct it, or write the time in seconds."
         ) from None
     return _subtract_first((dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy(dtype=float))
 

@@ -146,7 +146,7 @@ def _check_known_units(
         with table.faults.collect():
             raise DatasetError(
                 f"{table.file}, row {table.header_row}, column {shown(heading)}: this is {quantity.name}, but what follows "
-                f"that, {shown(bracket + behind)}, is no unit alone; state the unit that its numbers are in, "
+                f"that, {shown(bracket + behind)}, is not just a unit; state the unit that its numbers are in, "
                 f"{option_naming(quantity.name, heading, 'UNIT')}, or rename the column if it is something else."
             )
 

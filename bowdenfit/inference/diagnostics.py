@@ -128,7 +128,8 @@ def describe_convergence_shortfalls(
     for name, d in diagnostics.items():
         if not d.r_hat < target_r_hat:
             wider, most = percent(d.r_hat - 1), percent(target_r_hat - 1)
-            reasons.append(f"{name} spreads {wider} wider over all starts than within one, and the limit is {most}")
+            spread = f"{name} spreads {wider} wider over all chains than within one"
+            reasons.append(f"{spread} (R-hat minus 1), and the limit is {most}")
         if not d.drift < MAXIMUM_DRIFT:
             reasons.append(f"{name} still drifts during sampling, by {percent(d.drift, 0)} of its spread")
         low = min(d.ess_bulk, d.ess_tail)
@@ -146,7 +147,7 @@ def describe_low_ess(quantity: str, ess: float, target: int) -> str:
         ess: Its effective sample size.
         target: The least effective sample size that is acceptable.
     """
-    return f"the samples for {quantity} are worth {ess:.0f} independent ones, and should be worth at least {target}"
+    return f"the effective sample size of {quantity} is {ess:.0f} (independent draws), and should be at least {target}"
 
 
 @dataclass(frozen=True)

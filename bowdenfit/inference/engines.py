@@ -126,7 +126,7 @@ class Engine(Generic[Work, Result]):
             self.check()
             why = f"{type(error).__name__}: {error}"
             raise EngineError(
-                f"{self.name} takes no more work ({why}); start it again, and go on with --resume."
+                f"{self.name} accepts no more work ({why}); start it again, and go on with --resume."
             ) from None
 
     def _count_attempt(self, attempts: int, error: Exception) -> int:

@@ -174,8 +174,8 @@ class Uniformity:
             return ""
         low, high = (np.interp(quarter, self.at, self.share - self.at) for quarter in (0.25, 0.75))
         if abs(low - high) > abs(low + high):
-            return "scatter more than the fit says" if low > high else "scatter less than the fit says"
-        return "lie lower than the fit says" if low + high > 0 else "lie higher than the fit says"
+            return "scatter more than the fit predicts" if low > high else "scatter less than the fit predicts"
+        return "lie lower than the fit predicts" if low + high > 0 else "lie higher than the fit predicts"
 
 
 def check_uniformity(pit: np.ndarray, probability: float) -> Uniformity:

@@ -87,7 +87,7 @@ def refuse_shortage(size: int = COMPILATION_BYTES, addresses: bool = False) -> N
         mmap.mmap(-1, size, **kind).close()
     except OSError:
         raise MemoryShortageError(
-            f"there are not the {size >> 20} MiB of memory that this takes; close other programs, or raise the limit "
+            f"this takes {size >> 20} MiB of memory, which are not free; close other programs, or raise the limit "
             "(ulimit -d and -v show it, or the container's)."
         ) from None
 

@@ -89,7 +89,7 @@ class SamplerAgreement:
         """Say whether the samplers agree, for users."""
         one, two, most = SAMPLER_NAMES[self.first], SAMPLER_NAMES[self.second], self.largest
         if self.agree:
-            sharper = " A larger sampler.target_ess compares more sharply." if abs(most.sds) > NOTICEABLE else ""
+            sharper = " A larger sampler.target_ess makes the comparison sharper." if abs(most.sds) > NOTICEABLE else ""
             return (
                 f"{one} and {two} agree within Monte Carlo error: the mean, standard deviation, 5 % and 95 % quantile of every "
                 f"parameter and answer differ by at most {abs(most.sds):.2f} standard deviations ({most.summary} of "

@@ -226,8 +226,8 @@ def order_groups(description: Description, measurements: Measurements) -> tuple[
     without = [kind.name for kind, groups in tables if not groups]
     if description.by_group and without:
         raise DescriptionError(
-            f'friction_model has "{BY_GROUP}", but the tables of {listed(without)} say nothing of groups, so nobody knows '
-            "whose friction they show; add a column group where the table can have one, or fit them apart."
+            f'friction_model has "{BY_GROUP}", but the tables of {listed(without)} say nothing about groups, so it is '
+            "not known whose friction they show; add a column group where the table can have one, or fit them apart."
         )
     if description.by_group and len(names) < 2:
         raise DescriptionError(

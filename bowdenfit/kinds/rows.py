@@ -160,7 +160,7 @@ def _stroke(cell: Cell, held: str) -> int:
     text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
     if text not in _STROKES:
         raise cell.refuse(
-            f"{cell.shown} is no stroke; write pull (+1) or return (-1){held}; rename a column that tells something else."
+            f"{cell.shown} is not a stroke; write pull (+1) or return (-1){held}; rename a column that holds something else."
         )
     return _STROKES[text]
 
@@ -199,7 +199,7 @@ def _own_angle(column: Column, cell: Cell) -> float:
         return np.nan
     if cell.limit() is not None:
         raise cell.refuse(
-            f"{cell.shown} is no measured angle; leave the cell blank where the contact has a curve, or write the angle."
+            f"{cell.shown} is not a measured angle; leave the cell blank where the contact has a curve, or write the angle."
         )
     return read_angle(cell, column)
 
@@ -213,7 +213,7 @@ def origin_of_rows(table: RawTable) -> RowOrigin:
 def read_tension(cell: Cell, column: Column, what: str) -> float:
     """Return a tension [N], 0 for a slack rope; `what` names it in refusals."""
     if cell.limit() is not None:
-        raise cell.refuse(f"{cell.shown} is a bound, no reading; write the value, and 0 for a slack rope.")
+        raise cell.refuse(f"{cell.shown} is a bound, not a reading; write the value, and 0 for a slack rope.")
     value = column.value(cell)
     if value < 0:
         raise cell.refuse(

@@ -57,7 +57,7 @@ class LossByContact:
     JSON: ClassVar = (("at", "position"), "contacts", ("in_words", "sentence"))
 
     def sentence(self) -> str:
-        """Return the shares in words: "72 % of the loss sits at the bracket edge (90 % interval 62 to 79 %), 15 % at ..."."""
+        """Return the shares in words: "72 % of the loss occurs at the bracket edge (90 % interval 62 to 79 %), 15 % at ..."."""
         largest, *others = self.contacts
         low, high = (percent(end, 0) for end in (largest.share.q05, largest.share.q95))
         remaining = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
@@ -65,7 +65,7 @@ class LossByContact:
             remaining.append(f"the rest at {counted(len(others) - _FEW, 'other')}")
         where = f"{self.position[0].upper()}{self.position[1:]}, " if self.position else ""
         return (
-            f"{where}{percent(largest.share.median, 0)} of the loss sits at {largest.name!r} "
+            f"{where}{percent(largest.share.median, 0)} of the loss occurs at {largest.name!r} "
             f"(90 % interval {low.removesuffix(' %')} to {high}), {listed(remaining)}."
         )
 

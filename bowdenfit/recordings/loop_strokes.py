@@ -221,8 +221,8 @@ def _check_moves(fit: Hysteresis, file: str, name: str) -> None:
     if not moved or float(still) - fit.cost * len(force_in) < _SIGNIFICANT:
         raise DatasetError(
             f"{file}: the output force of {name!r} stands still, at {np.median(force_out):.4g} N, while the input force goes "
-            f"from {force_in.min():.4g} to {force_in.max():.4g} N: all inside the friction band, so that it tells no more of "
-            "friction than a bound. Record the loop moving against a load, or write what moving it without load takes as a "
+            f"from {force_in.min():.4g} to {force_in.max():.4g} N: all inside the friction band, so that it gives only a bound "
+            "on friction. Record the loop moving against a load, or write what moving it without load takes as a "
             "row of a loop table."
         )
 
@@ -236,7 +236,7 @@ def _remarks(
     elif len(strokes) == 1:
         which = "forward" if PULL in strokes else "back"
         remarks.append(
-            f"{name} moves {which} throughout: offsets of the load cells cannot be told from friction by it."
+            f"{name} moves {which} throughout: offsets of the load cells cannot be separated from friction by it."
         )
     if len(strokes) == 2 and abs(fit.center) > _CENTER_SD * max(fit.lost, _LEAST):
         remarks.append(
@@ -245,7 +245,8 @@ def _remarks(
         )
     if np.isnan(exponent) and preload is None and np.isfinite(loss):
         remarks.append(
-            f"{name}: the return side does not go slack, so that this recording by itself tells what is lost, {loss:.3g} N = "
-            "2 x preload x friction exponent, and not the two apart; state or measure the preload, or record under more load."
+            f"{name}: the return side does not go slack, so that this recording by itself determines what is lost, {loss:.3g} "
+            "N = 2 x preload x friction exponent, and not the two apart; state or measure the preload, or record under more "
+            "load."
         )
     return tuple(remarks)

@@ -255,12 +255,12 @@ def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:
     remarks = []
     if not strokes:
         remarks.append(
-            f"{name}: no block lies safely inside a sliding phase, so the recording says nothing of friction."
+            f"{name}: no block lies safely inside a sliding phase, so the recording says nothing about friction."
         )
     elif len(strokes) == 1:
         which = "pulling" if PULL in strokes else "returning"
         remarks.append(
-            f"{name} is {which} throughout and has no loop: a gain error, or a zero that is wrong, cannot be told from "
+            f"{name} is {which} throughout and has no loop: a gain error, or a zero that is wrong, cannot be separated from "
             "friction by it, and where it slides is known by the motor's motion or by both forces changing together."
         )
     if abs(loop.center) > 2.5 * _GAIN_SD and len(strokes) == 2:

@@ -110,7 +110,7 @@ def _check_length(blocks: Blocks, file: str, name: str, by_hand: Sequence[Phase]
     """Refuse a recording of a few blocks, and phases that lie outside it."""
     if len(blocks.time) < _FEWEST:
         raise DatasetError(
-            f"{file}: the recording {name!r} has too few blocks to tell its phases ({len(blocks.time)}, at least {_FEWEST} "
+            f"{file}: the recording {name!r} has too few blocks to identify its phases ({len(blocks.time)}, at least {_FEWEST} "
             "needed); the usual cause is a block that is too long or a recording that was cut off: state a shorter block "
             "under prepare in cable.toml, or leave the recording out."
         )

@@ -338,5 +338,5 @@ def test_a_dependence_on_load_is_refused_where_no_load_was_measured(option, on_b
     import bowdenfit as bf
     from bowdenfit.model import build_model
 
-    with pytest.raises(DescriptionError, match=f"{option}.*efficiencies alone say nothing of it"):
+    with pytest.raises(DescriptionError, match=f"{option}.*efficiencies alone say nothing about it"):
         build_model(bf.read(on_body, friction=option))

@@ -65,10 +65,10 @@ FAULTS = {
     "another unit": ('unit = "kg*m^2", sd = 0.7e-4', 'unit = "kg", sd = 0.7e-4', "does not measure an inertia"),
     "without rad": ('value = 0.1, unit = "N*m*s/rad"', 'value = 0.1, unit = "N*m"', "angular damping"),
     "a misspelled key": ("filter_time", "filtertime", "did you mean 'filter_time'?"),
-    "a negative one": ('friction = { value = 0.01', 'friction = { value = -0.01', "is not possible of the dry friction"),
-    "no inertia": ("inertia = { value = 7e-4", "inertia = { value = 0", "is not possible of the inertia"),
+    "a negative one": ('friction = { value = 0.01', 'friction = { value = -0.01', "is not possible for the dry friction"),
+    "no inertia": ("inertia = { value = 7e-4", "inertia = { value = 0", "is not possible for the inertia"),
     "an sd of a setting": ('value = 0.8, unit = "rad/s"', 'value = 0.8, unit = "rad/s", sd = 0.1', "is set, not measured"),
-    "an sd beyond it": ("sd = 0.7e-4", "sd = 1", "nothing is known of it"),
+    "an sd beyond it": ("sd = 0.7e-4", "sd = 1", "nothing is known about it"),
     "not a number": ("value = 0.1, unit", "value = nan, unit", "finite"),
     "too few counts": ("encoder_counts = 2000", "encoder_counts = 0", "greater than or equal to 4"),
 }  # fmt: skip

@@ -188,5 +188,5 @@ def test_a_time_under_the_upper_of_two_rows_of_headings_is_kept(tmp_path, run):
 
 def test_a_known_quantity_in_an_unknown_unit_is_named(tmp_path):
     (tmp_path / "t.csv").write_text("wrap_angle_deg,wrap_angle [bit] (mean),input_force_N,output_force_N\n90,3,10,8\n")
-    with pytest.raises(bf.DatasetError, match="is no unit alone; state the unit that its numbers are in"):
+    with pytest.raises(bf.DatasetError, match="is not just a unit; state the unit that its numbers are in"):
         bf.read(tmp_path / "t.csv")

@@ -193,5 +193,5 @@ def test_strokes_are_read_in_five_languages_and_other_words_are_refused(tmp_path
     table = bf.read(path, wrap_angle=(180, "deg")).measurements.table(ForceTable)
     assert table.stroke.tolist() == [1, -1, 1, -1, -1, -1, 1, -1]
     path = write(tmp_path, ("F_in (N)", "F_out (N)", "direction"), FORCE_IN, FORCE_OUT, ["left"] * 4)
-    with pytest.raises(DatasetError, match=r"'left' is no stroke; .* rename a column that tells something else"):
+    with pytest.raises(DatasetError, match=r"'left' is not a stroke; .* rename a column that holds something else"):
         forces(path)

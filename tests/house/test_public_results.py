@@ -316,9 +316,10 @@ def test_what_is_long_is_cut_with_a_word_on_how_to_see_the_rest():
 def test_ruled_columns_become_cells_and_what_stands_below_them_does_not():
     page = as_html(
         "Cut it.\n\nHow it went\n      value  90 % interval\n----------------------\nmu1   0.084  0.067 to 0.110    sheath\n"
-        "tau     1.0      0.3 to 4.2 %  scatter <1>\nand 3 more\nHard to tell apart: mu1 and tau, of all those that there are."
+        "tau     1.0      0.3 to 4.2 %  scatter <1>\nand 3 more\nStrongly correlated: mu1 and tau, of all "
+        "those that there are."
     )
     assert page.startswith("<p><b>Cut it.</b></p><p>How it went</p><table>")
     assert page.count("<th>") == 4 and page.count("<tr>") == 3
     assert ">0.3 to 4.2 %</td>" in page and ">scatter &lt;1&gt;</td>" in page
-    assert page.endswith("</table><p>and 3 more Hard to tell apart: mu1 and tau, of all those that there are.</p>")
+    assert page.endswith("</table><p>and 3 more Strongly correlated: mu1 and tau, of all those that there are.</p>")

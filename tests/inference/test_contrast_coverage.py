@@ -1,4 +1,4 @@
-"""Contrasts between groups hold the truth as often as they say, over tables of a bench that shares no code with the likelihood.
+"""Contrasts between groups contain the truth as often as claimed, over tables of a bench without code of the likelihood.
 
 Truths come from no prior: coefficients, their difference, and how mountings scatter are spread over what cables have, at
 loads of 1 N and of 10 kN. Each 90 % interval then holds its difference nine times out of ten, but for what the weak priors

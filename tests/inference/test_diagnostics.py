@@ -88,9 +88,9 @@ def test_one_draw_elsewhere_of_an_optimum_at_an_end_is_no_drift():
 def test_what_keeps_draws_from_being_trusted_is_said_in_plain_words():
     said = describe_convergence_shortfalls({"mu1": Diagnostics(1.037, 812.3, 640.0, 0.01, 0.12)}, 1.01, 1000)
     assert said == (
-        "mu1 spreads 3.7 % wider over all starts than within one, and the limit is 1.0 %",
+        "mu1 spreads 3.7 % wider over all chains than within one (R-hat minus 1), and the limit is 1.0 %",
         "mu1 still drifts during sampling, by 12 % of its spread",
-        "the samples for the tails of mu1 are worth 640 independent ones, and should be worth at least 1000",
+        "the effective sample size of the tails of mu1 is 640 (independent draws), and should be at least 1000",
     )
     assert not jargon(". ".join(said))
     assert describe_convergence_shortfalls({"mu1": Diagnostics(1.0099, 1000.0, 1000.0, 0.01, 0.07)}, 1.01, 1000) == ()

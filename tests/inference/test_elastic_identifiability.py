@@ -54,7 +54,7 @@ CASES = {
         ("preload",), {"preload": {"wrap_angles": tuple(np.linspace(60, 180, 8))}}, {},
         ("mu", "stiffness", "bedding_stretch", "lengthening"), "without a table of stretch, preloads tell only",
     ),
-    "free motion": (("loop",), FREE, {}, ("mu", "preload"), "tells only the product of friction and preload"),
+    "free motion": (("loop",), FREE, {}, ("mu", "preload"), "determines only the product of friction and preload"),
     "a loop that is always slack": (
         ("loop",), {"loop": {
             "wrap_angles": ANGLES[1:], "input_forces": (40.0, 60.0, 80.0, 100.0), "strokes": ("pull", "return")}},

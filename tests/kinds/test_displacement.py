@@ -137,7 +137,7 @@ def test_rows_with_strokes_are_taken_while_all_of_the_rope_slides(catheter, refu
 
 def test_a_free_spring_without_a_closed_loop_is_warned_of(catheter):
     with_columns(catheter, lambda rows: np.concatenate([part[:17] for part in np.split(rows, 3)]))
-    assert "friction cannot be told from the stiffness" in describe_data_set(bf.read(catheter))
+    assert "friction cannot be separated from the stiffness" in describe_data_set(bf.read(catheter))
 
 
 def test_rows_before_a_stop_are_counted_and_left_out(catheter):

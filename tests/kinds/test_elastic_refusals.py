@@ -249,7 +249,7 @@ def test_a_rope_that_is_only_stretched_straight_is_said_to_tell_nothing_of_frict
     (haptic / S).write_text(f"{HEADS[S]}\n0,5,0.5\n0,20,0.6\n0,30,0.7\n0,40,0.8\n")
     code, out, _ = run("check", haptic)
     assert code == 0
-    assert "every row of stretch.csv is at a wrap angle of 0, so it says nothing of friction" in " ".join(out.split())
+    assert "every row of stretch.csv is at a wrap angle of 0, so it says nothing about friction" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(("preloads", "said"), [((20, 10, 5), "falls with the wrap angle"), ((0, 0, 0), "reads 0")])

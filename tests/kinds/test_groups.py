@@ -118,7 +118,7 @@ def test_tables_without_groups_are_refused_beside_those_with(tmp_path, refuse):
     more = 'efficiencies = { file = "efficiencies.csv" }\n'
     folder = _folder(tmp_path, top=BY_GROUP, description=BENDS + more)
     (folder / "efficiencies.csv").write_text("wrap_angle_deg,efficiency\n180,0.7\n")
-    assert "efficiencies say nothing of groups" in refuse("check", folder)
+    assert "efficiencies say nothing about groups" in refuse("check", folder)
 
 
 def test_groups_called_by_numbers_are_read_where_that_is_said(tmp_path, accept):

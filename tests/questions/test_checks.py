@@ -130,10 +130,10 @@ def test_uniform_numbers_stay_in_the_band_and_others_do_not():
     rng = np.random.default_rng(3)
     assert sum(not check_uniformity(rng.uniform(size=30), 0.99).holds for _ in range(100)) <= 6
     normal = rng.standard_normal(60)
-    assert check_uniformity(stats.norm.cdf(2.0 * normal), 0.99).fault == "scatter more than the fit says"
-    assert check_uniformity(stats.norm.cdf(0.3 * normal), 0.99).fault == "scatter less than the fit says"
-    assert check_uniformity(stats.norm.cdf(normal + 1.5), 0.99).fault == "lie higher than the fit says"
-    assert check_uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit says"
+    assert check_uniformity(stats.norm.cdf(2.0 * normal), 0.99).fault == "scatter more than the fit predicts"
+    assert check_uniformity(stats.norm.cdf(0.3 * normal), 0.99).fault == "scatter less than the fit predicts"
+    assert check_uniformity(stats.norm.cdf(normal + 1.5), 0.99).fault == "lie higher than the fit predicts"
+    assert check_uniformity(stats.norm.cdf(normal - 1.5), 0.99).fault == "lie lower than the fit predicts"
 
 
 def parameter(name, prior):

@@ -248,10 +248,10 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     assert "The data prefer good over poor (score less by 12.1 ± 0.2)." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     assert "With 6 readings the standard errors tend to be too small." in words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
     leaning = words([2.0, 0.2, 1.9, 2.5, 0.1, 0.3])
-    assert "The data lean towards good over poor (score less by 7.0" in leaning
+    assert "The data favor good over poor (score less by 7.0" in leaning
     assert "tends to be too small: not proof." in leaning
     alone = words([9.0, 0.2, -0.1, 0.2, 0.1, 0.3])
-    assert "The data cannot tell good from poor" in alone
+    assert "The data cannot distinguish good from poor" in alone
     assert "Prefer the simpler one." in alone
     assert "even 0 rules no model out." in alone
     assert "rules no model out" not in leaning

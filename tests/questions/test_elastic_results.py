@@ -49,7 +49,7 @@ def fit(folder):
 def test_the_summary_of_a_loop_is_one_page_that_says_which_preload_to_set(fit):
     page = summary_text(fit)
     assert faults(page) == []
-    assert "Preload it with 1" in page
+    assert "Set the preload to 1" in page
     assert "  stiffness of the rope\n" in page  # in two lines, because one has no room for it
     assert "  once bedded in\n" in page
 
@@ -89,7 +89,7 @@ def test_the_summary_says_what_each_wrap_angle_does(fit):
     text = details_text(fit)
     assert "Fitted to 105 readings of stretch, 8 preloads and 64 readings of a loop." in text
     assert "Stretch and preload, median (90 % interval)" in text
-    assert "Over bends from 0 to 180 deg the cable stays taut from a preload of" in text
+    assert "Over bends from 0 to 180 deg the cable stays taut if its preload is at least" in text
     assert "disagrees" not in text
     assert max(map(len, text.splitlines())) <= 130
     rows = fit.summary()["elastic"]["bends"]

@@ -37,7 +37,7 @@ def fleet(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        ((ROWS[0], ROWS[1], ROWS[0]), "cable-01 after 0 cycles stands twice: fleet.csv, row 2 and fleet.csv, row 4"),
+        ((ROWS[0], ROWS[1], ROWS[0]), "cable-01 after 0 cycles appears twice: fleet.csv, row 2 and fleet.csv, row 4"),
         ((ROWS[1], ROWS[0]), "cycles run backwards: fleet.csv, row 3 (cable-01: 0 after 25000 in row 2)"),
         ((ROWS[0].replace(",0,", ",-5,"),), "-5' cycles cannot be"),
         ((ROWS[0].replace("yes", "perhaps"),), "does not say whether the cable was lubricated"),

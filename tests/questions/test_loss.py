@@ -41,7 +41,7 @@ def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):
 
 
 def test_the_answer_says_where_to_work_on_the_cable(fit):
-    assert "of the loss sits at 'bracket edge'" in str(fit.summary()["loss"]["in_words"])
+    assert "of the loss occurs at 'bracket edge'" in str(fit.summary()["loss"]["in_words"])
     assert loss_text(fit).startswith("Where the force is lost, at 4")
 
 

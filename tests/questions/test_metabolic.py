@@ -122,7 +122,7 @@ def test_gas_becomes_net_cost(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "lines", "said"),
     [
-        (["person,condition,net_W_per_kg", "a,x,6", "a,x,7"], [], "a stands twice for x"),
+        (["person,condition,net_W_per_kg", "a,x,6", "a,x,7"], [], "a appears twice for x"),
         (["person,condition,net_W_per_kg", "a,x,6", "a,y,7"], [], "1 persons and 2 conditions"),
         (["person,condition,cost", "a,x,6"], [], "has no column VO2_ml_per_min"),
         (["person,condition,VO2_ml_per_min,VCO2_ml_per_min,mass_kg", "a,x,9,9,9", "b,x,9,9,9"], [], "in which persons rested"),
@@ -137,7 +137,7 @@ def test_wrong_tables_are_refused_in_a_sentence(run, tmp_path, rows, lines, said
 
 
 def test_printed_numbers_that_are_not_enough_are_refused(tmp_path, run):
-    for text, said in (("", "how many persons"), ("persons = 5", "nothing can be compared")):
+    for text, said in (("", "number of persons"), ("persons = 5", "nothing can be compared")):
         (tmp_path / "metabolic.toml").write_text(f'schema = 1\nname = "made"\n{text}\n')
         code, _, error = run("metabolic", tmp_path)
         assert code == 2 and said in " ".join(error.split())

@@ -363,7 +363,7 @@ def test_lengths_may_have_units(fit):
         ("angle", "needs the cable length"),
         ("angle@45deg", "says nothing of an angle"),
         ("efficiency@600", "no angles were measured there"),
-        ("efficiency@abc", "is no number with its unit"),
+        ("efficiency@abc", "is not a number with its unit"),
         ("efficiency@470,50N", "says nothing of an efficiency"),
         ("efficiency@470kg", "says nothing of an efficiency"),
         ("efficiency@470furlongz", "is not known"),
@@ -455,7 +455,7 @@ def test_costs_that_make_no_sense_are_refused(fit, costs, sentence):
 @pytest.mark.parametrize(
     ("wanted", "sentence"),
     [
-        ("mu9", "is no answer of this fit"),
+        ("mu9", "is not an answer of this fit"),
         ("efficiency", "does not say where"),
         ("efficiency@600", "outside the range 430 to 530 mm"),
     ],

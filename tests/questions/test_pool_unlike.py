@@ -1,4 +1,4 @@
-"""Cables that are unlike the rest are said by their own inspections alone: their truth lies there, not nearer to the others."""
+"""Cables that are outliers are said by their own inspections alone: their truth lies there, not nearer to the others."""
 
 from dataclasses import replace
 

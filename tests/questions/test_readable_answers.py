@@ -153,7 +153,7 @@ def test_each_figure_is_written_in_three_formats_beside_its_caption(tmp_path):
         *(f"{n}.{e}" for n in ("coverage", "ranks") for e in endings),
     }
     first, second = (folder / CAPTIONS).read_text().split("\n\n")
-    assert first.startswith("coverage: How often intervals hold the truth")
+    assert first.startswith("coverage: Coverage of the intervals: how often they contain the true value")
     assert second.startswith("ranks: Where the true values fall within their estimated distributions")
 
 

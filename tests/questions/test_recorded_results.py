@@ -182,7 +182,7 @@ def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_r
     code, out, err = run("compare", "--json", "-o", where, plain[1], with_rate[1])
     assert code == 0, err
     words = " ".join((where / "comparison.txt").read_text().split())
-    assert "The data cannot tell" in words
+    assert "The data cannot distinguish" in words
     assert "Letting friction depend on speed (rate) predicts no better than not (plain)." in words
     assert "viscous" in words
     page = json.loads(out)

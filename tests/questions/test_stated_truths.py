@@ -79,7 +79,7 @@ def test_a_range_of_either_sign_is_drawn_uniformly():
 @pytest.mark.parametrize(
     ("page", "why"),
     [
-        ({"mu_egde": 0.1}, "'mu_egde' is no parameter of this cable; did you mean 'mu_edge'"),
+        ({"mu_egde": 0.1}, "'mu_egde' is not a parameter of this cable; did you mean 'mu_edge'"),
         ({"tau": 0.1}, "tau is fixed in cable.toml"),
         ({"mu_edge": -0.1}, "-0.1 is outside what the parameter can be, 0 to inf"),
         ({"mu_edge": [0.2, 0.1]}, "upside down or empty; write its lower end first"),

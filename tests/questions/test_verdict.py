@@ -135,7 +135,7 @@ def test_readings_that_scatter_far_less_than_was_stated_are_not_said_to_agree(st
     fit = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
     text = " ".join(summary_text(fit).split())
     assert fit.verdict().trusted
-    assert ("but the readings of efficiencies scatter less than the fit says" in text) == said
+    assert ("but the readings of efficiencies scatter less than the fit predicts" in text) == said
     assert ("Next: look at the noise that is stated" in text) == said
     assert ("the readings agree with the model" in text) != said
 

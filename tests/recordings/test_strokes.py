@@ -155,7 +155,7 @@ def test_with_a_velocity_of_zero_throughout_nothing_slides():
     blocks = replace(result.blocks, velocity=np.zeros(len(result.blocks.time)))
     strokes = find_strokes(blocks, "run.csv", "run")
     assert not strokes.used_sliding.any()
-    assert "says nothing of friction" in " ".join(strokes.remarks)
+    assert "says nothing about friction" in " ".join(strokes.remarks)
 
 
 def test_blocks_beside_a_change_of_the_contact_are_not_used():

@@ -1,4 +1,4 @@
-"""Simulated cables, fitted: do posterior intervals hold the truth as often as they say?"""
+"""Simulated cables, fitted: do posterior intervals contain the truth as often as they claim?"""
 
 from collections.abc import Callable, Iterable
 from typing import Any

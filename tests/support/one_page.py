@@ -1,13 +1,18 @@
-"""What keeps a page from being read by an engineer in a terminal: too wide, too long, no answer at its top, jargon."""
+"""What keeps a page from being read by an engineer in a terminal: too wide, too long, no answer at its top, jargon.
+
+Standard terms of statistics (R-hat, effective sample size, posterior, draws) may stand beside a plain explanation, but not on a
+first page, which does without them.
+"""
 
 import re
 
 JARGON = (
-    r"\belpd\b", r"\bk\b(?!( rope)?: |/k rope: )", r"\bz\b", r"\bdraws?\b", r"\bwalkers?\b", r"\bensembles?\b",
+    r"\belpd\b", r"\bk\b(?!( rope)?: |/k rope: )", r"\bz\b", r"\bwalkers?\b", r"\bensembles?\b",
     r"\bcondition number\b",
-    r"\blog rad\b", r"\w*(Normal|Cauchy)\(", r"\bcensored\b", r"\bposterior\b", r"\bR-hat\b", r"\beffective sample\b",
+    r"\blog rad\b", r"\w*(Normal|Cauchy)\(", r"\bcensored\b",
     r"\bs\.e\.", r"\b1 \w+s were\b", r"(?<![\d.,])\b1 (?!times\b|ms\b|is\b|was\b|has\b|does\b|less\b)[a-z]+s\b", r"\+-", r"\d%",
 )  # fmt: skip
+STATISTICS = (r"\bdraws?\b", r"\bposterior\b", r"\bR-hat\b", r"\beffective sample\b")  # that a first page does without
 ANSWER = re.compile(
     r"cut the cable to \d|coefficients? of friction:? |best (guess|\w+ \w+) is \d|DO NOT USE|feed (forward|back) |feels ",
     re.IGNORECASE,
@@ -25,7 +30,7 @@ def faults(page: str, lines: int = 25) -> list[str]:
     found = [f"wider than 80: {row}" for row in rows if len(row.encode()) > 80]
     found += [f"{len(rows)} lines"] if len(rows) > lines else []
     found += ["no answer in three lines"] if not ANSWER.search(" ".join(rows[:3])) else []
-    return found + jargon(page)
+    return found + jargon(page) + _terms(page, STATISTICS)
 
 
 def jargon(text: str) -> list[str]:
@@ -34,4 +39,8 @@ def jargon(text: str) -> list[str]:
     Args:
         text: A page, a caption or a label.
     """
-    return [f"jargon: {word[0]!r}" for pattern in JARGON if (word := re.search(pattern, text, re.IGNORECASE))]
+    return _terms(text, JARGON)
+
+
+def _terms(text: str, patterns: tuple[str, ...]) -> list[str]:
+    return [f"jargon: {word[0]!r}" for pattern in patterns if (word := re.search(pattern, text, re.IGNORECASE))]

@@ -191,7 +191,7 @@ class AngleCandidates(CandidateKind):
     name = "angle"
     order = 0
     needs = (ANGLE_NOISE,)
-    unknown = "no contact of this cable has a curve that an angle could tell of."
+    unknown = "no contact of this cable has a curve that an angle could determine."
     along_route = True
     angles = "none"
     measures_curves = True

@@ -90,7 +90,7 @@ class DisplacementKind(
         """Return the readings of each stroke, what is at the far end, and where the loop closes."""
         pulling = int(table.pulls.sum())
         low, high = table.shared
-        where = f"from {low:.4g} to {high:.4g} mm" if high > low else "nowhere at one displacement"
+        where = f"from {low:.4g} to {high:.4g} mm" if high > low else "at no common displacement"
         unused = int(np.sum(~table.used))
         left = f"; {unused} of {len(table.used)} rows are not used" if unused else ""
         count, returning = self.count_readings(table), int(table.used.sum()) - pulling
@@ -217,18 +217,18 @@ def _warnings(table: DisplacementTable, description: Description) -> Iterator[st
     if free and not closes:
         yield (
             f"in {file} pull and return do not meet over the same displacements, so the loop does not close, and "
-            f"{' and '.join(free)} {'are' if len(free) > 1 else 'is'} free: friction cannot be told from the stiffness. Record "
-            "the return too, or state what is known of spring and rope under [prior.NAME]."
+            f"{' and '.join(free)} {'are' if len(free) > 1 else 'is'} free: friction cannot be separated from the stiffness. "
+            "Record the return too, or state what is known of spring and rope under [prior.NAME]."
         )
     elif table.sliding and len(free) == 2:
         yield (
             f"{file} has readings of the sliding rope alone, and neither {_SPRING} nor {_ROPE} is stated: the width of the "
-            "loop tells the friction exponent only to a factor of two, between a rope that does not give and an end that does "
-            "not. Read through the turns of the motor too, or state one of them under [prior.NAME]."
+            "loop determines the friction exponent only to a factor of two, between a rope that does not give and an end that "
+            "does not. Read through the turns of the motor too, or state one of them under [prior.NAME]."
         )
     if not np.any(table.used):
         yield f"no row of {file} can be used."
     if not (np.nansum(table.own.angle, axis=1) > 0).any() and not any(
         c.wrap_angle.constant is not None or c.wrap_angle.curve for c in description.contact
     ):
-        yield f"every row of {file} is at a wrap angle of 0, so it says nothing of friction; read at larger ones too."
+        yield f"every row of {file} is at a wrap angle of 0, so it says nothing about friction; read at larger ones too."

@@ -67,8 +67,8 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     )
     if "output_force" in columns:
         raise DatasetError(
-            f"{table.file} has forces at both ends; name it under tables.forces, which tells friction without any spring, or "
-            "leave one of the two columns out."
+            f"{table.file} has forces at both ends; name it under tables.forces, which determines friction without any spring, "
+            "or leave one of the two columns out."
         )
     force, displacement = np.array(force_column.numbers()), np.array(x_column.numbers())
     own, at = read_own_angles(table, columns, contacts), read_route(table, columns, route)
@@ -79,7 +79,8 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     how = settings.rows or ("sliding" if stroke is not None else "in order")
     if how == "sliding" and stroke is None:
         raise DatasetError(
-            f"{table.file} has no stroke column, so nobody knows which way the rope slides in a row; add one (pull or return), "
+            f"{table.file} has no stroke column, so it is not known which way the rope slides in a row; add one (pull or "
+            "return), "
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
     run, names = _assign_runs(columns.get("run"), at, own)
@@ -154,7 +155,7 @@ def _check_runs(table: DisplacementTable) -> None:
     if single_rows:
         which = few([f"{table.origin.describe_row(i)} ({table.run_names[table.run[i]]})" for i in single_rows])
         raise DatasetError(
-            f"{which}: a run of one reading, which tells nothing, since where its displacement begins is fitted; the "
+            f"{which}: a run of one reading, which determines nothing, since where its displacement begins is fitted; the "
             "usual causes are a slipped digit in its wrap angle, another label than the rows beside it, and angles that "
             "differ from row to row: write one angle and one label for all rows of a mounting, or leave the row out."
         )
@@ -216,7 +217,7 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
         remarks.append(
             f"{file}: rows are taken in the order in which they stand, and turns of the motor as the displacement shows them."
             f"{ignored} {int(unknown.sum())} of {len(x)} rows, at the start of each run, are not used, because there the force "
-            "depends on how the rope lay before, which nobody knows."
+            "depends on how the rope lay before, which is not known."
         )
     if "end" not in settings.model_fields_set:
         remarks.append(

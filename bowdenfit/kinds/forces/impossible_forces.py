@@ -170,7 +170,7 @@ def check_following(table: ForceTable) -> None:
                 f"{table.origin.describe_row(rows[0])} and on: while {how}, output_force does not follow input_force, "
                 f"which goes from {force_in.min():.4g} to {force_in.max():.4g} N while the output is "
                 f"{force_out.mean():.4g} N give or take {force_out.std():.2g} N, "
-                "and of that the input explains little; a rope passes on more where more goes in. "
+                "and the input explains little of that; a rope transmits more force where more goes in. "
                 "The usual causes are a dead load cell, a column that is no force (a position, a time), and rows of one column "
                 "that belong beside others of the other; map the right columns in cable.toml, or leave these rows out."
             )

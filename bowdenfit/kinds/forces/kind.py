@@ -83,7 +83,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     )
     methods_sentence = "All readings of one mounting of the cable shared its error, which was integrated out."
     init_questions = InitQuestions(
-        "forces at both ends of the cable, a row a pair of readings",
+        "forces at both ends of the cable, one pair of readings a row",
         (
             WantedColumn(
                 Quantity("input_force", "force"), "the force at the motor", (Quantity("input_torque", "torque"),)
@@ -273,7 +273,7 @@ def _warn_of_single_mountings(table: ForceTable, description: Description) -> li
     if not once:
         return []
     return [
-        f"{listed(once)}: measured in one mounting of the cable{' each' if len(once) > 1 else ''}, so what that mounting did "
-        "cannot be told from what the group does, and intervals rest on the scatter of other mountings, or on its prior; mount "
-        "the cable anew a few times in each group."
+        f"{listed(once)}: measured in one mounting of the cable{' each' if len(once) > 1 else ''}, so the effect of that "
+        "mounting cannot be separated from that of the group, and intervals rest on the scatter of other mountings, or on its "
+        "prior; mount the cable anew a few times in each group."
     ]

@@ -95,10 +95,10 @@ def remark_on_reused_labels(
 def remark_on_one_row_runs(n_rows: int, file: str) -> str:
     """Return a remark on what it means that every row is a run of its own."""
     return (
-        f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows tell a "
-        "coefficient as surely as that many mountings do, and the scatter from mounting to mounting cannot be told from the "
-        "noise of the load cells unless that is stated. Where the cable in fact stayed mounted over several rows these share "
-        "what its mounting did, and intervals come out too narrow: give those rows one run."
+        f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows determine "
+        "a coefficient as precisely as that many mountings do, and the scatter from mounting to mounting cannot be separated "
+        "from the noise of the load cells unless that is stated. Where the cable in fact stayed mounted over several rows "
+        "these share the effect of its mounting, and intervals come out too narrow: give those rows one run."
     )
 
 
@@ -160,7 +160,7 @@ def read_groups(
         return names, []
     return names, [
         f"{file}: its column {shown(column.heading)} names {len(distinct)} groups ({few(distinct, _NAMED)}), which share their "
-        "friction coefficients; --friction by-group gives each its own, and bowdenfit compare tells which describes them."
+        "friction coefficients; --friction by-group gives each its own, and bowdenfit compare says which describes them better."
     ]
 
 

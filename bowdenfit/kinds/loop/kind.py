@@ -120,7 +120,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         table.faults.refuse()
         if not stroke.all():
             why = (
-                "a loop that is held still tells nothing but bounds; write pull (moving forward) or return, or leave the row "
+                "a loop that is held still gives only bounds; write pull (moving forward) or return, or leave the row "
                 "out."
             )
             raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
@@ -136,8 +136,8 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         ]
         if angles:
             remarks.append(
-                f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is left out of "
-                "account."
+                f"{table.file} has the column {shown(angles[0])}, which no contact in cable.toml reads; it is "
+                "ignored."
             )
         return TableFromFiles(made, {path.name: path}, tuple(remarks), (table.account,))
 
@@ -187,8 +187,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         known = stated or np.isfinite(table.preload).any()
         if not known and np.median(np.abs(table.output_force)) < _FREE * np.median(np.abs(table.input_force)):
             warnings.append(
-                f"nearly all of {table.origin.files[0]} was read in free motion, with hardly any output force; that tells only "
-                "the product of friction and preload: load the loop until its return side is slack, or measure the preload."
+                f"nearly all of {table.origin.files[0]} was read in free motion, with hardly any output force; that determines "
+                "only the product of friction and preload: load the loop until its return side is slack, or measure the "
+                "preload."
             )
         return warnings
 

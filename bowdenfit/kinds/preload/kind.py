@@ -115,8 +115,8 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
             )
         if lacks_stretch:
             warnings.append(
-                "without a table of stretch, preloads tell only how lengthening compares with the give of the rope; stiffness, "
-                "bedding-in and lengthening by themselves will rest on their priors."
+                "without a table of stretch, preloads determine only how lengthening compares with the give of the rope; "
+                "stiffness, bedding-in and lengthening by themselves will rest on their priors."
             )
         return warnings
 

@@ -33,7 +33,7 @@ _LOOP_NOTE = (
     "Samples are averaged over blocks; forward, between and back count blocks in which the loop moves forward, stands while "
     "the input force crosses the friction band, and moves back, moving those that lie safely inside a motion. The loss is "
     "the force that is lost while both sides are taut, 2 x preload x exponent, and the exponent is that of one side, both by "
-    "the recording itself; a dash where it does not tell them."
+    "the recording itself; a dash where it does not determine them."
 )
 
 
@@ -144,7 +144,7 @@ class RecordingKind(FrictionKind[Recordings]):
     )
     heading = "Recordings"
     methods_sentence = (
-        "Recordings were averaged over blocks, phases of sliding were told by a play operator, and all readings of one "
+        "Recordings were averaged over blocks, phases of sliding were identified by a play operator, and all readings of one "
         "mounting shared its error."
     )
     takes_channels = True
@@ -301,7 +301,7 @@ def _why_impossible(page: Preparation) -> str:
         )
     if isinstance(block, QuantityValue) and block.value <= 0:
         return (
-            f"prepare, block: {block.value:g} {block.unit} is no length of a block; write a positive "
+            f"prepare, block: {block.value:g} {block.unit} is not a possible length of a block; write a positive "
             'one, or block = "none" to average nothing'
         )
     return ""

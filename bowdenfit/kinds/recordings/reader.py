@@ -349,7 +349,7 @@ def _stated_angles(description: Description, entry: RecordingFile) -> tuple[np.n
     for name in entry.wrap_angles:
         if name not in columns:
             raise DescriptionError(
-                f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is no column of a contact's wrap angle"
+                f"cable.toml, recording {entry.file!r}, wrap_angles: {name!r} is not a column of a contact's wrap angle"
                 f"{suggest_name(name, columns)}"
             )
     stated = [entry.wrap_angles.get(name) for name in columns]

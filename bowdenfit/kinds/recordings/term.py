@@ -368,6 +368,6 @@ def refuse_saturated(recordings: Recordings) -> None:
         if recording.blocks.saturated.any():
             raise DatasetError(
                 f"{recording.file}: {int(recording.blocks.saturated.sum())} blocks of the recording {recording.name!r} are at "
-                "the end of a load cell's range, and what else would be clipped with another friction cannot be told from "
+                "the end of a load cell's range, and what else would be clipped with another friction cannot be known from "
                 "blocks; leave the recording out to calibrate."
             )

@@ -155,8 +155,8 @@ def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> 
     if seen_half_swings < _FEWEST_HALF_SWINGS:
         raise DatasetError(
             f"{called}: the joint turns round {seen_half_swings} times before it stands still, and fewer than "
-            f"{_FEWEST_HALF_SWINGS} do not tell damping from friction; pull it further before the release, or add inertia to "
-            "it (column added_inertia)."
+            f"{_FEWEST_HALF_SWINGS} do not separate damping from friction; pull it further before the release, or add inertia "
+            "to it (column added_inertia)."
         )
     step = float(np.median(np.diff(made.time[made.run == run])))
     if half < _FEWEST_A_HALF_SWING * step:
@@ -224,7 +224,8 @@ class RingDownKind(Kind[RingDownTable]):
         """
         if np.isnan(table.inertia) and len(np.unique(table.added)) < 2:
             raise DatasetError(
-                f"{table.origin.files[0]}: a ring-down tells stiffness and damping in proportion to the inertia of what "
+                f"{table.origin.files[0]}: a ring-down determines stiffness and damping only in proportion to the inertia of "
+                "what "
                 'swings, which is not known. State it under [tables], ringdown = { file = "...", inertia = { value = 1.0e-3, '
                 'sd = 5e-5, unit = "kg*m^2" } }, or record a second ring-down with a known inertia added to the joint (columns '
                 "run and added_inertia)."

@@ -107,7 +107,7 @@ def _read_branches(column: Column | None, n_rows: int) -> Flags:
 def _read_branch(cell: Cell) -> bool:
     text = cell.text.strip().lower()
     if text not in _BRANCHES:
-        seen = "the cell is blank" if cell.blank else f"{cell.shown} is no branch"
+        seen = "the cell is blank" if cell.blank else f"{cell.shown} is not a branch"
         raise cell.refuse(f"{seen}; write load (while the load grows) or unload (while it falls).")
     return _BRANCHES[text]
 
@@ -220,7 +220,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
             )
         elif len(loads) < _FEWEST_LOADS:
             warnings.append(
-                f"{file} has {len(loads)} different loads, too few to tell stiffness from bedding-in; read the stretch at "
+                f"{file} has {len(loads)} different loads, too few to separate stiffness from bedding-in; read the stretch at "
                 f"{_FEWEST_LOADS} or more, some of them low."
             )
         elif loads[0] > _LOW * loads[-1]:
@@ -242,7 +242,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
             )
         if not table.wrap_angle.any():
             warnings.append(
-                f"every row of {file} is at a wrap angle of 0, so it says nothing of friction; read at larger ones too."
+                f"every row of {file} is at a wrap angle of 0, so it says nothing about friction; read at larger ones too."
             )
         return warnings + warn_of_single_angle(measurements)
 

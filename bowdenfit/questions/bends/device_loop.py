@@ -161,7 +161,7 @@ def _mounting_scatter(fit: Record, device: Device | None) -> tuple[float, bool]:
         return _typical_value(fit, RUN_SCATTER), True
     if device is None or not device.states(SCATTER):
         raise missing_settings(
-            "this fit has one mounting of the cable and cannot tell how the next one will differ; what is safe in the next",
+            "this fit has one mounting of the cable and cannot say how the next one will differ; what is safe in the next",
             [SCATTER],
         )
     return device.known(SCATTER)[SCATTER].value, False
@@ -180,7 +180,7 @@ def _joint_stiffness(
         fitted = np.repeat(np.maximum(known.value + known.sd * noise, known.value / 100)[:, None], shape[1], axis=1)
     elif STIFFNESS in stated:
         raise DescriptionError(
-            f"device.toml, {STIFFNESS}: this fit tells it already, from its table of stretch under load; leave it out."
+            f"device.toml, {STIFFNESS}: this fit determines it already, from its table of stretch under load; leave it out."
         )
     if SPRING not in stated:
         return fitted
@@ -211,7 +211,7 @@ def read_bends(fit: Record, stated: str | tuple[tuple[float, str], tuple[float, 
         ends = np.rad2deg([low, high, measured[0], measured[-1]])
         raise UsageError(
             f"--wrap-angle {ends[0]:.4g}deg:{ends[1]:.4g}deg leaves the wrap angles measured, {ends[2]:.4g} to {ends[3]:.4g} "
-            "deg, and nobody knows the friction there; measure there too, or name a narrower range."
+            "deg, and the friction there is not known; measure there too, or name a narrower range."
         )
     return np.linspace(low, high, BENDS) if high > low else np.array([low])
 
@@ -266,7 +266,7 @@ def read_device_with_ring_down(fit: Record, path: Path) -> Device:
     source = f"{RINGDOWN} names" if results else "the fit itself has"
     if device.states(DAMPING):
         raise DescriptionError(
-            f"device.toml, {DAMPING}: {source} a ring-down, which tells it already; leave one of the two out."
+            f"device.toml, {DAMPING}: {source} a ring-down, which determines it already; leave one of the two out."
         )
     ring_down = fit if results is None else load(results)
     if ring_down.dataset.measurements.table(RingDownTable) is None:
@@ -285,7 +285,7 @@ def read_device_with_ring_down(fit: Record, path: Path) -> Device:
 def _known_from_ring_down(ring_down: Record, device: Device) -> dict[str, Known]:
     """Return the damping of the rope, and the inertia of the joint where the device does not say it."""
     joint = device.needed(
-        "the damping of the rope, which a ring-down tells together with that of the joint,", JOINT_DAMPING
+        "the damping of the rope, which a ring-down determines together with that of the joint,", JOINT_DAMPING
     )[JOINT_DAMPING]
     total = _pick_draws(ring_down, "rope_damping")
     middle = float(np.median(total)) - joint.value

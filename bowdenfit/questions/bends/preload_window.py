@@ -44,9 +44,8 @@ class PreloadWindow(Display):
         """Which preload to set."""
         low, high = (f"{angle:.4g}" for angle in self.bends)
         return (
-            f"Preload it with {significant(self.best)} N{self._at}: that is felt least of those that keep the cable taut "
-            f"from {low} to "
-            f"{high} deg."
+            f"Set the preload to {significant(self.best)} N{self._at}: of the preloads that keep the cable taut from {low} to "
+            f"{high} deg it is felt least."
         )
 
     @property
@@ -72,10 +71,10 @@ class PreloadWindow(Display):
         lowest, least, most = map(significant, (self.lowest.median, self.lowest.q05, self.lowest.q95))
         felt, low_felt, high_felt = map(significant, (self.felt.median, self.felt.q05, self.felt.q95))
         parts = [
-            f"Over bends from {low} to {high} deg{under} the cable stays taut from a preload of {lowest} N{at} on "
-            f"(90 % interval {least} to {most} N). Least friction is felt without slack, with "
-            f"{percent(TAUT, 0)} probability, at {best} N: then free motion takes {felt} {unit} "
-            f"({low_felt} to {high_felt}) at the bend where it is most."
+            f"Over bends from {low} to {high} deg{under} the cable stays taut if its preload is at least {lowest} N{at} "
+            f"(90 % interval {least} to {most} N). The least friction without slack, with {percent(TAUT, 0)} probability, is "
+            f"felt at {best} N: then free motion takes {felt} {unit} ({low_felt} to {high_felt}) at the bend where it takes "
+            "most."
         ]
         if self.highest is not None:
             parts.append(

@@ -1,4 +1,4 @@
-"""Simulation-based calibration: do posterior intervals of a description hold the truth as often as they say?
+"""Simulation-based calibration: do posterior intervals of a description contain the truth as often as they claim?
 
 Truth is drawn from the prior, tables are simulated with it and fitted; over many of these replications the rank of the truth
 among the draws is uniform if prior, likelihood and sampler are what they claim to be. Truths may be stated instead: then

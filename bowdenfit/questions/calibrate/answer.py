@@ -1,4 +1,4 @@
-"""The answer of a calibration: which intervals hold the truth as often as they claim, and which way others are wrong."""
+"""The answer of a calibration: which intervals contain the truth as often as they claim, and which way others are wrong."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -87,7 +87,7 @@ class CheckedQuantity:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether its ranks are uniform and its intervals hold the truth as often as they claim, as far as it is judged."""
+        """Whether its ranks are uniform and its intervals contain the truth as often as they claim, as far as it is judged."""
         if not self.judged_by:
             return True
         return (self.corrected >= LEVEL or self.judged_by == "coverage") and all(e.within for e in self.coverage)
@@ -103,11 +103,13 @@ class CheckedQuantity:
             faults.append(f"estimated too {'high' if self.bias > 0 else 'low'}")
         if any(interval.rate < interval.low for interval in self.coverage):
             faults.append(
-                f"intervals too narrow ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
+                f"intervals too narrow ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} intervals contain "
+                "the true value)"
             )
         elif any(interval.rate > interval.high for interval in self.coverage):
             faults.append(
-                f"intervals too wide ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} ones hold the truth)"
+                f"intervals too wide ({percent(widest.rate, 0)} of the {percent(widest.probability, 0)} intervals contain the "
+                "true value)"
             )
         return " and ".join(faults) or "ranks are not uniform"
 

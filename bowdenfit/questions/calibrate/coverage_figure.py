@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.calibrate.answer import Calibration
 
-HEADING = "How often intervals hold the truth"
+HEADING = "Coverage of the intervals: how often they contain the true value"
 _ROW = 0.24  # in, of a quantity
 _LONGEST = 2.0  # in, of a name
 _MARK = 0.2  # in, from a name to the panel and to the edge of the page
@@ -46,7 +46,7 @@ def draw(calibration: Calibration) -> Figure:
             axes.plot(100 * coverage.rate, i, "o" if coverage.within else "X", color=color, label=label)
         claimed = 100 * calibration.quantities[0].coverage[k].probability
         axes.axvline(claimed, color=GRAY, lw=0.8)
-        axes.set_xlabel(f"{claimed:.0f} % intervals that hold the truth (%)")
+        axes.set_xlabel(f"{claimed:.0f} % intervals that contain the truth (%)")
     legend_above(figure, flat, 3)
     return figure
 

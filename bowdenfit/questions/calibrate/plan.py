@@ -168,7 +168,7 @@ def parse_truths(page: Mapping[str, Any], space: ParameterSpace, file: str) -> t
     parameters = {p.name: p for p in space.parameters}
     for name in page:
         if name not in parameters:
-            raise UsageError(f"{file}: {shown(name)} is no parameter of this cable{suggest_name(name, list(parameters))}")
+            raise UsageError(f"{file}: {shown(name)} is not a parameter of this cable{suggest_name(name, list(parameters))}")
         if parameters[name].fixed is not None:
             raise UsageError(f"{file}: {name} is fixed in cable.toml, so there is no truth to look for; leave it out.")
     return tuple(_parse_truth(parameters[name], value, f"{file}, {name}") for name, value in page.items())

@@ -1,4 +1,4 @@
-"""Asking whether the intervals of a description hold the truth as often as they say."""
+"""Asking whether the intervals of a description contain the truth as often as they claim."""
 
 import secrets
 from collections.abc import Callable, Sequence
@@ -43,7 +43,7 @@ def calibrate(
     progress: Annotated[Report | None, HIDDEN] = None,
     **reading: Unpack[Reading],
 ) -> "Calibration":
-    """Simulation-based calibration: whether intervals of this description hold the truth as often as they claim.
+    """Simulation-based calibration: whether intervals of this description contain the truth as often as they claim.
 
     True values are drawn from the priors, tables of the same shape are simulated with them and fitted, and the truth is
     ranked among the draws. Priors that look at the data are those of the data set as measured. Every replication is kept.
@@ -120,12 +120,12 @@ WATCH = Watch(REPLICATIONS, "what is done is kept in", {"unit": "replication", "
 VERB = Verb(
     calibrate,
     _reply,
-    """Test whether intervals hold the truth as often as they say.
+    """Test whether intervals contain the truth as often as they claim.
 
     This is simulation-based calibration of DATASET, of this very description and
     for tables like these. Again and again, true values are drawn from the priors,
     tables like the measured ones (the same lengths, runs, loads and wrap angles)
-    are simulated with them and fitted. Then intervals must hold the truth as often
+    are simulated with them and fitted. Then intervals must contain the truth as often
     as they claim, for every parameter, the optimal length and the efficiency there.
     What was measured enters only by the design.
 

@@ -108,18 +108,18 @@ def describe_procedure(calibration: Calibration) -> str:
 
 
 def verdict_sentences(calibration: Calibration) -> list[str]:
-    """Say whether intervals hold the truth as often as they claim, and which do not."""
+    """Say whether intervals contain the truth as often as they claim, and which do not."""
     if not calibration.is_conclusive:
         few = f"at least {MIN_REPLICATIONS} replications must converge, and at most {percent(MAX_UNCONVERGED, 0)} may fail to"
         return [f"NOT JUDGED: {calibration.ranked} of {calibration.replications} replications converged; {few}."]
     whose = "intervals of the coefficients and of the optimum" if calibration.truths else "intervals"
     if calibration.is_calibrated:
         return [
-            f"CALIBRATED: for this description and these tables, {whose} hold the truth as often as they claim, as far as "
-            f"{calibration.ranked} replications can tell.",
+            f"CALIBRATED: for this description and these tables, {whose} contain the truth as often as they claim, as far as "
+            f"{calibration.ranked} replications can show.",
             _power_sentence(calibration),
         ]
-    lines = ["NOT CALIBRATED: some intervals do not hold the truth as often as they claim."]
+    lines = ["NOT CALIBRATED: some intervals do not contain the truth as often as they claim."]
     return [
         *lines,
         *(f"- {name}: {fault}." for name, fault in calibration.faults.items()),
@@ -147,7 +147,7 @@ def quantity_note(calibration: Calibration) -> str:
         [f"{percent(c.low, 0)} and {percent(c.high, 0)} of the {percent(c.probability, 0)} intervals" for c in first]
     )
     note = (
-        "Held: share of the intervals that hold the truth; by chance alone all "
+        "Held: share of the intervals that contain the truth; by chance alone all "
         f"{'judged ' if calibration.truths else ''}quantities "
         f"lie between {bands} in {percent(1 - LEVEL, 0)} of calibrations. "
     )

@@ -29,7 +29,7 @@ def describe_impossible_efficiencies(fit: Record) -> str:
     if not impossible:
         return ""
     return (
-        f"No rope passes on more force than goes in, but these readings say so beyond their noise: {few(impossible)}. "
+        f"No rope transmits more force than goes in, but these readings say so beyond their noise: {few(impossible)}. "
         "The usual causes are swapped columns or channels, pull and return exchanged, a unit, or a channel that is no "
         "force: look at these with `bowdenfit check`."
     )

@@ -83,9 +83,9 @@ def _describe_far_readings(fit: Record, noise: str) -> tuple[str, ...]:
 def _far_reading_sentence(names: Sequence[str]) -> str:
     """Return the sentence about readings far outside what chance does."""
     return (
-        f"The model does not describe {few(names, _MAX_NAMED)}: so far out that chance does it in less than one healthy "
-        f"fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise student, "
-        "or leave it out and say so."
+        f"The model does not describe {few(names, _MAX_NAMED)}: so far off that it happens by chance in less than one "
+        f"healthy fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise "
+        "student, or leave it out and say so."
     )
 
 
@@ -99,8 +99,8 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
     where = _where_low_and_high(departure, fit.model.cable.friction.conditions.groups)
     return (
-        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; chance "
-        f"does as much in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
+        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; by "
+        f"chance as much happens in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
     )
 
 
@@ -110,9 +110,9 @@ def _describe_drift(departure: Departure) -> str:
     return (
         f"The model does not describe {find_readings(departure.table).words}: the zero of the output drifts, by about "
         f"{significant(abs(departure.high - departure.low), 2)} N from the start of a recording to its end (or that of the "
-        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; chance "
-        f"does as much in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; leave out the "
-        "part in which the zero moves."
+        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; by "
+        f"chance as much happens in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; "
+        "leave out the part in which the zero moves."
     )
 
 
@@ -166,7 +166,7 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "Friction alone grows with the bend from nothing: the usual causes are a bend that nobody measured, at the ends of "
             "the sheath or between them (a [[contact]] of its own), angles that were read from another zero, and load cells "
             "that differ in gain (state input_gain_error_sd and output_gain_error_sd under [sensors]). A run with the cable "
-            "as straight as it gets tells most."
+            "as straight as it gets is the most informative."
         )
     if departure.against == ORDER:
         return (
@@ -182,7 +182,7 @@ def _suggest_friction(model: str, options: tuple[str, ...], otherwise: str) -> s
     if not missing:
         return f"The friction model has {model} already, so look at {otherwise}."
     flags = " or ".join(f"--friction {option}" for option in missing)
-    return f"Fit again with {flags} (bowdenfit compare tells which), and look at {otherwise}."
+    return f"Fit again with {flags} (bowdenfit compare says which), and look at {otherwise}."
 
 
 def _suggest_curve(fit: Record, column: str) -> str:

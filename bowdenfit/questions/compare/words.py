@@ -96,8 +96,8 @@ def verdict_sentences(comparison: Comparison) -> list[str]:
         )
         noun = "the difference is" if len(undecided) == 1 else "the differences are"
         lines.append(
-            f"The data cannot tell {best} from {listed(undecided)}: {noun} within what chance gives ({size}). Prefer the "
-            "simpler one."
+            f"The data cannot distinguish {best} from {listed(undecided)}: {noun} within what chance gives ({size}). Prefer "
+            "the simpler one."
         )
     return lines + [_trust_sentence(comparison, name) for name in comparison.differences if name in comparison.troubles]
 
@@ -120,7 +120,7 @@ def _preference_sentence(comparison: Comparison, name: str) -> str:
 def _leaning_sentence(comparison: Comparison, name: str) -> str:
     n = len(comparison.readings)
     return (
-        f"The data lean towards {comparison.best} over {name} ({_describe_difference(comparison, name)}), but with {n} "
+        f"The data favor {comparison.best} over {name} ({_describe_difference(comparison, name)}), but with {n} "
         "readings the "
         f"standard error is itself uncertain and tends to be too small: not proof.{_name_dominating_reading(comparison, name)}"
     )
@@ -163,7 +163,7 @@ def basis_sentences(comparison: Comparison) -> list[str]:
         "probable the readings were: 2.3 less is ten times less probable. The "
         "weights make the mixture of the models that predicts best"
         + (
-            "; where the data cannot tell, they follow chance, and even 0 rules no model out."
+            "; where the data cannot distinguish models, they follow chance, and even 0 excludes no model."
             if "open" in verdicts
             else "."
         )

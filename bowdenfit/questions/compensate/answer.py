@@ -55,7 +55,7 @@ class FeedbackGain(Part):
     """Gain K_f on the torque measured at the joint.
 
     Args:
-        safe: Largest gain with which the loop oscillates with at most the risk, hands off or on [1].
+        safe: Largest gain with which the loop oscillates with at most the risk, with a hand on it or without [1].
         stable: Largest gain that does not oscillate, by draw [1].
         passive: Largest gain with which no passive hand can make it oscillate, at that risk [1].
         with_hand: Whether a hand that is described counts, too.

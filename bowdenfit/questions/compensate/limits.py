@@ -72,7 +72,7 @@ def parse_risk(risk: tuple[float, str] | None) -> float:
 def estimate_feedback_gain(
     fit: Record, device: Device, loop: LoopDraws, friction: np.ndarray, risk: float
 ) -> FeedbackGain:
-    """Estimate the largest gain, hands off and on.
+    """Estimate the largest gain, without a hand on the device and with one.
 
     Args:
         fit: The fit.

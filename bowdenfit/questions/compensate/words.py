@@ -85,7 +85,7 @@ def _mounting_sentence(answer: Compensation, scheduled: FeedForward) -> str:
         seem = "that hardly matters here"
     else:
         seem = f"without it {answer.share_without_scatter:.2f} would seem safe, and is not"
-    return f"Friction scatters from mounting to mounting by {answer.scatter:.2g} of its exponent ({source}); {seem}."
+    return f"The friction exponent scatters from mounting to mounting by {answer.scatter:.2g} of itself ({source}); {seem}."
 
 
 def _feedback_sentences(answer: Compensation) -> Iterator[str]:
@@ -94,8 +94,9 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
         return
     if gain.safe <= 0:
         yield (
-            "No gain on the measured torque is safe: some devices that fit what is known oscillate with the least of them. "
-            f"What decides is {gain.decided_by}; {_describe_remedy(gain)}, and damp the rope{_describe_integral_remedy(gain)}."
+            "No gain on the measured torque is safe: some devices that agree with what is known oscillate even at the "
+            f"smallest. The quantity that decides is {gain.decided_by}; {_describe_remedy(gain)}, and damp the "
+            f"rope{_describe_integral_remedy(gain)}."
         )
         return
     most = "10000 or more" if gain.safe >= 9999 else f"at most {gain.safe:.2g}"
@@ -105,8 +106,8 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
         fades = f", which fades by two thirds in {(1 + gain.safe) / gain.integral:.2g} s of motion one way"
     yield (
         f"Feed back {most} times the torque measured at the joint{beside}: with at most {percent(answer.risk, 0)} probability "
-        f"it then oscillates, {'hands off or on' if gain.with_hand else 'hands off'}. That leaves "
-        f"{format_torque(gain.left.median)} to feel{fades}. {_passivity_sentence(gain)} The largest gain is "
+        f"it then oscillates, {'with a hand on the device or without' if gain.with_hand else 'without a hand on the device'}. "
+        f"That leaves {format_torque(gain.left.median)} to feel{fades}. {_passivity_sentence(gain)} The largest gain is "
         f"{gain.stable.q05:.2g} to {gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of that "
         f"depends on {gain.decided_by}: "
         f"{_describe_remedy(gain)}."
@@ -144,7 +145,8 @@ def _caution_sentences(answer: Compensation) -> Iterator[str]:
     if answer.slack > _LIKELY_SLACK:
         yield (
             f"Caution: at rest the loop is slack somewhere {_range(answer)} with {percent(answer.slack, 0)} probability; there "
-            "it has no friction to hide, and does not follow at once. Preload it more, or narrow the range with --wrap-angle."
+            "it has no friction to hide, and does not follow at once. Increase the preload, or narrow the range with "
+            "--wrap-angle."
         )
 
 
@@ -155,7 +157,7 @@ def _preload_sentence(answer: Compensation) -> str:
         return ""
     least, own = taut[0], min(answer.preloads, key=lambda row: abs(row.preload - _find_own_preload(answer)))
     if least.preload >= own.preload:
-        return f"Less preload than its {own.preload:.3g} N would be felt less, but the loop could be slack at rest."
+        return f"Less preload than {own.preload:.3g} N would mean less friction to feel, but the loop could be slack at rest."
     return (
         f"Preloaded with {least.preload:.3g} N instead of {own.preload:.3g} N the loop is felt as "
         f"{format_torque(least.friction.median)} instead of {format_torque(own.friction.median)}, but one side is slack from "
@@ -171,7 +173,7 @@ def _find_own_preload(answer: Compensation) -> float:
 def _missing_sentences(answer: Compensation) -> Iterator[str]:
     if not answer.device:
         yield (
-            "Friction of the motor and damping, which would allow more, count as nothing: name a device.toml that says them "
+            "Friction of the motor and damping, which would allow more, are taken as zero: name a device.toml that says them "
             "with --device."
         )
     if answer.missing:

@@ -156,7 +156,7 @@ class TransmissionTables:
         sentences = [
             f"Cable: {about.cable} ({kind})." + (f" Group: {about.group}." if about.group else ""),
             f"Fitted by bowdenfit {about.version}, seed {about.seed}, {about.created or 'date unknown'}.",
-            f"Range: {self.points.words}. Outside it the nearest end counts, and a flag tells.",
+            f"Range: {self.points.words}. Outside it the value at the nearest end is used, and a flag says so.",
             *(f"Measured: {words}." for words in about.measured),
             f"Levels: {', '.join(LEVELS)} of friction" + (f", and {n} draws." if n else "."),
         ]

@@ -89,8 +89,8 @@ VERB = Verb(
               cables drawn from the posterior
 
     Every file says which fit it was written from, with which seed and version, and
-    over which range it holds. Outside that range the nearest end counts, and a flag
-    tells.
+    over which range it holds. Outside that range the value at the nearest end is
+    used, and a flag says so.
     """,
     warns=True,
 )

@@ -125,7 +125,7 @@ def refuse_compensation(to: str) -> None:
     """
     if to != "yaml":
         raise UsageError(
-            f"--device is asked of yaml; {NAMES[to]} tells of the cable alone. Leave it out, or write --to yaml."
+            f"--device is for yaml only; {NAMES[to]} describes the cable alone. Leave it out, or write --to yaml."
         )
 
 

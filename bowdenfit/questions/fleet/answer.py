@@ -197,7 +197,7 @@ def _method_sentences(fleet: Fleet) -> list[str]:
     unknown = sum(math.isnan(inspection.cycles) for inspection in fleet.fitted)
     if unknown:
         some = counted(unknown, "inspection")
-        lines.append(f"Of {some} nobody says after how many cycles, so nothing follows from them on wear.")
+        lines.append(f"Nothing about wear follows from {some} without a stated number of cycles.")
     if len(fleet.cables) == 1:
         lines.append("It is one cable only, so there is no population to compare it with.")
     return lines

@@ -68,7 +68,7 @@ def read_inspections(folder: Path) -> list[Inspection]:
     """
     refuse_special(folder)
     if not folder.is_dir():
-        raise UsageError(f"{folder} is no folder; name the one with {FLEET_TABLE}, or with a folder for each cable.")
+        raise UsageError(f"{folder} is not a folder; name the one with {FLEET_TABLE}, or with a folder for each cable.")
     table = folder / FLEET_TABLE
     inspections = _read_inspection_table(table) if table.exists() else _list_inspections(folder)
     order = {cable: i for i, cable in enumerate(sorted({inspection.cable for inspection in inspections}))}
@@ -103,7 +103,7 @@ def _parse_folder_name(path: Path) -> float:
         cycles = UNKNOWN
     if not (math.isfinite(cycles) and cycles >= 0):
         raise DatasetError(
-            f"{path} is no number of cycles, which the folder of an inspection is called by, such as "
+            f"{path} is not a number of cycles, which the folder of an inspection is called by, such as "
             f"{path.parent.name}/25000; rename it, or write {FLEET_TABLE}."
         )
     return cycles
@@ -175,7 +175,7 @@ def _parse_temperatures(table: RawTable, columns: dict[str, Column]) -> list[flo
     def read(cell: Cell) -> float:
         value = UNKNOWN if cell.blank else cell.number() + _TEMPERATURES[headings[0]]
         if value < _COLDEST or value > _HOTTEST:
-            raise cell.refuse(f"{cell.shown} is no temperature at which a cable is inspected; correct it, or its unit.")
+            raise cell.refuse(f"{cell.shown} is not a temperature at which a cable is inspected; correct it, or its unit.")
         return value
 
     return columns[headings[0]].read_cells(read, UNKNOWN) if headings else []
@@ -188,7 +188,7 @@ def _refuse_duplicates(numbered: Sequence[tuple[Inspection, str]]) -> None:
         if inspection.label in seen:
             missing = "" if math.isfinite(inspection.cycles) else " without a number of cycles"
             raise DatasetError(
-                f"{inspection.label} stands twice{missing}: {seen[inspection.label]} and {where}. The usual cause is a row "
+                f"{inspection.label} appears twice{missing}: {seen[inspection.label]} and {where}. The usual cause is a row "
                 "that was copied; delete one, correct the cycles, or put the readings of both into one table."
             )
         seen[inspection.label] = where

@@ -134,8 +134,8 @@ def identifiability_text(result: Identifiability) -> str:
     blocks.append(legend({name: what for name, what in result.meanings.items() if name in named}))
     blocks.append(
         filled(
-            f"Judged at {result.basis}. ± is one standard deviation, now and before anything was measured; told by: who "
-            "settles the value, and how much of what was open before."
+            f"Judged at {result.basis}. ± is one standard deviation, now and before anything was measured (the prior); "
+            "determined by: whether the measurements or the prior determine the value, with their share of the prior variance."
         )
     )
     return "\n\n".join(block for block in blocks if block) + "\n"
@@ -143,7 +143,7 @@ def identifiability_text(result: Identifiability) -> str:
 
 def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, str]) -> str:
     """Return the parameters of a group in a table, and which are hard to tell apart."""
-    heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "told by")
+    heads: tuple[str, ...] = ("", "value", "known to", "before", "unit", "determined by")
     unit = {p.name: units.get(p.name, "1") for p in group.parameters}
     rows: list[tuple[str, ...]] = [
         (p.name, *_format_numbers(p), "" if unit[p.name] == "1" else unit[p.name], _describe_source(p.share))
@@ -151,12 +151,12 @@ def _parameter_table(name: str, group: CovarianceAnalysis, units: Mapping[str, s
     ]
     if set(unit.values()) <= {"1"}:
         heads, rows = (*heads[:4], *heads[5:]), [(*row[:4], *row[5:]) for row in rows]
-    text = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "told by"))
+    text = f"{name[0].upper() + name[1:]}, one by one\n" + narrow_table(heads, rows, left=("unit", "determined by"))
     correlated = [sorted((p.name, p.most_correlated)) for p in group.parameters if abs(p.correlation) > _CORRELATED]
     pairs = [f"{first} and {second}" for first, second in dict.fromkeys(map(tuple, correlated))]
     if len(group.parameters) > 1 and not group.collinearity < _COLLINEAR:
         pairs = [*pairs, "all of them together"]
-    return "\n".join([text, filled(f"Hard to tell apart: {'; '.join(pairs)}.")]) if pairs else text
+    return "\n".join([text, filled(f"Strongly correlated, hard to separate: {'; '.join(pairs)}.")]) if pairs else text
 
 
 def _format_numbers(p: ParameterContraction) -> tuple[str, str, str]:
@@ -169,7 +169,7 @@ def _describe_source(share: float) -> str:
     """Describe what determines a value: measurements, its prior, or both."""
     if share < IDENTIFIABLE:
         return f"measurements ({percent(1 - share, 0)})"
-    return f"assumption ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (assumption {percent(share, 0)})"
+    return f"prior ({percent(share, 0)})" if share > PRIOR_DOMINATED else f"both (prior {percent(share, 0)})"
 
 
 def _combination_table(group: CovarianceAnalysis) -> str:

@@ -172,7 +172,7 @@ def _unidentified_sentence(names: list[str], combination: Combination | None, ho
     them = listed(names)
     if combination is not None:
         precision = describe_precision(combination)
-        sentence = f"The measurements do not tell {them} apart: what they determine is {combination.words}, {precision}"
+        sentence = f"The measurements do not separate {them}: what they determine is {combination.words}, {precision}"
     else:
         sentence = f"The measurements do not determine {them}"
     remark = "rest on their priors" if len(names) > 1 else "rests on its prior"
@@ -221,9 +221,9 @@ class ConfoundedPair:
         """Return the pair and its combination in a sentence."""
         digits = int(np.clip(1 - np.floor(np.log10(max(self.sd, 1e-12))), 0, 8))
         return (
-            f"The measurements hardly tell {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); what "
-            f"they do determine is {self.combination} = {self.mean:z.{digits}f} ± {self.sd:z.{digits}f}, while {self.first} "
-            f"alone is known to ± {significant(self.first_sd, 2)}."
+            f"The measurements hardly separate {self.first} and {self.second} apart (correlation {self.correlation:+.2f}); "
+            f"what they do determine is {self.combination} = {self.mean:z.{digits}f} ± {self.sd:z.{digits}f}, while "
+            f"{self.first} alone is known to ± {significant(self.first_sd, 2)}."
         )
 
 

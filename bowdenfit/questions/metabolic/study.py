@@ -116,18 +116,18 @@ def _refuse_incomplete(study: Study, file: str) -> None:
     names = [difference.name for difference in study.condition]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise DescriptionError(f"{file}: the condition {twice!r} stands twice; delete one.")
+        raise DescriptionError(f"{file}: the condition {twice!r} appears twice; delete one.")
     for difference in study.difference:
         unknown = next((name for name in (difference.condition, difference.less) if name not in names), None)
         if unknown is not None:
             raise DescriptionError(f"{file}: a difference is of {unknown!r}, which no condition is called; correct the name.")
     if study.persons is None:
-        raise DescriptionError(f"{file}: nobody says how many persons walked; write persons = 5, or name their table.")
+        raise DescriptionError(f"{file}: the number of persons is missing; write persons = 5, or name their table.")
     if len(names) < 2 or not study.difference:
         raise DescriptionError(f"{file}: nothing can be compared; write two [[condition]] and a [[difference]], or a table.")
     for difference in study.difference:
         if difference.p is not None and not 0 < float(difference.p) < 1:
-            raise DescriptionError(f"{file}: p = {difference.p} is no probability between 0 and 1; correct it.")
+            raise DescriptionError(f"{file}: p = {difference.p} is not a probability between 0 and 1; correct it.")
 
 
 def _read_costs(study: Study, path: Path) -> MetabolicCosts:
@@ -146,7 +146,7 @@ def _read_costs(study: Study, path: Path) -> MetabolicCosts:
         cells = {name: row[columns[name]] for name in needed}
         person, condition = cells["person"].text.strip(), cells["condition"].text.strip()
         if (person, condition) in costs:
-            raise cells["person"].refuse(f"{person} stands twice for {condition}; give each person one row a condition.")
+            raise cells["person"].refuse(f"{person} appears twice for {condition}; give each person one row a condition.")
         numbers = [cells[name].number() for name in needed[2:]]
         if not all(map(math.isfinite, numbers)) or (len(numbers) > 1 and min(numbers) <= 0):
             raise cells[needed[2]].refuse("a number here is blank, or not above 0; correct it, or leave the row out.")
@@ -163,7 +163,8 @@ def _read_costs(study: Study, path: Path) -> MetabolicCosts:
         gross = np.delete(gross - gross[:, [resting]], resting, axis=1)
         conditions = tuple(name for name in conditions if name != study.rest)
     if len(persons) < 2 or len(conditions) < 2:
-        raise DatasetError(f"{table.file} has {len(persons)} persons and {len(conditions)} conditions; it takes two of each.")
+        counts = f"{len(persons)} persons and {len(conditions)} conditions"
+        raise DatasetError(f"{table.file} has {counts}; at least two of each are needed.")
     return MetabolicCosts(persons, conditions, gross)
 
 

@@ -49,7 +49,7 @@ def _suggest_alternative(fit: Record) -> str:
     ]
     if can:
         return f"name others with --candidate, such as {' or '.join(can)}"
-    return "bowdenfit identify says what is known least, and measuring at other bends tells more of most coefficients"
+    return "bowdenfit identify says what is known least, and measuring at other bends helps most coefficients"
 
 
 def example_name(fit: Record, kind: CandidateKind) -> str:
@@ -87,7 +87,7 @@ def why_unsuitable(fit: Record, candidate: Candidate) -> str:
     if low <= candidate.route <= high or stands_in:
         return ""
     why = (
-        "an angle there tells nothing of the curves"
+        "an angle there says nothing about the curves"
         if kind.measures_curves
         else "no angles were measured there that could stand in"
     )
@@ -161,7 +161,7 @@ def _add_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str,
         value, unit = float(match[1]) if match else float("nan"), match[2] if match else ""
         if np.isnan(value):
             strokes = f", nor a stroke, {' or '.join(_STROKES)}" if has_designs else ""
-            raise ValueError(f"{part!r} is no number with its unit{strokes}")
+            raise ValueError(f"{part!r} is not a number with its unit{strokes}")
         along = route is not None and kind.along_route and np.isnan(candidate.route)
         kind_of_unit = dimension_of(unit) if unit else ""
         if along and route is not None and (not unit or kind_of_unit == dimension_of(route.unit)):
@@ -172,7 +172,7 @@ def _add_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str,
             return replace(candidate, angles=(*candidate.angles, value * conversion_factor(unit, "angle")))
     except (ValueError, DatasetError) as error:
         raise UsageError(f"--candidate {text!r}: {error}.") from None
-    units = f", with units where it is no {route_variable(fit)}" if route is not None and kind.along_route else ""
+    units = f", with units where it is not a {route_variable(fit)}" if route is not None and kind.along_route else ""
     raise UsageError(
         f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example_name(fit, kind)}{units}."
     )

@@ -198,7 +198,7 @@ def _check_costs(chosen: Sequence[Candidate], costs: Mapping[str, float] | None)
         if kind not in kinds:
             raise UsageError(f"--cost {kind}={cost:g}: no candidate is of this kind{suggest_name(kind, kinds)}")
         if not (np.isfinite(cost) and cost > 0):
-            raise UsageError(f"--cost {kind}={cost:g} is no cost; write a positive number, such as {kind}=2.")
+            raise UsageError(f"--cost {kind}={cost:g} is not a cost; write a positive number, such as {kind}=2.")
     missing = [kind for kind in kinds if kind not in costs]
     if missing:
         raise UsageError(

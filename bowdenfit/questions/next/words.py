@@ -77,7 +77,7 @@ def _advice_sentences(ranking: NextMeasurement) -> list[str]:
             f"None of these measurements would narrow {answer.words} noticeably: it is known to "
             f"{_format_sd(ranking, answer.sd)}, and "
             f"to {_format_sd(ranking, first.sd)} after the best of them, {first.words}.",
-            "One more reading of a kind that has been measured many times adds little; name another kind with --candidate, or "
+            "One more reading of a kind that was measured many times adds little; name another kind with --candidate, or "
             "ask for another answer with --for.",
         ]
     per_cost = " for its cost" if best.cost is not None else ""

@@ -160,7 +160,7 @@ class Pool(Display):
         inspections: How many are pooled.
         left_out: Those that are not.
         coefficients: Of a new cable of this population, dry and at the reference temperature; its scatter is in it. Cables that
-            are unlike the rest are not in the population.
+            are outliers are not in the population.
         typical: Of the middle of the population, by name.
         spreads: Standard deviation of log coefficients between cables, by name, and of the wear under "wear".
         wear: In the reference cycles, of the middle of the population; None where it cannot be told.
@@ -172,7 +172,7 @@ class Pool(Display):
         mixtures: Coefficients of which cables do not look like one population, with the probability of that by chance.
         curves: What is drawn over cycles; None where wear cannot be told.
         next_inspections: The inspections that tell most, the best first.
-        notes: What is not told and why, and what was taken for granted, a sentence each.
+        notes: What is not estimated and why, and what was taken for granted, a sentence each.
         reasons: Why the answer should not be trusted; empty if it may.
         seed: Of everything random.
     """

@@ -113,7 +113,7 @@ def _draw_cable(
             [times * unpooled.median], [y], "o", color=GRAY, markerfacecolor="white", markersize=3.2, label="By itself"
         )
     axes.plot([times * pooled.q05, times * pooled.q95], [y, y], "-", color=color, linewidth=1.0)
-    label = "Unlike the rest" if is_outlier else f"Pooled, {WIDE_INTERVAL}"
+    label = "Outlier" if is_outlier else f"Pooled, {WIDE_INTERVAL}"
     axes.plot([times * pooled.median], [y], "s" if is_outlier else "o", color=color, markersize=2.6, label=label)
 
 

@@ -49,7 +49,7 @@ def parse_service_limit(
     value, unit = until
     efficiency = value * conversion_factor(unit, "ratio")
     if not 0 < efficiency < 1:
-        raise UsageError(f"--until {value:g}{unit} is no efficiency that a cable falls to; write it as 60% or 0.6 1.")
+        raise UsageError(f"--until {value:g}{unit} is not an efficiency that a cable falls to; write it as 60% or 0.6 1.")
     angles = dict(_parse_wrap_angle(text) for text in wrap_angles)
     wrong = [name for name in angles if name not in coefficients]
     missing = [name for name in coefficients if name not in angles]
@@ -75,7 +75,7 @@ def _parse_wrap_angle(text: str) -> tuple[str, float]:
         angle = math.nan
     if match is None or not 0 <= angle < _MOST_TURNS * 2 * math.pi:
         raise UsageError(
-            f"--wrap-angle {shown(text)} is no coefficient with its wrap angle; write it as mu_sheath=180deg."
+            f"--wrap-angle {shown(text)} is not a coefficient with its wrap angle; write it as mu_sheath=180deg."
         )
     return match["name"].strip(), angle
 

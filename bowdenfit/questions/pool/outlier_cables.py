@@ -242,7 +242,7 @@ def find_mixtures(
         inspected: What is known.
         draws: Of the population.
         names: Of the numbers of a cable.
-        without: Cables that are said to be unlike the rest, of which the population has none.
+        without: Cables that are outliers, of which the population has none.
     """
     pooled = ~np.isin(np.arange(inspected.cables), list(without))
     data, effects = inspected.data, draws.effects.mean(axis=0)

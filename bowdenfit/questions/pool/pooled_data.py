@@ -41,7 +41,7 @@ class PoolingData:
         cycles: Of the inspections; NaN where nobody says.
         reference_cycles: That wear is stated for.
         left_out: Inspections that are not pooled.
-        notes: What is not told and why, a sentence each.
+        notes: What is not estimated and why, a sentence each.
         inputs: Of the inspections, what they were fitted from.
         own_names: What the coefficients are called in single fits.
     """
@@ -177,7 +177,7 @@ def _select_usable(
         elif not has[i]:
             left.append(ExcludedFit(label, "it has none of the coefficients that are pooled"))
         elif some and not dated[i]:
-            left.append(ExcludedFit(label, "nobody says after how many cycles it was made"))
+            left.append(ExcludedFit(label, "its number of cycles is not stated"))
     kept = trusted & has & (dated if some else np.ones(len(has), dtype=bool))
     if left:
         named = few([inspection.inspection for inspection in left])

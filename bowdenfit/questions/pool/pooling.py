@@ -43,7 +43,7 @@ class _PooledDraws:
 
     Args:
         full_population: The population of all cables.
-        population: The population without cables that are unlike the rest, and these by their own inspections alone.
+        population: The population without cables that are outliers, and these by their own inspections alone.
         p_values: Probability that a cable of this population is as far from the others, (cable,).
         departures: How it differs from the rest by the number of each that does, in words.
         wear_identified: Those of them whose own inspections tell their wear.
@@ -277,7 +277,7 @@ def _general_notes(data: PoolingData, fleet: FleetDraws) -> list[str]:
     """Return notes that do not depend on the estimates."""
     notes = []
     if len(data.cables) == 1:
-        notes.append("It is one cable only: there is no population that it could be compared with or drawn toward.")
+        notes.append("It is one cable only: there is no population that it could be compared with or shrunk toward.")
     unpooled = [
         name for name, about in fleet.attributes.items() if about.get("role") not in ("friction", "noise", None)
     ]

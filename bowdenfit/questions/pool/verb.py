@@ -81,9 +81,9 @@ VERB = Verb(
 
     FLEET is a results folder that `bowdenfit fleet` wrote. The answer says how
     friction grows with cycles, what lubrication and temperature do, how much cables
-    differ, and what a new one will be like; each cable is drawn toward the others
-    as far as its own inspections leave it open. It names cables that are unlike the
-    rest, which are shown by their own inspections alone, and what to inspect next.
+    differ, and what a new one will be like; each cable is shrunk toward the population
+    (partial pooling) as far as its own inspections leave it open. It names cables that are
+    outliers, which are shown by their own inspections alone, and what to inspect next.
 
     With --until and a --wrap-angle for each coefficient: how many cycles each cable
     and a new one last, and with --cycles the probability of failing before. With

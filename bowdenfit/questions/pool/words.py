@@ -9,7 +9,7 @@ from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable
 from bowdenfit.words import counted, decimals, few, filled, listed, percent, table
 
 HEADINGS = {
-    "pooled-coefficients": "Cables drawn toward the others",
+    "pooled-coefficients": "Cables shrunk toward the population",
     "pooled-wear": "Wear",
     "pooled-life": "How many have failed",
 }
@@ -82,8 +82,8 @@ def life_sentences(pool: Pool) -> list[str]:
         lines.append(f"The first to do so is expected to be {first[0].cable}, after {_life(first[1])}.")
     if pool.new_cable is not None and pool.new_cable.extrapolated:
         lines.append(
-            f"No cable was inspected after more than {_cycles(pool.reference_cycles)}: beyond that wear is taken to go on as "
-            "it did."
+            f"No cable was inspected after more than {_cycles(pool.reference_cycles)}: beyond that wear is assumed to go on as "
+            "before."
         )
     lines.append("If cables were taken out of use because they were bad, lives are longer here than they are.")
     return lines
@@ -94,7 +94,7 @@ def outlier_sentences(pool: Pool) -> list[str]:
     if len(pool.cables) == 1:
         return []
     lines = [
-        f"{cable.cable} is unlike the rest: {cable.departure} (by chance in {_probability(cable.p_value)} of such fleets)."
+        f"{cable.cable} is an outlier: {cable.departure} (by chance in {_probability(cable.p_value)} of such fleets)."
         for cable in pool.outliers[:_NAMED]
     ]
     if len(pool.outliers) > _NAMED:
@@ -106,21 +106,21 @@ def outlier_sentences(pool: Pool) -> list[str]:
             f"These cables do not look like one population in {names}: there are clusters or outliers, as where cables of two "
             "makes are pooled. Pool each make by itself; otherwise the prediction for a new cable is wrong."
         )
-    return [*(lines or ["No cable is unlike the rest."]), *homogeneity_sentences(pool)]
+    return [*(lines or ["No cable is an outlier."]), *homogeneity_sentences(pool)]
 
 
 def _outlier_treatment_sentences(pool: Pool) -> list[str]:
-    """Say by what cables that are unlike the rest are shown."""
+    """Say by what cables that are outliers are shown."""
     if not pool.outliers:
         return []
     shown = "It is shown by its" if len(pool.outliers) == 1 else "They are shown by their"
     lines = [
-        f"{shown} own inspections alone, not drawn toward the others; what cables have in common and a new cable are said "
+        f"{shown} own inspections alone, not shrunk toward the population; what cables have in common and a new cable are said "
         f"without {'it' if len(pool.outliers) == 1 else 'them'}."
     ]
     borrowed = [cable.cable for cable in pool.outliers if cable.pooled]
     if borrowed:
-        lines.append(f"Only the wear of {few(borrowed)} is that of the others, because no own inspections tell it.")
+        lines.append(f"Only the wear of {few(borrowed)} is that of the others, as their own inspections do not determine it.")
     return lines
 
 
@@ -134,7 +134,7 @@ def homogeneity_sentences(pool: Pool) -> list[str]:
         return []
     named = listed([f"{name} ({new.q05:.2g} to {new.q95:.2g} of nine in ten)" for name, new in apart.items()])
     return [
-        f"All cables are unlike in {named}: one of them says little about another, and none is shrunk toward a common mean."
+        f"All cables differ in {named}: one of them says little about another, and none is shrunk toward a common mean."
     ]
 
 
@@ -146,11 +146,11 @@ def next_sentences(pool: Pool) -> list[str]:
     if best.probability is not None and pool.limit is not None:
         what = (
             f"it fails before {_cycles(pool.limit.cycles or 0)} with probability {_probability(best.probability)}, and no "
-            "other inspection settles as much"
+            "other inspection would say more"
         )
     else:
         what = (
-            f"its wear in {_cycles(pool.reference_cycles)} would be known to ± {percent(best.after)}, and is to ± "
+            f"its wear in {_cycles(pool.reference_cycles)} would be known to ± {percent(best.after)}, now to ± "
             f"{percent(best.before)}"
         )
     return [f"Inspect {best.cable} next, after {_cycles(best.cycles)}: {what}."]
@@ -219,7 +219,7 @@ def cable_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         cells += [_format_interval(cable.wear, 100, " %")] if wears else []
         cells += [_cycles(cable.life.median, bare=True)] if cable.life else []
         cells += [_probability(cable.life.fails)] if cable.life and with_failures else []
-        rows.append((cable.cable, *cells, "unlike" if cable.departure else ""))
+        rows.append((cable.cable, *cells, "outlier" if cable.departure else ""))
     return tuple(heads), rows
 
 
@@ -291,14 +291,14 @@ def captions(pool: Pool) -> dict[str, str]:
     what = f"efficiency falls below {100 * limit.efficiency:g} %" if limit is not None else ""
     return {
         "pooled-coefficients": (
-            "Each cable by itself from its first inspection (open), and drawn toward the others as far as its own inspections "
-            "leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
-            f"{len(pool.cables)} cables; red ones are unlike the rest, and by their own inspections alone."
+            "Each cable by itself from its first inspection (open), and shrunk toward the population as far as its own "
+            "inspections leave it open (filled, with 90 % interval); gray: where nine of ten new cables lie. n = "
+            f"{len(pool.cables)} cables; orange: outliers, by their own inspections alone."
         ),
         "pooled-wear": (
             f"{'Efficiency' if limit else 'Friction over that of the new cable'} of each cable (thin) and of a new one (thick, "
             f"with 90 % interval), dry and at {pool.reference_temperature:g} °C. n = {len(pool.cables)} cables, inspected up "
-            "to the dotted line; beyond it wear is taken to go on as it did."
+            "to the dotted line; beyond it wear is assumed to go on as before."
         ),
         "pooled-life": (
             f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
@@ -331,12 +331,12 @@ def pool_page(pool: Pool) -> HtmlPage:
         prose_section(
             "Every cable",
             [
-                "Drawn toward the others as far as its own inspections leave it open, or by its own inspections alone if it is "
-                "unlike the rest; median ± standard deviation."
+                "Shrunk toward the population as far as its own inspections leave it open, or by its own inspections alone if "
+                "it is an outlier; median ± standard deviation."
             ],
             [PageTable(cable_heads, tuple(cables))],
             pictures=(pictures["pooled-coefficients"],),
         ),
-        prose_section("What is not told", pool.notes or ["Everything that was measured is pooled."], items=left_out),
+        prose_section("What is not estimated", pool.notes or ["Everything that was measured is pooled."], items=left_out),
     )
     return HtmlPage(pool.name or "Fleet", f"Pooled by bowdenfit; seed {pool.seed}", sections)

@@ -84,7 +84,7 @@ def choose_route_values(fit: Record, lengths: Sequence[float | NumberWithUnit] |
     route = fit.dataset.description.route
     numbers = [length[0] if isinstance(length, tuple) else length for length in lengths or ()]
     if invalid := [number for number in numbers if not np.isfinite(number)]:
-        raise UsageError(f"{invalid[0]} is no length; name the lengths to predict at as numbers.")
+        raise UsageError(f"{invalid[0]} is not a length; name the lengths to predict at as numbers.")
     if not lengths and route is not None and not route.choices:
         raise UsageError("the description has no choices; name the lengths to predict at.")
     return np.asarray(to_route_unit(route, lengths) or (route.choices if route else [0.0]), dtype=float)

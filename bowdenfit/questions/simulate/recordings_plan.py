@@ -271,7 +271,7 @@ def _parse_motor_speed(text: str, where: str) -> float:
     """Return the motor speed [rad/s]."""
     match = _SPEED.fullmatch(text)
     if match is None or float(match[1]) == 0:
-        raise DescriptionError(f'{where}: {text!r} is no motor speed; write one such as "20 r/min" or "2.1 rad/s".')
+        raise DescriptionError(f'{where}: {text!r} is not a motor speed; write one such as "20 r/min" or "2.1 rad/s".')
     return float(match[1]) * (1.0 if match[2] == "rad/s" else RPM)
 
 

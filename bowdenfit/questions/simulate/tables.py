@@ -212,7 +212,7 @@ def draw_true_values(
     unknown = [name for name in truth if name not in {p.name for p in space.parameters}]
     if unknown:
         known = ", ".join(p.name for p in space.parameters)
-        raise UsageError(f"{unknown[0]!r} is no parameter of this cable; its parameters are {known}.")
+        raise UsageError(f"{unknown[0]!r} is not a parameter of this cable; its parameters are {known}.")
 
     def draw(key: jax.Array) -> jax.Array:
         return space.vector(jax.random.normal(key, (space.size,)))

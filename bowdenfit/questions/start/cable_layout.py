@@ -171,7 +171,7 @@ def _add_curved_contacts(file: MeasuredFile, layout: CableLayout, asker: Asker) 
         )
         shape = (
             "How does that angle follow the length: gaussian (a bell, largest at some length), line (a straight line) or "
-            "logistic (from 0 to a plateau)? Whether another fits better, bowdenfit compare tells."
+            "logistic (from 0 to a plateau)? bowdenfit compare says whether another fits better."
         )
         curve = asker.ask(word_question(shape, sorted(CURVES), _DEFAULT_CURVE))
         assign_column(file, Quantity(column.plain_name, "angle"), column, asker)

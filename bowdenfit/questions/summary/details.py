@@ -130,7 +130,7 @@ def _prior_driven_sentence(page: dict[str, Any]) -> str:
     if not names:
         return ""
     verb = "rests" if len(names) == 1 else "rest"
-    return filled(f"Hardly informed by the measurements: {listed(names)} {verb} on the prior almost alone.")
+    return filled(f"Hardly determined by the measurements: {listed(names)} {verb} on the prior almost alone.")
 
 
 def _curve_block(fit: Record, page: dict[str, Any]) -> str:
@@ -290,7 +290,7 @@ def parameters_text(fit: Record) -> str:
         notes.append(
             filled(
                 f"The intervals of {listed(wide)} are wider than their standard errors suggest: hardly more readings than "
-                "unknowns leave little to tell the scatter from, or the sum of squares is lopsided."
+                "parameters leave little to estimate the scatter from, or the sum of squares is lopsided."
             )
         )
     by = [f"{p.name} by {p.scaled_by}" for p in fit.model.space.parameters if p.scaled_by]

@@ -65,7 +65,7 @@ def caption(data: Traces) -> str:
     """Describe what is drawn, in plain words."""
     return (
         "The path of every parameter over the steps of the sampler, a color and line style for each independent start "
-        "(ensemble or chain). Where the sampling has converged, the paths lie on top of each other and drift neither up nor "
+        "(chain). Where the sampling has converged, the paths lie on top of each other and drift neither up nor "
         f"down. Right of each panel: the density of each. {explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.n_ensembles} independent starts, {data.quantities[0].draws.size} draws from the posterior."
     )
@@ -119,7 +119,7 @@ def _style(number: int) -> dict[str, Any]:
 
 
 def _group_draws(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return places along the path (0 to 1), and the draws summarized there (columns): all walkers', or a stretch of a chain."""
+    """Return places along the path (0 to 1), and draws summarized there (columns): all walkers', or a stretch of a chain."""
     n_walkers, n = draws.shape
     if n_walkers > 1 or n < 2 * STRETCHES:
         chosen = np.arange(0, n, -(-n // MOST_DRAWS))
@@ -153,7 +153,7 @@ def _legend_title(chains: bool) -> str:
     """Return what lines and bands are."""
     if chains:
         return f"Line: median of each {STRETCHES}th of the chain; shaded: its {WIDE_INTERVAL}; right of each panel: density"
-    return f"Thick: median of the walkers at a step; thin: their {WIDE_INTERVAL}; right of each panel: density"
+    return f"Thick: median at a step; thin: {WIDE_INTERVAL}; right of each panel: density"
 
 
 def _draw_legend(figure: Figure, n_ensembles: int, key: str) -> None:

@@ -101,7 +101,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
 
 
 def _undetermined(why: str) -> Delay:
-    remark = f"How much later the output channel is than the input channel cannot be told from this recording, because {why}."
+    remark = f"How much later the output channel is than the input channel cannot be known from this recording, because {why}."
     return Delay(0.0, float("nan"), float("nan"), f"{remark} No delay was assumed; state one if it is known.")
 
 

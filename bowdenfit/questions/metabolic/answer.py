@@ -246,7 +246,7 @@ def _format_range(span: Range) -> str:
 @text_of.register(Metabolic)
 def metabolic_text(result: Metabolic) -> str:
     """Return a study for people: what it shows, what it does not, and what of it cannot be right."""
-    heads = ("condition", "less", "W/kg", "95 % from", "to", "change", "p", "p (Holm)", "lower with prob.")
+    heads = ("condition", "minus", "W/kg", "95 % from", "to", "change", "p", "p (Holm)", "lower with prob.")
     rows = [
         (c.condition, c.less, f"{c.difference:+.3f}", f"{c.low:+.3f}", f"{c.high:+.3f}", percent(c.share, sign="+"),
          f"{c.p:.2g}", f"{c.p_holm:.2g}", f"{c.lower_doubted:.2f} to {c.lower:.2f}")
@@ -254,7 +254,7 @@ def metabolic_text(result: Metabolic) -> str:
     ]  # fmt: skip
     blocks = [
         "\n".join(filled(line) for line in (f"{result.name}:", *map(_difference_sentence, result.comparisons))),
-        narrow_table(heads, rows, left=("less",)),
+        narrow_table(heads, rows, left=("minus",)),
         "\n".join(filled(f"- {line}") for line in result.contradictions),
         "\n".join(filled(line) for line in _remark_sentences(result)),
     ]
@@ -292,7 +292,7 @@ def _remark_sentences(result: Metabolic) -> list[str]:
     least = max(result.comparisons, key=lambda comparison: comparison.least)
     lines.append(
         f"With {persons} the least true difference that four of five studies find is {least.least:.2f} W/kg "
-        f"({least.condition} less {least.less})."
+        f"({least.condition} minus {least.less})."
     )
     lines.append(
         "Lower with probability: the first number assumes beforehand that differences are a few percent either way, the "

@@ -87,7 +87,7 @@ VERB = Verb(
       active   the torque measured at the joint, fed back
 
     One torque for all bends must suit the bend with the least friction; by bend it
-    may be more. What the fit does not tell is asked for by name in device.toml;
+    may be more. What the fit does not determine is asked for by name in device.toml;
     datasets/haptic-teleoperation has one.
     """,
     json="Print as JSON.",

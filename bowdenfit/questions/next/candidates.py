@@ -174,7 +174,7 @@ def _add_part(fit: Record, kind: CandidateKind, candidate: Candidate, text: str,
         raise UsageError(f"--candidate {text!r}: {error}.") from None
     units = f", with units where it is not a {route_variable(fit)}" if route is not None and kind.along_route else ""
     raise UsageError(
-        f"--candidate {text!r}: {part!r} says nothing of {kind.phrase}; write it as {example_name(fit, kind)}{units}."
+        f"--candidate {text!r}: {part!r} says nothing about {kind.phrase}; write it as {example_name(fit, kind)}{units}."
     )
 
 

@@ -13,6 +13,7 @@ from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
 from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import describe_checks_alone
+from bowdenfit.questions.error_budget import ErrorBudget, error_budget
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_with_title, parse_page_width, warning_mark
 from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
@@ -75,6 +76,11 @@ class Fit(Record):
     def checks(self) -> Checks | None:
         """Every reading against its prediction from all the others, and what the priors do; None without draws."""
         return check_readings(self)
+
+    @property
+    def error_budget(self) -> ErrorBudget | None:
+        """What usual errors of a bench, which its readings cannot show, would add to each interval; None without draws."""
+        return error_budget(self)
 
     @property
     def groups(self) -> Groups | None:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from bowdenfit.description.cable_parts import CableSettings, Contact, Route, WrapAngle
-from bowdenfit.description.defaults import PriorDefaults, Sampler, SamplerSettings, Sensors
+from bowdenfit.description.defaults import BenchErrors, PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
     ForceLimits,
     Phase,
@@ -42,6 +42,7 @@ __all__ = [
     "BY_GROUP",
     "RESERVED_NAMES",
     "SCHEMA",
+    "BenchErrors",
     "CableSettings",
     "Contact",
     "Description",
@@ -111,6 +112,7 @@ class Description(Display, Frozen):
     tables: Tables
     recording: tuple[RecordingFile, ...] = ()
     sensors: Sensors = Sensors()
+    errors: BenchErrors = BenchErrors()
     sampler: SamplerSettings = SamplerSettings()
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)

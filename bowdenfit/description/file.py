@@ -119,6 +119,7 @@ def _quantities(description: Description) -> list[Stated]:
         ("sensors, force_noise", sensors.force_noise, "force"),
         ("sensors, input_force_noise", sensors.input_force_noise, "force"),
         ("sensors, offset_sd", sensors.offset_sd, "force"),
+        ("errors, angle", description.errors.angle, "angle"),
         ("reference_force", description.reference_force, "force"),
         *((f"cable, {name}", length, "length") for name, length in cable.lengths.items()),
         ("preload, wrap_angle", preload.wrap_angle, "angle"),

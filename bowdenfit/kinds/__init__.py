@@ -12,6 +12,7 @@ Imports go downward only (a contract of import-linter in pyproject.toml holds th
     sliding_rows
     kind  term                                           the interfaces: Kind and TermKind
     candidate  table_files  plausibility  row_angles     parts of the interfaces; CandidateKind
+    bench_error                                          systematic errors as tables would show them
     tables                                               tables that several kinds look at
     rows                                                 rows of tables, read and written
 """

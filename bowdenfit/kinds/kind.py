@@ -35,6 +35,7 @@ from bowdenfit.description import Contact, Description, Table, TableSettings
 from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, Faults
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.plausibility import CoarseReadings
 from bowdenfit.kinds.rows import FileRows, ForceRows, Rows
 from bowdenfit.kinds.table_files import AnyTable, InitQuestions, Source, TableFromFiles
@@ -174,6 +175,10 @@ class Kind(ABC, Generic[AnyTable]):
     def coarse_readings(self, table: AnyTable) -> CoarseReadings | None:
         """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
         return None
+
+    def with_bench_error(self, table: AnyTable, error: BenchError) -> AnyTable:
+        """Return the table as a bench with another systematic error would have given it; the same where it shows none."""
+        return table
 
     def why_implausible(self, measured: AnyTable, simulated: AnyTable) -> str:
         """Return why no bench would hand in the simulated table, in a few words; empty if one might."""

@@ -1,5 +1,6 @@
 """Wrap angles of curved contacts along the route: how they are read, checked and described."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from bowdenfit.description.file import Stated
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings
 from bowdenfit.kinds.plausibility import compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
@@ -130,6 +132,11 @@ class AngleKind(PlannedKind[AngleTable]):
     @override
     def copied_readings(self, table: AngleTable) -> list[str]:
         return describe_copies(compare_without_runs(table.origin, table.route, table.angle, table.route))
+
+    @override
+    def with_bench_error(self, table: AngleTable, error: BenchError) -> AngleTable:
+        """Return the table with the error in its angles."""
+        return replace(table, angle=error.apply_to_angles(table.angle))
 
     @override
     def why_implausible(self, measured: AngleTable, simulated: AngleTable) -> str:

@@ -1,6 +1,6 @@
 """Transmission efficiencies, output force over input force while pulling: how they are read, checked and described."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from typing_extensions import override
@@ -10,6 +10,7 @@ from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
 from bowdenfit.kinds.plausibility import (
     GAIN_ERROR,
@@ -133,6 +134,12 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             return None
         settings = np.column_stack([table.route, table.own.angle])
         return find_coarse_readings(listed(table.origin.files), settings, table.efficiency)
+
+    @override
+    def with_bench_error(self, table: EfficiencyTable, error: BenchError) -> EfficiencyTable:
+        """Return the table with the error in its efficiencies and wrap angles."""
+        efficiency = error.apply_to_force(table.efficiency)
+        return replace(table, efficiency=efficiency, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: EfficiencyTable, simulated: EfficiencyTable) -> str:

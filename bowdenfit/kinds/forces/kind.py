@@ -1,6 +1,7 @@
 """Forces read at both ends of a cable: how they are checked and described."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -9,6 +10,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
@@ -187,6 +189,12 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         stroke = table.stroke.astype(float)
         settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
         return find_coarse_readings(listed(table.origin.files), settings, table.output_force, "N")
+
+    @override
+    def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:
+        """Return the table with the error in its output forces and wrap angles."""
+        force = error.apply_to_force(table.output_force, table.stroke)
+        return replace(table, output_force=force, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: ForceTable, simulated: ForceTable) -> str:

@@ -1,6 +1,7 @@
 """Forces at both ends of a pull-pull loop while it moves: how they are read, checked and described."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from pydantic import model_validator
@@ -13,6 +14,7 @@ from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.columns import Column, Quantity, find_columns
 from bowdenfit.files.headings import meanings
 from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
@@ -201,6 +203,12 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         return describe_copies(
             compare_without_runs(table.origin, settings, forces, table.input_force, 3 * setting + table.stroke)
         )
+
+    @override
+    def with_bench_error(self, table: LoopTable, error: BenchError) -> LoopTable:
+        """Return the table with the error in its output forces and wrap angles."""
+        force = error.apply_to_force(table.output_force, table.stroke)
+        return replace(table, output_force=force, own=error.apply_to_rows(table.own))
 
     @override
     def why_implausible(self, measured: LoopTable, simulated: LoopTable) -> str:

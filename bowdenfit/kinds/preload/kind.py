@@ -1,5 +1,7 @@
 """Preload between fixed ends: how it is read, checked and described."""
 
+from dataclasses import replace
+
 import numpy as np
 from typing_extensions import override
 
@@ -7,6 +9,7 @@ from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity, find_columns, require_column
 from bowdenfit.files.tables import read_table
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import is_within_factor
 from bowdenfit.kinds.rows import (
@@ -119,6 +122,12 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
                 "stiffness, bedding-in and lengthening by themselves will rest on their priors."
             )
         return warnings
+
+    @override
+    def with_bench_error(self, table: PreloadTable, error: BenchError) -> PreloadTable:
+        """Return the table with the error in its preloads and wrap angles."""
+        preload = error.apply_to_force(table.preload, 0.0)
+        return replace(table, preload=preload, wrap_angle=error.apply_to_angles(table.wrap_angle))
 
     @override
     def why_implausible(self, measured: PreloadTable, simulated: PreloadTable) -> str:

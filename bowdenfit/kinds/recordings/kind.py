@@ -1,5 +1,6 @@
 """Force recordings, sampled while a motor pulls, stops, reverses and returns: how they are checked and described."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from bowdenfit.description import Description, Preparation, QuantityValue
 from bowdenfit.description.file import Stated
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.headings import Quantity
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import FrictionKind, Readings, efficiency_readings
 from bowdenfit.kinds.plausibility import FACTOR, NO_NOISE, SCATTER, explain_impossible_loss
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings, read_recordings
@@ -274,6 +276,16 @@ class RecordingKind(FrictionKind[Recordings]):
                     f"the recording {recording.name} holds the same forces as the recording {name}, to the last digit"
                 )
         return copied
+
+    @override
+    def with_bench_error(self, table: Recordings, error: BenchError) -> Recordings:
+        """Return the recordings with the error in their output forces and wrap angles; their strokes stay."""
+        items = []
+        for recording in table.items:
+            force = error.apply_to_force(recording.blocks.output_force, recording.strokes.contact)
+            angle = np.where(np.isnan(recording.own_sd), error.apply_to_angles(recording.own_angle), recording.own_angle)
+            items.append(replace(recording, own_angle=angle, blocks=replace(recording.blocks, output_force=force)))
+        return replace(table, items=tuple(items))
 
     @override
     def why_implausible(self, measured: Recordings, simulated: Recordings) -> str:

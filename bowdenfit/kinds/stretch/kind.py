@@ -1,6 +1,7 @@
 """Stretch of the rope under loads and at wrap angles: how it is read, checked and described."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +12,7 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor, split_by_group
 from bowdenfit.kinds.rows import (
@@ -254,6 +256,16 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         read = table.stretch[:, None]
         return describe_copies(
             ComparedReadings(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve)
+        )
+
+    @override
+    def with_bench_error(self, table: StretchTable, error: BenchError) -> StretchTable:
+        """Return the table with the error in its loads and wrap angles."""
+        return replace(
+            table,
+            load=error.apply_to_force(table.load, 0.0),
+            peak=error.apply_to_force(table.peak, 0.0),
+            wrap_angle=error.apply_to_angles(table.wrap_angle),
         )
 
     @override

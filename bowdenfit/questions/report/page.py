@@ -9,6 +9,7 @@ from bowdenfit.errors import UsageError
 from bowdenfit.pages.section import Chart, HtmlPage, PageSection, Picture, prose_section
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.bends.words import section as bends_section
+from bowdenfit.questions.error_budget import budget_section
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
@@ -38,7 +39,7 @@ from bowdenfit.results.folder import REPORT, file_to_write
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load
 
-ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, bends_section)
+ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, budget_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")

@@ -12,6 +12,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
+from bowdenfit.questions.error_budget import error_budget, interval_text, widening_sentence
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
@@ -33,6 +34,7 @@ LINES = 25  # fit on one terminal of usual height
 _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters of names in a line of 80
 _LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OUTLIERS = 4, 8, 3  # rows
 _OTHER_LINES = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
+WITH_BENCH = "with bench errors"
 READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
 _KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
@@ -74,7 +76,7 @@ def _sentence_lines(fit: Record) -> list[list[str]]:
     first, *others = summary_sentences(fit)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
-        sentences = [f"{name}: {first}", *others, *reasons_to_trust(fit), suggest_next_step(fit)]
+        sentences = [f"{name}: {first}", widening_sentence(fit), *others, *reasons_to_trust(fit), suggest_next_step(fit)]
     else:
         sentences = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict), f"What they would say: {first}"]
     return [filled(sentence).splitlines() for sentence in sentences if sentence]
@@ -87,9 +89,11 @@ def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
     if not shown:
         return [], True
     interval_width = max(len(q.interval) for q in shown)
-    rows = [(q.name, q.value, f"{q.interval:>{interval_width}} {q.unit}".rstrip()) for q in shown]
-    heads = ("", "value", f"{'90 % interval':>{interval_width}}")
-    printed = table(heads, rows, left=heads[-1:]).splitlines()
+    rows: list[tuple[str, ...]] = [(q.name, q.value, f"{q.interval:>{interval_width}} {q.unit}".rstrip()) for q in shown]
+    heads: tuple[str, ...] = ("", "value", f"{'90 % interval':>{interval_width}}")
+    if widened := _widened_intervals(fit, [q.name for q in shown]):
+        heads, rows = (*heads, WITH_BENCH), [(*row, text) for row, text in zip(rows, widened, strict=True)]
+    printed = table(heads, rows, left=heads[2:]).splitlines()
     start = max(map(len, printed)) + 2
     more = len(rows_to_show) - len(shown)
     lines_made, spare, complete = printed[:2], lines - len(shown) + (more <= 0), True
@@ -99,6 +103,15 @@ def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
         complete &= " ".join(meaning) == q.description
         lines_made += [f"{line:<{start}}{meaning[0]}".rstrip(), *(" " * start + further for further in meaning[1:])]
     return [*lines_made, *([f"and {more} more"] if more > 0 else [])], complete
+
+
+def _widened_intervals(fit: Record, names: Sequence[str]) -> list[str]:
+    """Return intervals with errors of the bench, of coefficients by name; empty where these more than half widen none."""
+    budget = error_budget(fit)
+    rows = [budget.row(name) if budget is not None else None for name in names]
+    if not any(row is not None and row.is_notable for row in rows):
+        return []
+    return [interval_text(row.bench, row.readings.digits) if row is not None else "" for row in rows]
 
 
 def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:

@@ -13,6 +13,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import describe_elastic
 from bowdenfit.questions.check.answer import check_readings
 from bowdenfit.questions.check.words import describe_checks
+from bowdenfit.questions.error_budget import budget_text
 from bowdenfit.questions.groups import groups_text
 from bowdenfit.questions.identify.answer import describe_identified
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs
@@ -70,6 +71,7 @@ def details_text(fit: Record) -> str:
         _friction_model_block(fit),
         describe_elastic(fit),
         loss_text(fit),
+        budget_text(fit),
         _design_answer(fit),
     ]
     blocks.append(_origin_sentence(page))

@@ -15,6 +15,7 @@ from bowdenfit.kinds.recordings.kind import list_preparations
 from bowdenfit.kinds.term import Term
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.answer import check_readings
+from bowdenfit.questions.error_budget import error_budget
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.identify.judgment import confounded_pairs
 from bowdenfit.questions.loss import loss_by_contact
@@ -90,6 +91,8 @@ def summarize(fit: Record) -> dict[str, Any]:
         page["checks"] = checks
     if (loss := loss_by_contact(fit)) is not None:
         page["loss"] = loss
+    if (budget := error_budget(fit)) is not None:
+        page["error_budget"] = budget
     if (lost := compute_lost_force(fit)) is not None:
         page["drag"] = lost
     effect = compare_speeds(fit)

@@ -1,0 +1,298 @@
+r"""The error budget: what errors of a whole bench, which none of its readings can show, add to each interval.
+
+An interval of the posterior holds what scatters. A bend angle that is 3 % too large, a load cell with another gain, or one with
+hysteresis shifts every reading alike, and metrology adds it as an uncertainty of type B:
+
+.. math:: u^2(f) = u_A^2(f) + \sum_e \left(\frac{\partial \mathrm{E} f}{\partial e} u_e\right)^2
+
+The slope of a posterior mean by an error e of the data is a covariance over the draws, without a refit:
+
+.. math:: \frac{d \mathrm{E} f}{d e} = \mathrm{Cov}\!\left(f, \frac{\partial \log p(y_e \mid z)}{\partial e}\right)
+
+References:
+    JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement (GUM), 4.3 and 5.1.
+    Giordano, Broderick and Jordan, Covariances, robustness, and variational Bayes, Journal of Machine Learning Research 19
+    (2018), 51: the covariance as a derivative of a posterior mean.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jaxtyping import Float
+
+from bowdenfit.cable.cable import Cable
+from bowdenfit.display import Display, Rows
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.draws import BATCH, run_in_batches
+from bowdenfit.inference.interval import NORMAL_90, Interval
+from bowdenfit.inference.log_density import LogDensity
+from bowdenfit.kinds import KINDS, iterate_tables
+from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.terms import TERMS
+from bowdenfit.pages.section import PageSection, PageTable, prose_section
+from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
+from bowdenfit.words import counted, filled, listed, table
+
+_DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take longer
+_STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
+_NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
+TITLE = "Error budget: what errors of the bench that no reading shows would add"
+_KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """One cause of error.
+
+    Args:
+        name: What is wrong then, "wrap angles", "gain" or "hysteresis".
+        words: The same with how well it is known.
+    """
+
+    name: str
+    words: str
+
+
+@dataclass(frozen=True)
+class BudgetRow:
+    """What the errors of a bench add to one quantity.
+
+    Args:
+        quantity: Its name.
+        unit: Its unit.
+        readings: Its interval by the readings alone.
+        bench: The interval with the errors of the bench.
+        shifts: By how much each source moves it, one standard deviation, by name.
+    """
+
+    quantity: str
+    unit: str
+    readings: Interval
+    bench: Interval
+    shifts: Mapping[str, float]
+
+    @property
+    def is_notable(self) -> bool:
+        """Whether the errors of the bench add more than half to its interval."""
+        return self.bench.sd > _NOTABLE * self.readings.sd
+
+    @property
+    def largest(self) -> str:
+        """Name of the source that moves it most."""
+        return max(self.shifts, key=lambda name: self.shifts[name])
+
+
+@dataclass(frozen=True, repr=False)
+class ErrorBudget(Display):
+    """Every answer of a fit, by the readings alone and with the usual or stated errors of a bench.
+
+    Args:
+        sources: Causes of error.
+        rows: The answers.
+    """
+
+    sources: tuple[ErrorSource, ...]
+    rows: tuple[BudgetRow, ...]
+
+    def row(self, quantity: str) -> BudgetRow | None:
+        """Return the row of a quantity; None where there is none."""
+        return next((row for row in self.rows if row.quantity == quantity), None)
+
+    def sentences(self) -> list[str]:
+        """What the errors of a bench add, in a sentence or two."""
+        notable = [row for row in self.rows if row.is_notable]
+        known = listed([source.words for source in self.sources])
+        if not notable:
+            return [f"Errors of the bench that no reading shows ({known}) would add less than half to each interval."]
+        return [
+            f"Errors of the bench that no reading shows ({known}) would more than half widen "
+            f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml."
+        ]
+
+    def _table(self) -> Rows:
+        rows = []
+        for row in self.rows:
+            ends = {"q05": row.readings.q05, "q95": row.readings.q95}
+            ends |= {"q05_with_bench": row.bench.q05, "q95_with_bench": row.bench.q95}
+            rows.append({"quantity": row.quantity, "unit": row.unit, "median": row.readings.median} | ends | dict(row.shifts))
+        return rows, {}
+
+
+@cached_per_fit
+def error_budget(fit: Record) -> ErrorBudget | None:
+    """Return the error budget of a fit; None without draws, or where no error of the bench is left to add.
+
+    Args:
+        fit: The fit.
+    """
+    uncertainties = dict(_standard_errors(fit))
+    quantities = _answers(fit) if fit.sampled is not None else {}
+    if not quantities or not uncertainties:
+        return None
+    chosen = np.linspace(0, len(fit.draws().flat_z) - 1, _DRAWS).astype(int)
+    errors = [error for _, steps in uncertainties.values() for error, _ in steps]
+    scores = iter(_scores(fit, fit.draws().flat_z[chosen], errors))
+    slopes: dict[str, list[tuple[np.ndarray, float]]] = {
+        name: [(next(scores), size) for _, size in steps] for name, (_, steps) in uncertainties.items()
+    }
+    rows = []
+    for name, (unit, draws) in quantities.items():
+        some = draws[chosen] - draws[chosen].mean()
+        shifts = {
+            source: max(abs(float(np.mean(some * score))) * size for score, size in parts)
+            for source, parts in slopes.items()
+        }
+        readings = Interval.of(draws)
+        rows.append(BudgetRow(name, unit, readings, _widened(readings, list(shifts.values())), shifts))
+    return ErrorBudget(tuple(ErrorSource(name, words) for name, (words, _) in uncertainties.items()), tuple(rows))
+
+
+def _standard_errors(fit: Record) -> Iterator[tuple[str, tuple[str, list[tuple[BenchError, float]]]]]:
+    """Yield each source of error: its words, and each step that stands for it with its standard uncertainty in steps.
+
+    Between limits of +-a every value is as likely (GUM 4.3.7), which makes a standard uncertainty of a/sqrt(3); two load cells
+    have errors of their own. Of an error in proportion and one in degrees, the one that matters more to an answer counts.
+    """
+    stated, sensors = fit.dataset.description.errors, fit.dataset.description.sensors
+    angle = stated.angle.to("angle")
+    steps = [
+        (BenchError(angle_scale=_STEP), stated.angle_scale / sqrt(3) / _STEP),
+        (BenchError(angle_offset=_STEP), angle / sqrt(3) / _STEP),
+    ]
+    if angle or stated.angle_scale:
+        words = f"wrap angles known to {stated.angle.value:g} {stated.angle.unit} or {100 * stated.angle_scale:g} %"
+        yield "wrap angles", (words, steps)
+    of_cells = sqrt(2 / 3) / _STEP
+    if stated.gain and sensors.gain_sd is None:
+        gain = [(BenchError(gain=_STEP), stated.gain * of_cells)]
+        yield "gain", (f"a gain of each load cell known to {100 * stated.gain:g} %", gain)
+    if stated.hysteresis:
+        hysteresis = [(BenchError(hysteresis=_STEP), stated.hysteresis * of_cells)]
+        yield "hysteresis", (f"a hysteresis of each load cell of up to {100 * stated.hysteresis:g} %", hysteresis)
+
+
+def _answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
+    """Return unit and draws of every coefficient, the best length and the efficiency there."""
+    draws, free = fit.draws(), fit.model.space.free
+    quantities = {p.name: (p.unit, draws.values[p.name].ravel()) for p in free if p.role in _KEY_ROLES}
+    route = fit.dataset.description.route
+    for name, unit in ((OPTIMAL_LENGTH, route.unit if route else ""), (OPTIMAL_EFFICIENCY, "1")):
+        if name in draws.optimum:
+            quantities[name] = (unit, draws.optimum[name].ravel())
+    return quantities
+
+
+def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> list[np.ndarray]:
+    """Return the change of the log likelihood of each draw by each small error of the data."""
+    with jax.enable_x64(True):
+        posterior = LogDensity(fit.model)
+        data = _data_with(fit, BenchError())
+
+        def log_likelihood(z: Float[Array, " free"], data: Any) -> Array:
+            return sum((jnp.sum(part) for part in posterior.log_likelihoods(z, data).values()), jnp.zeros(()))
+
+        rows = jax.ShapeDtypeStruct((BATCH, z.shape[1]), float)
+        program = compile_program(jax.vmap(log_likelihood, in_axes=(0, None)), rows, data)
+        before = run_in_batches(lambda part: program(part, data), BATCH, z)
+        changes = []
+        for error in errors:
+            changed = _data_with(fit, error)
+            after = run_in_batches(lambda part, changed=changed: program(part, changed), BATCH, z)
+            changes.append(after - before)
+    return [np.where(np.isfinite(change), change, 0.0) for change in changes]
+
+
+def _data_with(fit: Record, error: BenchError) -> tuple[dict[str, Any], ...]:
+    """Return the data of all terms as a bench with a systematic error would have given them."""
+    measurements, cable = fit.dataset.measurements, fit.model.cable
+    tables = {kind.name: KINDS[kind.name].with_bench_error(table, error) for kind, table in iterate_tables(measurements)}
+    angles = next((table for table in tables.values() if isinstance(table, AngleTable)), None)
+    terms = [term for name, table in tables.items() for term in TERMS[name].terms(cable, table, angles)]
+    return tuple(_with_constant_angles(dict(term.data), cable, error) for term in terms)
+
+
+def _with_constant_angles(data: dict[str, Any], cable: Cable, error: BenchError) -> dict[str, Any]:
+    """Return data of a term whose rows also hold the constant wrap angles of cable.toml, those without a stated error."""
+    if "is_own" not in data:
+        return data
+    own, is_own = np.array(data["own"], dtype=float), np.array(data["is_own"])
+    for k, contact in enumerate(cable.description.contact):
+        constant = contact.wrap_angle.constant
+        if constant is not None and constant.sd is None:
+            own[..., k] = error.apply_to_angles(np.array(constant.to("angle")))
+            is_own[..., k] = True
+    return data | {"own": own, "is_own": is_own}
+
+
+def _widened(readings: Interval, shifts: list[float]) -> Interval:
+    """Return an interval with further independent uncertainties; a quantity that is never negative stays so."""
+    added = sqrt(sum(shift**2 for shift in shifts))
+    low = readings.median - np.hypot(readings.median - readings.q05, NORMAL_90 * added)
+    high = readings.median + np.hypot(readings.q95 - readings.median, NORMAL_90 * added)
+    lowest = 0.0 if readings.q05 >= 0 else -np.inf
+    return replace(readings, sd=float(np.hypot(readings.sd, added)), q05=max(float(low), lowest), q95=float(high))
+
+
+HEADS = ("quantity", "readings alone", "with errors", "angles", "gain", "hysteresis")
+_SOURCES = ("wrap angles", "gain", "hysteresis")
+
+
+def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
+    """Return a row for each quantity, under `HEADS`: both intervals, and the shifts by one standard deviation."""
+    rows = list[tuple[str, ...]]()
+    for row in budget.rows:
+        digits = row.readings.digits
+        name = row.quantity if row.unit in ("", "1") else f"{row.quantity} ({row.unit})"
+        shifts = [f"{row.shifts[source]:.1g}" if source in row.shifts else "-" for source in _SOURCES]
+        rows.append((name, interval_text(row.readings, digits), interval_text(row.bench, digits), *shifts))
+    return rows
+
+
+def interval_text(interval: Interval, digits: int) -> str:
+    """'0.166 to 0.186'."""
+    return f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
+
+
+def budget_text(fit: Record) -> str:
+    """Return the error budget as a table with what it says; empty without draws."""
+    budget = error_budget(fit)
+    if budget is None:
+        return ""
+    note = "The last three columns are the shifts by one standard deviation of each error; combined as the GUM does."
+    lines = [TITLE, table(HEADS, budget_rows(budget)), *(filled(sentence) for sentence in (*budget.sentences(), note))]
+    return "\n".join(lines)
+
+
+def budget_section(fit: Record) -> PageSection | None:
+    """Return the error budget as a section of the report; None without draws."""
+    budget = error_budget(fit)
+    return prose_section(TITLE, budget.sentences(), [PageTable(HEADS, tuple(budget_rows(budget)))]) if budget else None
+
+
+def widening_sentence(fit: Record) -> str:
+    """Return what the errors of the bench make of the first answer that they more than half widen; empty if of none.
+
+    'With errors of the bench that no reading shows, mu is 0.166 to 0.186, most of it from wrap angles known to 3 deg or 3 %.'
+    """
+    budget = error_budget(fit)
+    notable = [row for row in budget.rows if row.is_notable] if budget else []
+    if budget is None or not notable:
+        return ""
+    row = next((row for row in notable if row.quantity == OPTIMAL_LENGTH), notable[0])
+    name = "the best length" if row.quantity == OPTIMAL_LENGTH else row.quantity
+    source = next(source.words for source in budget.sources if source.name == row.largest)
+    unit = "" if row.unit == "1" else f" {row.unit}"
+    others = counted(len(notable) - 1, "other answer")
+    also = f" ({others} also widen{'s' if len(notable) == 2 else ''})" if len(notable) > 1 else ""
+    interval = interval_text(row.bench, row.readings.digits)
+    return (
+        f"With errors of the bench that no reading shows, {name} is {interval}{unit}{also}, mostly by {source}; state "
+        "yours under [errors] in cable.toml."
+    )

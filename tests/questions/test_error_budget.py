@@ -1,0 +1,99 @@
+"""The error budget: slopes of the answers by errors of the bench agree with fits of tables that have these errors."""
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.rows import OwnAngles
+from bowdenfit.questions.error_budget import ErrorBudget
+
+MU, BENDS, LOADS = 0.12, (90.0, 90.0, 180.0, 180.0, 270.0, 270.0), (20.0, 50.0, 100.0)
+
+
+def bench(path, scale=1.0, hysteresis=0.0, noise=0.005, angles=True):
+    """Write a table of six mountings, whose angles are read a factor too large, or whose output cell has hysteresis."""
+    rng, rows = np.random.default_rng(3), ["run,stroke,input_force_N,output_force_N" + ",wrap_angle_deg" * angles]
+    for number, bend in enumerate(BENDS if angles else (180.0,) * 6):
+        mounting = rng.normal(0, 0.02 if noise > 1e-3 else 0.001)
+        for stroke in (1, -1):
+            for load in LOADS:
+                exponent = MU * np.radians(bend) + mounting
+                output = load * np.exp(-stroke * exponent) * (1 + rng.normal(0, noise)) * (1 - hysteresis * stroke / 2)
+                row = f"r{number},{'pull' if stroke > 0 else 'return'},{load},{output:.6f}"
+                rows.append(row + f",{bend * scale:.4f}" * angles)
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory):
+    return bf.fit(bench(tmp_path_factory.mktemp("bench") / "table.csv"), seed=1)
+
+
+def budget_of(fit) -> ErrorBudget:
+    assert fit.error_budget is not None
+    return fit.error_budget
+
+
+@pytest.mark.parametrize(
+    ("error", "limit", "source"), [({"scale": 1.03}, 0.03, "wrap angles"), ({"hysteresis": 0.015}, 0.015, "hysteresis")]
+)
+def test_a_slope_is_the_shift_of_a_fit_with_that_error(fit, tmp_path, error, limit, source):
+    shifted = bf.fit(bench(tmp_path / "table.csv", **error), seed=1)
+    row = budget_of(fit).row("mu")
+    moved = abs(shifted.parameter("mu").mean - fit.parameter("mu").mean)
+    cells = np.sqrt(2) if source == "hysteresis" else 1.0  # two load cells have an error each
+    assert row.shifts[source] * np.sqrt(3) / cells == pytest.approx(moved, abs=0.15 * row.readings.sd), limit
+
+
+def test_uncertainties_are_combined_as_the_gum_does(fit):
+    row = budget_of(fit).row("mu")
+    added = np.sqrt(sum(shift**2 for shift in row.shifts.values()))
+    assert row.bench.sd == pytest.approx(np.hypot(row.readings.sd, added))
+    assert row.bench.q05 < row.readings.q05 < row.readings.median < row.readings.q95 < row.bench.q95
+
+
+def test_a_constant_angle_has_its_error_too(tmp_path):
+    fit = bf.fit(bench(tmp_path / "table.csv", angles=False), seed=1, wrap_angle="180deg")
+    row = budget_of(fit).row("mu")
+    assert row.shifts["wrap angles"] == pytest.approx(row.readings.median * 0.03 / np.sqrt(3), rel=0.1)
+
+
+def test_a_precise_bench_shows_both_intervals_on_the_first_page(tmp_path):
+    fit = bf.fit(bench(tmp_path / "table.csv", noise=5e-4), seed=1)
+    page = " ".join(str(fit).split())
+    assert "With errors of the bench that no reading shows, mu is" in page
+    assert "state yours under [errors] in cable.toml." in page
+    assert "with bench errors" in page
+    assert budget_of(fit).row("mu").is_notable
+    assert fit.summary()["error_budget"]["rows"][0]["bench"]["q05"] < fit.parameter("mu").q05
+
+
+def test_a_scattering_bench_shows_the_interval_of_its_readings(fit):
+    assert "bench" not in str(fit)
+    assert "would add less than half to each interval" in budget_of(fit).sentences()[0]
+
+
+def test_stated_errors_replace_the_usual_ones_or_leave_the_budget(tmp_path):
+    path = bench(tmp_path / "table.csv", noise=5e-4)
+    settings = ["errors.angle_scale=0", "errors.angle={value=0,unit='deg'}", "errors.hysteresis=0.001"]
+    settings += ["sensors.input_gain_error_sd=0.001", "sensors.output_gain_error_sd=0.001"]
+    row = budget_of(bf.fit(path, seed=1, settings=settings)).row("mu")
+    assert set(row.shifts) == {"hysteresis"}
+    assert not row.is_notable
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"), [("errors.angle={value=3,unit='N'}", "N"), ("errors.gain=-0.1", "gain"), ("errors.gains=1", "gain")]
+)
+def test_an_error_that_cannot_be_is_refused(tmp_path, setting, said):
+    with pytest.raises(bf.BowdenfitError, match=said):
+        bf.read(bench(tmp_path / "table.csv"), settings=[setting])
+
+
+def test_an_error_moves_forces_and_angles_as_a_bench_shows_them():
+    error = BenchError(gain=0.01, hysteresis=0.02, angle_scale=0.03, angle_offset=0.1)
+    assert error.apply_to_force(np.array([100.0, 100.0]), np.array([1, -1])) == pytest.approx([99.99, 102.01])
+    angles = OwnAngles(("bend",), np.array([[1.0], [1.0], [0.0], [np.nan]]), np.array([[np.nan], [0.1], [np.nan], [np.nan]]))
+    assert error.apply_to_rows(angles).angle.ravel() == pytest.approx([1.13, 1.0, 0.0, np.nan], nan_ok=True)

@@ -13,17 +13,17 @@ from bowdenfit.parameters.priors import HalfCauchy, Normal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter, Scale
 
 
-def run_scatter(at: Circumstances) -> Parameter:
+def declare_run_scatter(at: Circumstances) -> Parameter:
     """Return tau, the scatter from mounting to mounting."""
     meaning = at.noise.meaning("scatter of the log ratio from mounting to mounting")
     return Parameter(RUN_SCATTER, r"$\tau$", meaning, "noise", HalfCauchy(at.defaults.run_scatter))
 
 
-def force_noise(at: Circumstances, meaning: str = "standard deviation of a force reading") -> Parameter:
+def declare_force_noise(at: Circumstances, meaning: str = "standard deviation of a force reading") -> Parameter:
     """Return the noise of an output force reading: free, fixed, or with the prior of the data sheet."""
     stated, ratio = at.description.sensors.force_noise, at.description.sensors.noise_ratio
     meaning += "" if ratio == 1 else f" at the output; at the input {f'{ratio:.3g} times that' if ratio else 'none'}"
-    free = noise_of_forces(at, FORCE_NOISE, r"$\sigma_F$", meaning)
+    free = declare_noise_of_forces(at, FORCE_NOISE, r"$\sigma_F$", meaning)
     if stated is None:
         return free
     if stated.sd is None:
@@ -31,13 +31,13 @@ def force_noise(at: Circumstances, meaning: str = "standard deviation of a force
     return replace(free, prior=TruncatedNormal(stated.to("force"), stated.sd_to("force") or 0.0), scaled_by="")
 
 
-def noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
+def declare_noise_of_forces(at: Circumstances, name: str, symbol: str, meaning: str) -> Parameter:
     """Return a noise of forces whose prior is in proportion to the loads."""
     load, part = at.cable.friction.conditions.load, at.defaults.force_noise_share
     return Parameter(name, symbol, meaning, "noise", HalfCauchy(part * load.value), "N", scaled_by=load.describe_share(part))
 
 
-def offsets(at: Circumstances) -> list[Parameter]:
+def declare_offsets(at: Circumstances) -> list[Parameter]:
     """Return the offset of each load cell, where the description says that offsets are fitted."""
     if not at.description.fits_offsets:
         return []
@@ -52,7 +52,7 @@ def offsets(at: Circumstances) -> list[Parameter]:
     ]  # fmt: skip
 
 
-def gain_error(description: Description) -> list[Parameter]:
+def declare_gain_error(description: Description) -> list[Parameter]:
     """Return the relative gain error between the load cells, where the description says how large that of each may be."""
     sd = description.sensors.gain_sd
     if not sd:
@@ -61,9 +61,9 @@ def gain_error(description: Description) -> list[Parameter]:
     return [Parameter(GAIN_ERROR, "$g$", meaning, "sensor", Normal(0.0, sd))]
 
 
-def preload(at: Circumstances) -> list[Parameter]:
-    """Return the preload, and the rope where bending changes the preload."""
-    own = rope(at) if at.description.preload_follows_stretch else []
+def declare_preload(at: Circumstances) -> list[Parameter]:
+    """Return the parameter of the preload, and those of the rope where bending changes the preload."""
+    own = declare_rope(at) if at.description.preload_follows_stretch else []
     return [*own, preload_parameter(at.description, at.defaults, preload_scale(at))]
 
 
@@ -82,7 +82,7 @@ def preload_scale(at: Circumstances) -> Scale:
     return at.cable.friction.conditions.load
 
 
-def rope(at: Circumstances) -> list[Parameter]:
+def declare_rope(at: Circumstances) -> list[Parameter]:
     """Return the parameters of stretch and lengthening, with priors by the stretch that was read."""
     return rope_parameters(at.defaults, _rope_scales(at))
 

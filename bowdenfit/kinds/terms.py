@@ -43,7 +43,7 @@ from bowdenfit.kinds.loop.term import LOOP_MOUNTING, LoopTerms
 from bowdenfit.kinds.preload.term import PRELOAD_NOISE, PreloadTerms
 from bowdenfit.kinds.recordings.term import RecordingTerms
 from bowdenfit.kinds.ringdown.term import RingDownTerms
-from bowdenfit.kinds.shared_parameters import gain_error
+from bowdenfit.kinds.shared_parameters import declare_gain_error
 from bowdenfit.kinds.stretch.term import STRETCH_NOISE, StretchTerms
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Circumstances, TermKind, Truth
@@ -85,7 +85,7 @@ def collect_parameters(cable: Cable, measurements: Measurements) -> list[Paramet
     kinds = list(iterate_term_kinds(measurements))
     circumstances = Circumstances(cable, measurements, any(kind.shows_mounting_scatter for kind, _ in kinds))
     needed = {p.name: p for kind, table in kinds for p in kind.parameters(table, circumstances)}
-    needed |= {p.name: p for p in gain_error(cable.description)}
+    needed |= {p.name: p for p in declare_gain_error(cable.description)}
     return sorted(needed.values(), key=lambda p: _ORDER.index(p.name) if p.name in _ORDER else len(_ORDER))
 
 

@@ -23,7 +23,7 @@ from bowdenfit.recordings.preparation import hysteresis, prepare
 from bowdenfit.recordings.preparation.blocks import estimate_bandwidth, main_frequency
 from bowdenfit.recordings.preparation.clock import DROPOUT, GOOD, SATURATED, SPIKE, Sampled, read_at, spread_repeated
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR, _touched, estimate_delay
-from bowdenfit.recordings.preparation.flags import flag_samples, frozen, resolution, saturation, spikes
+from bowdenfit.recordings.preparation.flags import flag_frozen, flag_samples, resolution, saturation, spikes
 from bowdenfit.recordings.preparation.hysteresis import play
 from bowdenfit.recordings.preparation.noise import (
     correlation_time,
@@ -257,7 +257,7 @@ def test_frozen_and_missing_samples_are_found(side):
 
 def test_a_force_that_rests_without_noise_is_not_frozen():
     raw = recording(noise=0.0)
-    assert not frozen(raw.output_force, raw.input_force, resolution(raw.input_force)).any()
+    assert not flag_frozen(raw.output_force, raw.input_force, resolution(raw.input_force)).any()
 
 
 def test_samples_interpolated_over_a_gap_of_the_other_clock_are_dropouts():

@@ -17,7 +17,7 @@ from bowdenfit.cable.sensors import FORCE_NOISE, INPUT_OFFSET, RUN_SCATTER, Load
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementSettings, DisplacementTable, Turns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
-from bowdenfit.kinds.shared_parameters import force_noise, offsets, rope, run_scatter
+from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_rope, declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable, StretchTable
 from bowdenfit.kinds.term import WRAP_ANGLE, Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
@@ -323,7 +323,7 @@ def _stiffness_parameters(table: DisplacementTable, at: Circumstances) -> list[P
     )  # fmt: skip
     at_stop = settings is not None and settings.end == "stop"
     if at.measurements.table(StretchTable) is not None:
-        return [*rope(at), *([] if at_stop else [spring])]
+        return [*declare_rope(at), *([] if at_stop else [spring])]
     if at_stop:
         return [linear]
     return [spring, linear if ROPE_STIFFNESS in at.description.prior else give]
@@ -331,7 +331,7 @@ def _stiffness_parameters(table: DisplacementTable, at: Circumstances) -> list[P
 
 def _offset_parameter(table: DisplacementTable, at: Circumstances) -> Parameter:
     """Return the offset of the motor's load cell, which looks like friction where it is ignored."""
-    stated = [p for p in offsets(at) if p.name == INPUT_OFFSET]
+    stated = [p for p in declare_offsets(at) if p.name == INPUT_OFFSET]
     if stated:
         return stated[0]
     part = at.defaults.motor_offset_share
@@ -363,8 +363,8 @@ class DisplacementTerms(TermKind[DisplacementTable]):
         return [
             *_stiffness_parameters(table, at),
             *_zero_parameters(table, at),
-            run_scatter(at),
-            force_noise(at, at.noise.meaning("standard deviation of a force reading")),
+            declare_run_scatter(at),
+            declare_force_noise(at, at.noise.meaning("standard deviation of a force reading")),
             *([] if table.sliding else [jitter]),
             _offset_parameter(table, at),
         ]

@@ -18,7 +18,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, simulate_rows
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
-from bowdenfit.kinds.shared_parameters import run_scatter
+from bowdenfit.kinds.shared_parameters import declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, TermKind, Truth
 from bowdenfit.parameters.space import Parameter, ParameterSpace
@@ -142,7 +142,7 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
 
     @override
     def parameters(self, table: EfficiencyTable, at: Circumstances) -> list[Parameter]:
-        return [run_scatter(at)]
+        return [declare_run_scatter(at)]
 
     @override
     def draw(self, table: EfficiencyTable, truth: Truth) -> dict[str, Array]:

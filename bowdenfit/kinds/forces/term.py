@@ -19,7 +19,7 @@ from bowdenfit.kinds.forces.next_run import ForceRunCandidates
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
-from bowdenfit.kinds.shared_parameters import force_noise, offsets, run_scatter
+from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth
@@ -235,7 +235,7 @@ class ForceTerms(TermKind[ForceTable]):
     @override
     def parameters(self, table: ForceTable, at: Circumstances) -> list[Parameter]:
         """Return scatter, noise and offsets; inside a run readings are normal, whatever the noise of mountings."""
-        return [run_scatter(at), force_noise(at), *offsets(at)]
+        return [declare_run_scatter(at), declare_force_noise(at), *declare_offsets(at)]
 
     @override
     def draw(self, table: ForceTable, truth: Truth) -> dict[str, Array]:

@@ -17,7 +17,7 @@ from bowdenfit.cable.elasticity import spread_matrix
 from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.candidate import Candidate, CandidateKind, Simulation, Situation, choose_loads, simulate_rows
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
-from bowdenfit.kinds.shared_parameters import force_noise, offsets, preload
+from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_preload
 from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
@@ -181,8 +181,8 @@ class LoopTerms(TermKind[LoopTable]):
         """Return preload, noise and offsets; and its mounting effect, if other readings show how mountings scatter."""
         meaning = "effect of the loop's mounting on the friction exponent, in units of tau"
         mounting = Parameter(LOOP_MOUNTING, "$m$", meaning, "sensor", Normal(0.0, 1.0))
-        noise = force_noise(at, at.noise.meaning("standard deviation of a force reading"))
-        return [*preload(at), *([mounting] if at.mountings_scatter else []), noise, *offsets(at)]
+        noise = declare_force_noise(at, at.noise.meaning("standard deviation of a force reading"))
+        return [*declare_preload(at), *([mounting] if at.mountings_scatter else []), noise, *declare_offsets(at)]
 
     @override
     def draw(self, table: LoopTable, truth: Truth) -> dict[str, Array]:

@@ -22,7 +22,7 @@ from bowdenfit.kinds.candidate import (
     choose_wrap_angles,
     simulate_rows,
 )
-from bowdenfit.kinds.shared_parameters import preload, preload_scale
+from bowdenfit.kinds.shared_parameters import declare_preload, preload_scale
 from bowdenfit.kinds.tables import AngleTable, PreloadTable
 from bowdenfit.kinds.term import (
     WRAP_ANGLE,
@@ -156,7 +156,7 @@ class PreloadTerms(TermKind[PreloadTable]):
             PRELOAD_NOISE, r"$\sigma_P$", at.noise.meaning("standard deviation of a preload reading"), "noise",
             HalfCauchy(part * by.value), "N", scaled_by=by.describe_share(part),
         )  # fmt: skip
-        return [*preload(at), noise]
+        return [*declare_preload(at), noise]
 
     @override
     def draw(self, table: PreloadTable, truth: Truth) -> dict[str, Array]:

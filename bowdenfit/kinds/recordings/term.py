@@ -47,7 +47,12 @@ from bowdenfit.kinds.recordings.whole_recordings import (
 )
 from bowdenfit.kinds.row_angles import collect_row_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
-from bowdenfit.kinds.shared_parameters import noise_of_forces, offsets, preload, run_scatter
+from bowdenfit.kinds.shared_parameters import (
+    declare_noise_of_forces,
+    declare_offsets,
+    declare_preload,
+    declare_run_scatter,
+)
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, SlidingRows
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
@@ -83,13 +88,13 @@ class RecordingTerms(TermKind[Recordings]):
     def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
         """Return scatter of mountings, noise of blocks, errors of the load cells, and the preload of a loop."""
         late = table.delay_sd
-        block_noise = noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
+        block_noise = declare_noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
         delay = Parameter(
             DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
             Normal(0.0, late), "ms", 1000.0, prior_words=f"Normal(0, {1000 * late:.3g} ms)",
         )  # fmt: skip
-        of_loop = preload(at) if at.cable.is_loop else []
-        return [*of_loop, run_scatter(at), block_noise, *offsets(at), *([delay] if late > 0 else [])]
+        of_loop = declare_preload(at) if at.cable.is_loop else []
+        return [*of_loop, declare_run_scatter(at), block_noise, *declare_offsets(at), *([delay] if late > 0 else [])]
 
     @override
     def draw(self, table: Recordings, truth: Truth) -> dict[str, Array]:

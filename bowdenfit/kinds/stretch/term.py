@@ -21,7 +21,7 @@ from bowdenfit.kinds.candidate import (
     choose_wrap_angles,
     simulate_rows,
 )
-from bowdenfit.kinds.shared_parameters import rope
+from bowdenfit.kinds.shared_parameters import declare_rope
 from bowdenfit.kinds.tables import AngleTable, StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, IndependentReadings, Term, TermKind, Truth
 from bowdenfit.parameters.priors import HalfCauchy, LogNormal, Normal
@@ -119,7 +119,7 @@ class StretchTerms(TermKind[StretchTable]):
             LogNormal(prior.median, prior.log_sd),
         )  # fmt: skip
         return [
-            *rope(at),
+            *declare_rope(at),
             Parameter(
                 STRETCH_ZERO, r"$\Delta L_0$", "stretch that the reading calls zero", "elastic",
                 Normal(0.0, zero * largest.value), "mm", scaled_by=largest.describe_share(zero),

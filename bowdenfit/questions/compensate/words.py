@@ -46,7 +46,7 @@ def format_torque(value: float) -> str:
     return f"{value:.{max(decimals(abs(value)) + 1, 3) if abs(value) >= 1e-3 else 4}f} N*m"
 
 
-def _range(answer: Compensation) -> str:
+def _describe_bends(answer: Compensation) -> str:
     low, high = (f"{angle:.4g}" for angle in answer.bends)
     return f"at {low} deg" if low == high else f"from {low} to {high} deg"
 
@@ -57,20 +57,21 @@ def _feed_forward_sentences(answer: Compensation) -> Iterator[str]:
         return
     friction, left = format_torque(most.friction.median), format_torque(fixed.left)
     risk = f"with at most {percent(answer.risk, 0)} probability the device then moves by itself"
+    bends = _describe_bends(answer)
     if answer.bends[0] == answer.bends[1]:
         yield (
-            f"Feed forward at most {format_torque(fixed.torque)} {_range(answer)}: {risk}. That leaves {left} of {friction} "
-            "to feel."
+            f"Feed forward at most {format_torque(fixed.torque)} {bends}: {risk}. That leaves {left} of {friction} to "
+            "feel."
         )
     elif scheduled.left * _WORTHWHILE < fixed.left:
         yield (
-            f"Feed forward by bend, {scheduled.share:.2f} times the median friction: {risk} somewhere {_range(answer)}. At "
+            f"Feed forward by bend, {scheduled.share:.2f} times the median friction: {risk} somewhere {bends}. At "
             f"{most.wrap_angle:.4g} deg that leaves {format_torque(scheduled.left)} of {friction} to feel. One torque for all "
             f"bends may be {format_torque(fixed.torque)}, the limit at {fixed.decided_at:.4g} deg, and leaves {left}."
         )
     else:
         yield (
-            f"Feed forward at most {format_torque(fixed.torque)} at all bends: {risk} somewhere {_range(answer)}. At "
+            f"Feed forward at most {format_torque(fixed.torque)} at all bends: {risk} somewhere {bends}. At "
             f"{most.wrap_angle:.4g} deg that leaves {left} of {friction} to feel, and by bend {format_torque(scheduled.left)}."
         )
     yield _mounting_sentence(answer, scheduled)
@@ -144,9 +145,9 @@ def _caution_sentences(answer: Compensation) -> Iterator[str]:
         )
     if answer.slack > _LIKELY_SLACK:
         yield (
-            f"Caution: at rest the loop is slack somewhere {_range(answer)} with {percent(answer.slack, 0)} probability; there "
-            "it has no friction to hide, and does not follow at once. Increase the preload, or narrow the range with "
-            "--wrap-angle."
+            f"Caution: at rest the loop is slack somewhere {_describe_bends(answer)} with {percent(answer.slack, 0)} "
+            "probability; a slack loop has no friction to compensate, and does not follow at once. Increase the preload, or "
+            "narrow the range with --wrap-angle."
         )
 
 

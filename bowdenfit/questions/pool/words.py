@@ -39,18 +39,18 @@ def headline(pool: Pool) -> str:
     who = f"{pool.name}: " if pool.name else ""
     if pool.limit is not None and pool.new_cable is not None:
         until = percent(pool.limit.efficiency, 0)
-        early = f"one in twenty does before {_cycles(pool.new_cable.q05)}"
+        early = f"one in twenty does before {_format_cycles(pool.new_cable.q05)}"
         if math.isinf(pool.new_cable.median):
             return f"{who}more likely than not a new cable never falls below {until}; {early}."
-        return f"{who}a new cable falls below {until} after {_cycles(pool.new_cable.median)}; {early}."
+        return f"{who}a new cable falls below {until} after {_format_cycles(pool.new_cable.median)}; {early}."
     wear = pool.wear.share if pool.wear is not None else None
     if len(pool.cables) == 1:  # of which the middle of a population tells little
         wear = pool.cables[0].wear
     if wear is not None:
         way = "grows" if wear.median >= 0 else "falls"
-        return f"{who}friction {way} by {_share(wear)} in {_cycles(pool.reference_cycles)}."
+        return f"{who}friction {way} by {_format_share(wear)} in {_format_cycles(pool.reference_cycles)}."
     name, first = next(iter(pool.typical.items()))
-    value = f"{first.median:z.{decimals(first.sd)}f} (90 % interval {_range(first)})"
+    value = f"{first.median:z.{decimals(first.sd)}f} (90 % interval {_format_bounds(first)})"
     return f"{who}{name} is {value} in the middle of {_count_cables(pool)}."
 
 
@@ -66,24 +66,24 @@ def life_sentences(pool: Pool) -> list[str]:
     limit, lives = pool.limit, [(cable, cable.life) for cable in pool.cables if cable.life is not None]
     lines = []
     if limit.cycles is not None:
-        count = _cycles(limit.cycles)
+        count = _format_cycles(limit.cycles)
         likely = [(cable, life) for cable, life in lives if (life.fails or 0) > 0.5]
         worst = sorted(lives, key=lambda pair: pair[1].median)
-        named = listed([f"{cable.cable} ({_life(life)})" for cable, life in worst[:3]])
-        who = f"the first are {named}" if len(worst) > 1 else f"it lasts {_life(worst[0][1])}"
+        named = listed([f"{cable.cable} ({_format_life(life)})" for cable, life in worst[:3]])
+        who = f"the first are {named}" if len(worst) > 1 else f"it lasts {_format_life(worst[0][1])}"
         lines.append(
             f"Before {count}, {len(likely)} of {_count_cables(pool)} fall below {percent(limit.efficiency, 0)} more likely "
             f"than not; {who}."
         )
         if pool.new_cable is not None:
-            lines.append(f"A new one does so with probability {_probability(pool.new_cable.fails)}.")
+            lines.append(f"A new one does so with probability {_format_probability(pool.new_cable.fails)}.")
     else:
         first = min(lives, key=lambda pair: (pair[1].median, pair[0].cable))
-        lines.append(f"The first to do so is expected to be {first[0].cable}, after {_life(first[1])}.")
+        lines.append(f"The first to do so is expected to be {first[0].cable}, after {_format_life(first[1])}.")
     if pool.new_cable is not None and pool.new_cable.extrapolated:
         lines.append(
-            f"No cable was inspected after more than {_cycles(pool.reference_cycles)}: beyond that wear is assumed to go on as "
-            "before."
+            f"No cable was inspected after more than {_format_cycles(pool.reference_cycles)}: beyond that wear is assumed to "
+            "go on as before."
         )
     lines.append("If cables were taken out of use because they were bad, lives are longer here than they are.")
     return lines
@@ -94,7 +94,7 @@ def outlier_sentences(pool: Pool) -> list[str]:
     if len(pool.cables) == 1:
         return []
     lines = [
-        f"{cable.cable} is an outlier: {cable.departure} (by chance in {_probability(cable.p_value)} of such fleets)."
+        f"{cable.cable} is an outlier: {cable.departure} (by chance in {_format_probability(cable.p_value)} of such fleets)."
         for cable in pool.outliers[:_NAMED]
     ]
     if len(pool.outliers) > _NAMED:
@@ -145,29 +145,28 @@ def next_sentences(pool: Pool) -> list[str]:
     best = pool.next_inspections[0]
     if best.probability is not None and pool.limit is not None:
         what = (
-            f"it fails before {_cycles(pool.limit.cycles or 0)} with probability {_probability(best.probability)}, and no "
-            "other inspection would say more"
+            f"it fails before {_format_cycles(pool.limit.cycles or 0)} with probability "
+            f"{_format_probability(best.probability)}, and no other inspection would say more"
         )
     else:
         what = (
-            f"its wear in {_cycles(pool.reference_cycles)} would be known to ± {percent(best.after)}, now to ± "
+            f"its wear in {_format_cycles(pool.reference_cycles)} would be known to ± {percent(best.after)}, now to ± "
             f"{percent(best.before)}"
         )
-    return [f"Inspect {best.cable} next, after {_cycles(best.cycles)}: {what}."]
+    return [f"Inspect {best.cable} next, after {_format_cycles(best.cycles)}: {what}."]
 
 
 def effect_sentences(pool: Pool) -> list[str]:
     """Say what changes friction."""
     lines = []
     if pool.wear is not None and pool.new_cable is not None:
-        lines.append(
-            f"Friction {_verb_of_change(pool.wear)} by {_share(pool.wear.share)} in {_cycles(pool.reference_cycles)}."
-        )
+        cycles = _format_cycles(pool.reference_cycles)
+        lines.append(f"Friction {_verb_of_change(pool.wear)} by {_format_share(pool.wear.share)} in {cycles}.")
     for effect in pool.effects:
         if effect.name == "lubrication":
-            lines.append(f"Where a cable was lubricated friction {_verb_of_change(effect)} by {_share(effect.share)}.")
+            lines.append(f"Where a cable was lubricated friction {_verb_of_change(effect)} by {_format_share(effect.share)}.")
         else:
-            lines.append(f"Friction {_verb_of_change(effect)} by {_share(effect.share, 2)} a degree.")
+            lines.append(f"Friction {_verb_of_change(effect)} by {_format_share(effect.share, 2)} a degree.")
     return lines
 
 
@@ -217,8 +216,8 @@ def cable_rows(pool: Pool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     for cable in pool.cables:
         cells = [_format_interval(cable.coefficients.get(name), bare=lives) for name in names]
         cells += [_format_interval(cable.wear, 100, " %")] if wears else []
-        cells += [_cycles(cable.life.median, bare=True)] if cable.life else []
-        cells += [_probability(cable.life.fails)] if cable.life and with_failures else []
+        cells += [_format_cycles(cable.life.median, bare=True)] if cable.life else []
+        cells += [_format_probability(cable.life.fails)] if cable.life and with_failures else []
         rows.append((cable.cable, *cells, "outlier" if cable.departure else ""))
     return tuple(heads), rows
 
@@ -250,21 +249,21 @@ def _verb_of_change(effect: Effect) -> str:
     return "grows" if effect.share.median >= 0 else "falls"
 
 
-def _share(share: Interval, digits: int = 1) -> str:
+def _format_share(share: Interval, digits: int = 1) -> str:
     low, high = sorted((abs(share.q05), abs(share.q95))) if share.q05 * share.q95 > 0 else (share.q05, share.q95)
     return f"{percent(abs(share.median), digits)} ({percent(low, digits)} to {percent(high, digits)})"
 
 
-def _range(interval: Interval) -> str:
+def _format_bounds(interval: Interval) -> str:
     digits = decimals(interval.sd)
     return f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
 
 
-def _life(life: Life) -> str:
-    return _cycles(life.median)
+def _format_life(life: Life) -> str:
+    return _format_cycles(life.median)
 
 
-def _cycles(count: float, bare: bool = False) -> str:
+def _format_cycles(count: float, bare: bool = False) -> str:
     """Return a count to three digits, in words."""
     if math.isinf(count):
         return "for ever"
@@ -273,7 +272,7 @@ def _cycles(count: float, bare: bool = False) -> str:
     return text if bare else f"{text} cycles"
 
 
-def _probability(p: float | None) -> str:
+def _format_probability(p: float | None) -> str:
     if p is None:
         return ""
     if p < 1 - _SURE:

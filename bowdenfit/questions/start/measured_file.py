@@ -175,7 +175,7 @@ def inspect_recording(path: Path, why: str) -> MeasuredFile:
             channel.unit,
             channel.unit or heading_of(channel.name).unit,
             True,
-            *_range(channel.values),
+            *_measure_range(channel.values),
             len(channel.values),
         )
         for channel in signals
@@ -184,7 +184,7 @@ def inspect_recording(path: Path, why: str) -> MeasuredFile:
     return MeasuredFile(path, columns, kind, why, has_clock=any(channel.time is not None for channel in signals))
 
 
-def _range(values: np.ndarray) -> tuple[float, float]:
+def _measure_range(values: np.ndarray) -> tuple[float, float]:
     """Return the lowest and highest finite value; zeros where there is none."""
     known = values[np.isfinite(values)]
     return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)

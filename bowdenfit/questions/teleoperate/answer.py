@@ -128,7 +128,7 @@ def sentences(answer: Teleoperation) -> list[str]:
     ]
 
 
-def _range(answer: Teleoperation) -> str:
+def _describe_bends(answer: Teleoperation) -> str:
     low, high = (f"{angle:.4g}" for angle in answer.bends)
     return f"bent to {low} deg" if low == high else f"bent from {low} to {high} deg"
 
@@ -139,14 +139,15 @@ def _wall_sentences(answer: Teleoperation) -> Iterator[str]:
     if hardest is None:
         yield (
             f"Through this cable a hand feels walls of up to {answer.walls[-1]:.0f} N*m/rad, the hardest looked at, without "
-            f"bouncing with at least {sure} probability, {_range(answer)}; {at}."
+            f"bouncing with at least {sure} probability, {_describe_bends(answer)}; {at}."
         )
     elif hardest <= 0:
-        yield f"Through this cable a hand feels no wall without bouncing with {sure} probability, {_range(answer)}; {at}."
+        bends = _describe_bends(answer)
+        yield f"Through this cable a hand feels no wall without bouncing with {sure} probability, {bends}; {at}."
     else:
         yield (
             f"Through this cable a hand feels walls of up to {significant(hardest)} N*m/rad without bouncing with at least "
-            f"{sure} probability, {_range(answer)}; {at}."
+            f"{sure} probability, {_describe_bends(answer)}; {at}."
         )
 
 

@@ -54,7 +54,7 @@ def check_sign(file: str, name: str, force: Vector) -> None:
     Raises:
         DatasetError: More than half of the readings above a fifth of the largest are negative.
     """
-    low, high = _range(force)
+    low, high = _measure_range(force)
     _refuse_missing_code(file, name, force, low, high)
     largest, loaded, below = max(abs(low), abs(high)), 0, 0
     for part in split_pieces(len(force)):
@@ -137,7 +137,7 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
 
 
 def _check_forces(file: str, name: str, force: Vector) -> None:
-    low, high = _range(force)
+    low, high = _measure_range(force)
     if low == high:
         raise DatasetError(
             f"{file}: {name} reads {low:.6g} N in every sample; the usual cause is a load cell that was dead or "
@@ -178,7 +178,7 @@ def _share_repeated(time: Vector) -> float:
     return repeated / (len(time) - 1) if len(time) > 1 else 0.0
 
 
-def _range(force: Vector) -> tuple[float, float]:
+def _measure_range(force: Vector) -> tuple[float, float]:
     """Return the lowest and the highest reading [N]."""
     pieces = (to_floats(force, part) for part in split_pieces(len(force)))
     ends = [(float(np.min(some)), float(np.max(some))) for piece in pieces if len(some := piece[np.isfinite(piece)])]

@@ -21,9 +21,9 @@ from bowdenfit.recordings.preparation.segments import (
     USED,
     Rests,
     Segments,
-    at_drag,
-    band_of,
     cut_segments,
+    estimate_band,
+    move_to_drag,
     play_along_rows,
     read_rests,
     reverses,
@@ -166,7 +166,7 @@ def _coarse(every: Segments) -> Vector:
     few = usable[:: max(1, len(usable) // _COARSE_ROWS)]
     segments = replace(every, x=every.x[few], y=every.y[few], weight=every.weight[few], jitter=every.jitter[few])
     weight = _inner(segments)
-    center, half = band_of(segments)
+    center, half = estimate_band(segments)
     exponents = half * _FRICTIONS
     outputs = play_along_rows(segments.x, starts(segments, -center), exponents)
     stride = max(1, round(0.01 / segments.step))
@@ -232,7 +232,7 @@ def _linearized(
     plain = segments
     if len(initial_drag):
         segments = with_drag(plain, float(point[3]))
-        rests = at_drag(rests, ratio, float(point[3] - initial_drag[0])) if rests else None
+        rests = move_to_drag(rests, ratio, float(point[3] - initial_drag[0])) if rests else None
         weight = weight * np.exp(segments.y - plain.y)
     change, wide, points = 0.01 * exponent, 4.0, delay / segments.step
     exponents = np.array([exponent, exponent + change, exponent - change])
@@ -243,7 +243,7 @@ def _linearized(
     if len(initial_drag):
         more_drag = 0.01 * float(np.exp(np.median(plain.y)))
         other = with_drag(plain, float(point[3]) + more_drag)
-        other_rests = at_drag(rests, ratio, more_drag) if rests else None
+        other_rests = move_to_drag(rests, ratio, more_drag) if rests else None
         moved = play_along_rows(other.x, starts(other, ratio), exponents[:1], other_rests)[0]
         slopes.append((shift_rows(moved, points) - model - other.y + segments.y) / more_drag)
     stands, side = sides(segments, outputs[0], exponent)

@@ -93,7 +93,7 @@ def flag_samples(
     if settings.spikes:
         fault[off] = SPIKE
     if settings.dropouts:
-        fault[frozen(force, other, other_noise) & ~at_end] = DROPOUT
+        fault[flag_frozen(force, other, other_noise) & ~at_end] = DROPOUT
     fault[~finite] = DROPOUT
     gap = gaps_of(time) if settings.dropouts else np.zeros(len(time), dtype=bool)
     return Sampled(time, _without(force, ~finite), fault, gap), ends
@@ -117,7 +117,7 @@ def resolution(force: Vector) -> float:
     return 6 * noise_of(force) + 2 * quantum_of(force)
 
 
-def frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
+def flag_frozen(force: Vector, other: Vector, other_resolution: float) -> Flags:
     """Return samples that repeat one value for so long that quantisation cannot explain it, while the other channel moves.
 
     How long is too long follows from the noise: where it covers at least a third of a quantisation step, the chance of

@@ -225,8 +225,8 @@ def with_drag(segments: Segments, drag: float) -> Segments:
     return replace(segments, x=x, y=y, jitter=segments.jitter * np.exp(segments.x - x))
 
 
-def at_drag(rests: Rests, ratio: float, more: float) -> Rests:
-    """Rests on the scale of more drag [N]."""
+def move_to_drag(rests: Rests, ratio: float, more: float) -> Rests:
+    """Return the rests on the scale of more drag [N]."""
     if more == 0:
         return rests
     there = np.isfinite(rests.level)
@@ -234,8 +234,8 @@ def at_drag(rests: Rests, ratio: float, more: float) -> Rests:
     return replace(rests, level=np.where(there, np.log(np.maximum(force, 1e-300)) - ratio, rests.level))
 
 
-def band_of(segments: Segments) -> tuple[float, float]:
-    """Middle and half width of the band of x - y [1]."""
+def estimate_band(segments: Segments) -> tuple[float, float]:
+    """Return middle and half width of the band of x - y [1]."""
     low, high = np.quantile((segments.x - segments.y)[segments.weight > USED], (0.05, 0.95))
     return float(low + high) / 2, float(high - low) / 2
 

@@ -10,7 +10,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Scale
 from bowdenfit.units import speed_dimension
 
-LEAST_SHARE = 1e-5  # of the loads, judged; an offset cannot take more of a rope's reading than this leaves
+LEAST_SHARE = 1e-5  # of the loads, which an offset leaves of a rope's reading at least; a judgement
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from bowdenfit.physics.geometry import (
 )
 from bowdenfit.types import Vector
 
-_DEGREE = float(np.deg2rad(1.0))
+_DEGREE = float(np.deg2rad(1.0))  # [rad]
 
 
 class Curve(ABC):

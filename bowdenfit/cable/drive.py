@@ -22,7 +22,7 @@ from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import loop_band
 
-LEAST_EXPONENT = 1e-9  # below which friction would push, with whatever the mounting does to it
+LEAST_EXPONENT = 1e-9  # no mounting takes friction below none; not 0, of which logarithms are infinite
 
 PerTime = Float[Array, "time recordings"]
 PerRecording = Float[Array, " recordings"]

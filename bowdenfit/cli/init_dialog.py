@@ -28,8 +28,8 @@ from bowdenfit.words import filled, printable
 
 Answer = TypeVar("Answer")
 FOLDER = "my-cable"
-_MOST_FILES = 12  # that are proposed
-_LONGEST_NAME = 80  # of a cable
+_MOST_FILES = 12  # that are proposed; a judgement
+_LONGEST_NAME = 80  # characters of the name of a cable, a line of a terminal
 
 
 class Terminal:

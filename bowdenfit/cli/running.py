@@ -24,8 +24,8 @@ from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.verb import Watch
 
 INTERRUPTED = 130  # exit code, as shells have it
-_PATIENCE = 1.0  # s, in which a command may end by itself
-_LOOK = 0.2  # s between two looks at the thread; some systems do not wake the main thread for a signal
+_PATIENCE = 1.0  # s, in which a command may end by itself; a judgement
+_LOOK = 0.2  # s between two looks at the thread; a judgement, as some systems do not wake the main thread for a signal
 
 requested = threading.Event()
 """Set where the user or the system stops the program."""

@@ -41,11 +41,11 @@ def safe_shares(margin: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     return np.where(nominal > 0, margin / np.maximum(nominal, 1e-300), np.inf)
 
 
-LARGEST_GAIN, LEAST_GAIN = 1e4, 1e-4  # gains that are looked for
-_HALVINGS = 17  # of a range of eight decades: to a part in 5000
-_ROUNDING = 1e-6  # of a spectral radius: undamped motion of the whole device stands at 1
-_FREQUENCIES = 240
-_IMPEDANCE_ROUNDING = 1e-9  # of an impedance, which rounding may take from it
+LARGEST_GAIN, LEAST_GAIN = 1e4, 1e-4  # gains that are looked for: with these, all or none of the friction is left; judgements
+_HALVINGS = 17  # of a range of eight decades: to a part in 7000
+_ROUNDING = 1e-6  # of a spectral radius: free motion of the whole device is a double 1, which rounding moves by 1.5e-8
+_FREQUENCIES = 240  # from 0.001 to 1 of the Nyquist frequency, 80 a decade; a judgement
+_IMPEDANCE_ROUNDING = 1e-9  # of an impedance, far more than rounding may take from it; a judgement
 
 
 DrawNumbers: TypeAlias = float | np.ndarray

@@ -98,7 +98,7 @@ def karnopp_torque(control: Controller, speed: Numbers) -> Numbers:
     return jnp.where(jnp.abs(speed) > control.dead_zone, control.coulomb * jnp.sign(speed), inside)
 
 
-STEP = 1e-4  # of the plant [s]
+STEP = 1e-4  # of the plant [s]; a judgement: ten steps in a sample of a controller at 1 kHz
 
 
 @jax.tree_util.register_dataclass
@@ -224,7 +224,7 @@ def oscillating_path(seconds: float, sample: float, amplitude: float, period: fl
     return np.stack([amplitude * (1 - np.cos(phase)), amplitude * frequency * np.sin(phase)], axis=1)
 
 
-JUMP_SHARE = 0.1  # of the largest command, from which on a change from one sample to the next is a jump
+JUMP_SHARE = 0.1  # of the largest command, from which on a change from one sample to the next is a jump; a judgement
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from bowdenfit.description.device import Known
 from bowdenfit.physics.stretch import mean_tension
 
 Numbers: TypeAlias = Any  # an array over runs, of JAX or NumPy, or one number for all of them
-_MAX_REDRAWS = 200
+_MAX_REDRAWS = 200  # each leaves at most half of the draws below 0, as no stated value is
 
 
 @jax.tree_util.register_dataclass

@@ -10,7 +10,7 @@ import numpy as np
 from bowdenfit.words import printable
 
 Look: TypeAlias = Literal["line", "dashed", "low", "high", "points", "hollow"]
-_DIGITS, _X_DIGITS = 5, 8  # significant ones of a number; no screen tells more, but places may start far from zero
+_DIGITS, _X_DIGITS = 5, 8  # significant ones: 5 are more than a screen has pixels; places may start far from zero
 PICTURES = "pictures"  # in the context of a section that has some
 
 

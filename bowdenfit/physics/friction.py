@@ -8,7 +8,7 @@ from jax import Array
 from jaxtyping import Float
 
 _SMALL_EXPONENT = 1e-6  # below, three terms of the series in p are exact to the last digit
-_NOTHING_LEFT = 1e-9  # least u^p that is left where friction would hold more than the whole force
+_NOTHING_LEFT = 1e-9  # least u^p that is left where friction would hold more than the whole force; keeps its log finite
 
 
 def friction_exponent(

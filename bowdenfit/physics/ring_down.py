@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float, Int
 
-_LEAST = 1e-12  # of |1 - zeta^2|, where damping is nearly critical
+_LEAST = 1e-12  # of |1 - zeta^2|, where damping is nearly critical: a swing there leaves exp(-pi/1e-6), which is 0
 
 
 def compute_peaks(

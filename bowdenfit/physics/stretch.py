@@ -7,10 +7,10 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-_SMALL_EXPONENT = 1e-4  # below this the mean tension is better computed from its series
-_NOTHING_LEFT = 1e-30  # least share of the peak load, and least friction exponent
-_ITERATIONS = 2  # of Fritsch's method, each with four times the digits of the one before
-_POLISHES = 2  # Newton steps
+_SMALL_EXPONENT = 1e-4  # below, four terms of the series of the mean tension leave x^4/120, less than double precision
+_NOTHING_LEFT = 1e-30  # least share of the peak load, and least friction exponent; keeps logarithms and ratios finite
+_ITERATIONS = 2  # of Fritsch's method, which is of fourth order: each has four times the digits of the one before
+_POLISHES = 2  # Newton steps, each with twice the digits; they take back what cancels in a + w
 
 
 def extension(

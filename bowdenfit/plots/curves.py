@@ -13,7 +13,7 @@ from bowdenfit.plots.style import BLUE, GRAY, LEAST_SQUARES, LIGHT, MEDIAN, NARR
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+BAND_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # ends of the 90 % and 50 % intervals of every answer, and the median
 OUTSIDE = "Outside the range of the curves"
 NEW_RUN = "90 % of runs, each on a new mounting"
 
@@ -100,8 +100,8 @@ def note_shown_count(axes: Axes, count: int, total: int, noun: str = "") -> None
         axes.plot([], [], " ", label=" ".join(filter(None, (f"{count} of {total}", noun, "shown"))))
 
 
-GRID_POINTS = 160
-ENOUGH = 40_000  # draws, beyond which more do not change a picture
+GRID_POINTS = 160  # of a density; a judgement: two of them are less than a line's width apart
+ENOUGH = 40_000  # draws, beyond which more do not change a picture; a judgement
 
 
 def thin_draws(draws: np.ndarray) -> np.ndarray:

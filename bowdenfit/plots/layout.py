@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Sizes of pages are in inches, and judgements: as small as they can be without words on top of each other, which
+# `tests/support/figure_words.py` looks for in every figure.
 LEFT, RIGHT, BOTTOM = 0.62, 0.18, 0.45  # margins
-LEGEND_ROW, LEGEND_ROOM = 0.155, 0.12
+LEGEND_ROW, LEGEND_ROOM = 0.155, 0.12  # a row of the legend, and what is around all of them
 TITLE = 0.22  # room for a title of one line
 LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
 EDGE = 0.08  # from words to the edge of the page
 _MARK, _APART = 2.6, 2.0  # of a legend, in its font size: a mark with its gap, and from one column to the next
-_TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13
+_TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13  # most rows of a title, and one more row of a title or label
 
 
 def empty_page(width: float, height: float) -> Figure:
@@ -236,9 +238,9 @@ def _add_room(figure: Figure, above: float, below: float = 0.0) -> None:
         axes.set_position((box.x0, (box.y0 * height + below) / taller, box.width, box.height * height / taller))
 
 
-TICK = 0.035  # in
-NUMBER_SPACE, NUMBER_ROW = 0.075, 0.16  # in, from one number to the next: a character across, and a row up
-LETTER = 0.053  # in, width of a character of a number
+TICK = 0.035  # in, length of a tick: less than matplotlib's 3.5 pt; a judgement
+NUMBER_SPACE, NUMBER_ROW = 0.075, 0.16  # in, from one number to the next: a character across, and a row up; judgements
+LETTER = 0.053  # in, width of a character of a number: digits, dots and signs of DejaVu Sans at 7 pt, on average
 LEAST_SPACE = 1.1 * LETTER / NUMBER_SPACE  # of that from one number to the next, where there would be one number else
 
 

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from bowdenfit.plots.write import save
 
-_PIXELS = 100  # of the screen, an inch
+_PIXELS = 100  # of the screen, an inch; the usual resolution of notebooks
 
 
 class Page(Figure):

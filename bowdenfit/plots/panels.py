@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST = 8  # recordings in a figure
-LEAST_WIDTH = 1.2  # in, of a panel
-ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most
-LEGEND_MARK = 4.0  # pt
-LONG = 60.0  # ratio of the ends of a logarithmic axis from which it has numbers at powers of ten only
-MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show
+MOST = 8  # recordings in a figure; a judgement
+LEAST_WIDTH = 1.2  # in, of a panel; a judgement: three numbers have room below it
+ALIKE = 4.0  # ranges share an axis if all of them together are so many times the shortest at most; a judgement
+LEGEND_MARK = 4.0  # pt, a little less than a letter; a judgement
+LONG = 60.0  # ratio of the ends of a logarithmic axis from which only powers of ten have numbers; a judgement
+MARK_GRID = (160, 60)  # across and up a panel, marks of a kind that it can show; a judgement
 
 
 def finite(values: Iterable[np.ndarray]) -> np.ndarray:

@@ -27,12 +27,13 @@ from bowdenfit.plots.style import GRAY, MEDIUM, SMALL, WIDE
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
 
+# Sizes are judgements, as those of `layout`.
 STRIP, GAP = 0.5, 0.1  # in, height of a strip, and from it to its panel
 LEFT = 0.68  # in, margin
 _NUMBERS, _PAD, _TWO_LINES = 0.27, 0.11, 0.28  # in, room for numbers, for what is beside them, and for a name in two lines
-NONE = 1e-9  # below which residuals are none, in any unit
+NONE = 1e-9  # below which residuals are rounding, in any unit that is shown
 TALL = 0.85  # height over width of a panel
-_ROOM = 1.2
+_ROOM = 1.2  # limits of a strip over its largest residual, so that no mark touches its edge
 
 
 @dataclass(frozen=True)

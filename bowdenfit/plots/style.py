@@ -24,12 +24,12 @@ SERIES_COLORS = (BLUE, VERMILLION, GREEN, PURPLE, BLACK, ORANGE, SKY, GRAY)
 SERIES_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
 SERIES_LINES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 
-WIDE = 7.0  # in, both columns of a paper
-MEDIUM = 4.6  # in, figures of one panel
+WIDE = 7.0  # in, both columns of a paper of the IEEE
+MEDIUM = 4.6  # in, figures of one panel; a judgement
 SMALL = 7  # pt, ticks and legends
 TITLE_SIZE = 8  # pt
-LEAST = 6  # pt, of any words
-DOTS_PER_INCH = 160
+LEAST = 6  # pt, of any words; what journals still print
+DOTS_PER_INCH = 160  # a judgement: sharp on a screen, and small enough to be mailed
 
 IN_WORDS = {"log rad": "log angle"}  # units that few would understand
 EFFICIENCY, WRAP_ANGLE = "Efficiency (%)", "Wrap angle (deg)"

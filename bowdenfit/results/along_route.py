@@ -19,9 +19,9 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.model import Model
 from bowdenfit.results.optimal_length import OptimalLength, find_best_window, is_at_edge, rank_choices
 
-GRID_POINTS = 201
-_GOLDEN = (np.sqrt(5.0) - 1) / 2
-_REFINEMENTS = 32  # golden sections of a bracket of two grid steps: to 1e-7 of a step
+GRID_POINTS = 201  # an odd number, so that the middle is one; a judgement: curves of wrap angles are wider than many steps
+_GOLDEN = (np.sqrt(5.0) - 1) / 2  # golden ratio: the part of a bracket that each section keeps
+_REFINEMENTS = 32  # golden sections of a bracket of two grid steps: to 4e-7 of a step
 
 
 def route_grid(model: Model, points: int = GRID_POINTS) -> np.ndarray:

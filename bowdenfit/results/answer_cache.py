@@ -19,7 +19,7 @@ from bowdenfit.words import filled, printable
 
 SCHEMA = 7  # counted up with every change of what one of the questions answers, and of how figures look
 CHECKSUM = "crc32"  # of a page, in itself
-_PIECE = 1 << 22  # bytes of a file read at once
+_PIECE = 1 << 22  # bytes of a file read at once; a judgement
 CAPTIONS = "captions.txt"
 _DRAWN = "drawn"
 

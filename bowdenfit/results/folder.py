@@ -27,7 +27,7 @@ ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
 _LOCK = ".lock"  # there while something is being written
 _PARTIAL = ".partial"  # ends the names of what is being written
-_LARGEST = 400e6  # bytes of a text
+_LARGEST = 400e6  # bytes of a text; a judgement: far more than a fit writes
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 

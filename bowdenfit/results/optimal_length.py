@@ -12,7 +12,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
 from bowdenfit.words import capitalized, decimals, filled, percent, significant, table
 
-EDGE_FRACTION = 0.001  # an optimum this close to an end of the range, as a fraction of the range, counts as at the edge
+EDGE_FRACTION = 0.001  # an optimum this close to an end of the range, as a fraction of the range, is at the edge; a judgement
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def find_best_window(
     return Window(within, probability, float(grid[low]), float(grid[high]))
 
 
-_WORTH_SAYING = 0.02  # probability of an optimum at an end of the range; draws know it to 0.003
+_WORTH_SAYING = 0.02  # probability of an optimum at an end of the range; 2,000 effective draws know it to 0.003
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,7 +24,7 @@ from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, rea
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 from bowdenfit.results.serialization import deserialize, serialize, write_arrays
 
-SCHEMA = 6
+SCHEMA = 6  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.

@@ -74,6 +74,23 @@ def diagnose(draws: ChainDraws, n_ensembles: int) -> Diagnostics:
         )
 
 
+def quantile_error(draws: ChainDraws, n_ensembles: int, probability: float) -> float:
+    """Return the Monte Carlo standard error of a quantile; NaN where draws are infinite, 0 where they do not vary.
+
+    Args:
+        draws: Draws, one row a walker, ordered by ensemble.
+        n_ensembles: Number of independent ensembles.
+        probability: Of the quantile, such as 0.05.
+
+    References:
+        Vehtari et al. 2021, "Rank-normalization, folding, and localization" (Bayesian Analysis 16), section 4.4.
+    """
+    if not np.all(np.isfinite(draws)) or np.ptp(draws) == 0.0:
+        return 0.0 if np.all(np.isfinite(draws)) else float("nan")
+    chains = as_chains(draws, n_ensembles)
+    return float(array_stats().mcse(chains, method="quantile", prob=probability, chain_axis=0, draw_axis=1))
+
+
 def array_stats() -> Any:
     """Return ArviZ's statistics of arrays, imported when first needed because ArviZ takes a second to load."""
     from arviz_stats.base import array_stats as functions

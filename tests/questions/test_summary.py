@@ -217,3 +217,13 @@ def test_without_a_route_there_is_no_length_to_choose(tmp_path):
     assert "Best" not in details_text(fit)
     with pytest.raises(bf.UsageError, match="no \\[route\\]"):
         fit.optimal_length()
+
+
+def test_the_page_for_programs_has_the_monte_carlo_error_of_each_end(fit):
+    errors = fit.summary()["sampler"]["monte_carlo_errors"]
+    length = errors["optimal_length"]
+    spread = fit.draws().optimum["optimal_length"]
+    independent = np.std([np.quantile(part, 0.05) for part in np.array_split(spread, 8)]) / np.sqrt(8)
+    assert 0.3 * independent < length["q05"] < 3 * independent
+    assert all(0 <= error < 0.2 * np.ptp(np.quantile(spread, (0.05, 0.95))) for error in length.values())
+    assert set(fit.draws().values) <= set(errors)

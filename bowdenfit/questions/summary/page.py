@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.display import Display, Rows
-from bowdenfit.inference.diagnostics import describe_convergence_shortfalls
+from bowdenfit.inference.diagnostics import describe_convergence_shortfalls, quantile_error
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.sampler_agreement import recommend_sampler
@@ -114,17 +114,27 @@ def _sampler_page(fit: Record, posterior: Draws) -> dict[str, Any]:
     """Return how the draws were sampled, and what is recommended instead ("" if nothing is)."""
     settings = fit.dataset.description.sampler
     shortfalls = describe_convergence_shortfalls(posterior.diagnostics, settings.target_r_hat, settings.target_ess)
-    page = {
+    page: dict[str, Any] = {
         "method": posterior.sampler,
         "ensembles": posterior.n_ensembles,
         "walkers": len(posterior.z) // posterior.n_ensembles,
         "steps": posterior.steps,
         "acceptance": posterior.acceptance,
+        "monte_carlo_errors": _monte_carlo_errors(posterior),
         "recommendation": recommend_sampler(posterior.sampler, fit.model.space.size, bool(shortfalls)),
     }
     if posterior.trajectories is not None:
         page |= {k: v for k, v in values_by_key(posterior.trajectories).items() if k != "statistics"}
     return page
+
+
+def _monte_carlo_errors(posterior: Draws) -> dict[str, dict[str, float]]:
+    """Return the Monte Carlo standard error of the middle and the ends of each interval, by quantity."""
+    quantiles = {"q05": 0.05, "median": 0.5, "q95": 0.95}
+    return {
+        name: {end: quantile_error(draws, posterior.n_ensembles, at) for end, at in quantiles.items()}
+        for name, draws in (posterior.values | posterior.optimum).items()
+    }
 
 
 def _parameter_row(fit: Record, name: str) -> dict[str, Any]:

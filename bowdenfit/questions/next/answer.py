@@ -128,7 +128,8 @@ class RankedCandidate(Part):
         error: Monte Carlo standard error of the share [1].
         sd: Standard deviation of the answer afterwards: the root of its average variance.
         sd_error: Monte Carlo standard error of that.
-        as_good: Whether the best candidate is better by no more than the Monte Carlo error of the difference.
+        as_good: Whether its share is clearly above 0, and the best candidate's larger by no more than the Monte Carlo error of
+            the difference.
         cost: What it costs; None where nothing was said of costs.
     """
 

@@ -137,17 +137,30 @@ def _rank(
     ranked = []
     for i in order:
         sd_after = target.sd_after(explained[i].share)
-        scaled = [Explained(explained[k].share / price[k], 0.0, explained[k].without / price[k]) for k in (first, i)]
-        difference = scaled[0].share - scaled[1].share
+        of_first, of_this = (_divide_by_price(explained[k], price[k]) for k in (first, i))
         ranked.append(
             RankedCandidate(
                 chosen[i], format_candidate(chosen[i]), describe_candidate(fit, chosen[i]),
                 explained[i].share, explained[i].error, sd_after,
                 explained[i].error * target.sd**2 / (2 * sd_after) if sd_after > 0 else 0.0,
-                bool(difference <= EQUAL_WITHIN * error_of_difference(*scaled)), price[i] if costs else None,
+                i == first or is_as_good(of_first, of_this), price[i] if costs else None,
             )
         )  # fmt: skip
     return Several(ranked)
+
+
+def _divide_by_price(explained: Explained, price: float) -> Explained:
+    """Return what a candidate does for each unit of its cost."""
+    return Explained(explained.share / price, explained.error / price, explained.without / price)
+
+
+def is_as_good(best: Explained, other: Explained) -> bool:
+    """Return whether another candidate is a tie with the best: clearly above 0, and not clearly below the best.
+
+    A share of 0 is within the error of a small one, and yet nothing that would do equally well.
+    """
+    difference = best.share - other.share
+    return bool(other.share > EQUAL_WITHIN * other.error and difference <= EQUAL_WITHIN * error_of_difference(best, other))
 
 
 def _vary_load_and_stroke(fit: Record, target: TargetQuantity, best: Candidate) -> LoadAndStroke | None:

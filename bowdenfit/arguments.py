@@ -172,10 +172,29 @@ def number_with_unit(example: str) -> Reader:
     return Reader(read)
 
 
-def numbers_with_units(example: str) -> Reader:
-    """Return what reads numbers with their units, or one by itself, such as the example."""
+def numbers_with_units_by_name(example: str, named: str) -> Reader:
+    """Return what reads numbers with their units, each by a name or by none, as pairs of name ("" for none) and number.
+
+    Args:
+        example: One without a name, such as 90deg.
+        named: One with a name, such as edge=45deg.
+    """
     read = number_with_unit(example).read
-    return Reader(lambda value, name: [read(item, name) for item in _as_list(value)], list[str])
+
+    def read_item(item: Any, name: str) -> tuple[str, NumberWithUnit]:
+        if not (isinstance(item, str) and "=" in item):
+            return "", read(item, name)
+        key, _, number = item.rpartition("=")
+        if not key.strip():
+            raise UsageError(f"{name} {shown(item)} has no name before its '='; write it as {named!r}, or as {example}.")
+        return key.strip(), read(number, f"{name} {key.strip()!r},")
+
+    def read_all(value: Any, name: str) -> list[tuple[str, NumberWithUnit]]:
+        if not isinstance(value, Mapping):
+            return [read_item(item, name) for item in _as_list(value)]
+        return [(str(key), read(number, f"{name}[{key!r}]")) for key, number in value.items()]
+
+    return Reader(read_all, list[str])
 
 
 def numbers_by_name(example: str) -> Reader:

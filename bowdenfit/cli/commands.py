@@ -11,7 +11,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
-from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter, UnusedCliTokensError
+from cyclopts import (
+    App,
+    CycloptsError,
+    Group,
+    MissingArgumentError,
+    Parameter,
+    RepeatArgumentError,
+    UnusedCliTokensError,
+)
 from cyclopts.help import DefaultFormatter, PanelSpec
 from docstring_parser.google import parse
 from rich.box import Box
@@ -34,7 +42,7 @@ if TYPE_CHECKING:
     from bowdenfit.finished_fit import Fit
 
 LOOK: dict[str, Any] = {  # of every command
-    "default_parameter": Parameter(negative=(), show_default=False, allow_repeating=True, json_list=False, json_dict=False),
+    "default_parameter": Parameter(negative=(), show_default=False, json_list=False, json_dict=False),
     "group_arguments": Group("Arguments", sort_key=1),
     "group_parameters": Group("Options", sort_key=2),
     "group_commands": Group("Commands", sort_key=3),
@@ -106,6 +114,8 @@ def describe_error(error: CycloptsError) -> str:
     see = f"See {' '.join(['bowdenfit', *(error.command_chain or ())])} --help."
     if isinstance(error, UnusedCliTokensError):
         return f"Unexpected argument {listed(error.unused_tokens or [])}. {see}"
+    if isinstance(error, RepeatArgumentError):
+        return f"{error.token.keyword} is given twice, and only one can count; leave one out. {see}"
     if isinstance(error, MissingArgumentError) and error.argument is not None and error.argument.index is not None:
         name, words = error.argument.name, error.argument.parameter.help or ""
         dots, many = ("...", "some") if get_origin(error.argument.hint) is tuple else ("", "one")

@@ -16,6 +16,7 @@ def accepted(fit: bf.Fit) -> None:
     bf.predict(fit, np.array([455.0, 470.0]), output_force="22.5 lbf")
     bf.predict(fit, wrap_angles="90deg", quantity="stiffness", spring="5N/mm")
     bf.predict(fit, wrap_angles=[(90, "deg"), "180deg"], preload=(20, "N"))
+    bf.predict(fit, 470, wrap_angles={"bracket edge": "45deg", "free sheath": (100, "deg")})
     bf.plot(fit, "figures", figures="efficiency", width="3.5in", formats=("pdf",))
     bf.export(fit, "c", "cable.h", at="90deg", points=51)
     bf.compensate(fit, "device.toml", wrap_angle="45deg:180deg", risk="5%")

@@ -1,4 +1,4 @@
-"""Predictions while a contact bends, such as over a gait: the mean over its wrap angles, with the least and the most."""
+"""Predictions at stated wrap angles of contacts, and while one bends, as over a gait: the mean, the least and the most."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ from bowdenfit.kinds.rows import read_angle
 from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.predict.lengths import to_newtons
 from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
+from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles
 from bowdenfit.results.record import Record
 from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import counted
@@ -72,14 +73,14 @@ def make_gait(
         DatasetError: The table cannot be read.
     """
     contacts = [c.name for c in fit.dataset.description.contact]
-    if contact is not None and contact not in contacts:
-        raise UsageError(f"--contact {contact!r}: there is no such contact{suggest_name(contact, contacts)}")
-    number = find_bent_contact(fit.model) if contact is None else contacts.index(contact)
+    number = find_bent_contact(fit.model) if contact is None else _find_contact(fit, contact, f"--contact {contact!r}")
     if bool(angles) == (file is not None):
         raise UsageError(
             "--contact needs the wrap angles that it goes through: as --wrap-angle 45deg, which may be repeated, or a table of "
             "them as --gait FILE; name one of the two."
         )
+    if column is not None and file is None:
+        raise UsageError(f"--gait-column {column!r} names a column of --gait FILE, and none is given; leave it out.")
     angles_rad, arms = (_convert_angles(angles), None) if file is None else _read_gait(Path(file), column)
     if len(angles_rad) <= _MOST_ANGLES:
         return Gait(number, contacts[number], angles_rad, len(angles_rad), arms)
@@ -88,6 +89,42 @@ def make_gait(
     kept_angles, kept_arms = (None if of is None else np.interp(middles, ranks, of[order]) for of in (angles_rad, arms))
     assert kept_angles is not None
     return Gait(number, contacts[number], kept_angles, len(angles_rad), kept_arms)
+
+
+def read_stated_angles(fit: Record, named: Sequence[tuple[str, tuple[float, str]]], gait: Gait | None) -> dict[int, float]:
+    """Return stated wrap angles [rad] by number of the contact.
+
+    Args:
+        fit: The fit.
+        named: Names of contacts, and their wrap angles with units.
+        gait: What another contact goes through; None without.
+
+    Raises:
+        UsageError: There is no such contact, one is named twice, or an angle is none.
+    """
+    stated: dict[int, float] = {}
+    for name, angle in named:
+        number = _find_contact(fit, name, f"--wrap-angle '{name}={angle[0]:g}{angle[1]}'")
+        if gait is not None and number == gait.contact:
+            raise UsageError(
+                f"--wrap-angle '{name}={angle[0]:g}{angle[1]}' and --contact or --gait both state the wrap angles of {name!r}; "
+                "leave one of them out."
+            )
+        if number in stated:
+            raise UsageError(
+                f"--wrap-angle states {name!r} twice; state it once, or ask for the mean over several wrap angles by "
+                f"--contact {name!r} with each as --wrap-angle {angle[0]:g}{angle[1]}."
+            )
+        (stated[number],) = _convert_angles([angle])
+    return stated
+
+
+def _find_contact(fit: Record, name: str, option: str) -> int:
+    """Return the number of a contact."""
+    contacts = [contact.name for contact in fit.dataset.description.contact]
+    if name not in contacts:
+        raise UsageError(f"{option}: there is no such contact{suggest_name(name, contacts)}")
+    return contacts.index(name)
 
 
 def _convert_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
@@ -122,6 +159,7 @@ def predict_over_gait(
     input_force: tuple[float, str] | None = None,
     stroke: str = "pull",
     output_force: tuple[float, str] | None = None,
+    stated: Mapping[int, float] = NO_ANGLES,
 ) -> list[dict[str, Any]]:
     r"""Predict efficiency, output force or input force at route values: the mean over a gait, and its extremes.
 
@@ -135,6 +173,7 @@ def predict_over_gait(
         input_force: Force and unit, of which the output force is predicted; efficiencies are predicted without.
         stroke: "pull" or "return".
         output_force: Force and unit that is wanted, of which the input force is predicted.
+        stated: Wrap angles of other contacts [rad], by number; without one a contact keeps its own.
     """
     route, limits = fit.dataset.description.route, find_measured_range(fit)
     friction = fit.model.cable.friction
@@ -146,7 +185,8 @@ def predict_over_gait(
         name, force = "output_force_N", to_newtons(input_force, "--input-force")
     else:
         divisor = force
-    forces = _forces_over_gait(fit, lengths, gait, force, _STROKES[stroke], inverse=output_force is not None)
+    angles = choose_angles(fit.model, lengths, stated)
+    forces = _forces_over_gait(fit, angles, gait, force, _STROKES[stroke], inverse=output_force is not None)
     words = clip_to_tension(forces["mean"], force, slack_word)[1]
     of_load = {"at_input_force_N": force} if friction.depends_on_load and name == "efficiency" else {}
     rows = []
@@ -162,7 +202,7 @@ def predict_over_gait(
             for which in ("", "most_"):
                 row |= _format_interval(f"{which}{_TORQUE}", forces[f"{which}torque"][:, i] / 1000, f"{which}{_TORQUE}_")
         load = None if name == "efficiency" else float(np.median(forces["mean"][:, i])) if output_force else force
-        notes = [words[i], gait.description, *limits.notes(None if route is None else float(length), load)]
+        notes = [words[i], gait.description, angles.notes[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             notes.append(outside := route.outside(length))
             row["in_range"] = not outside
@@ -177,14 +217,14 @@ def _format_interval(name: str, draws: np.ndarray, prefix: str = "") -> dict[str
 
 
 def _forces_over_gait(
-    fit: Record, lengths: np.ndarray, gait: Gait, force: float, sign: float, *, inverse: bool
+    fit: Record, chosen: PredictionAngles, gait: Gait, force: float, sign: float, *, inverse: bool
 ) -> dict[str, np.ndarray]:
     """Return forces at the other end [N], draws by route values: the mean, in a new mounting, and the extremes."""
     model, cable = fit.model, fit.model.cable
     function: Callable[..., Array] = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 
-    def average_over_gait(values: Mapping[str, Array], at: Array, bends: Array, mounting: Array) -> dict[str, Array]:
-        angles = cable.wrap_angles(values, at)
+    def average_over_gait(values: Mapping[str, Array], bends: Array, mounting: Array) -> dict[str, Array]:
+        angles = chosen.resolve(cable, values)
 
         def step(carry: dict[str, Array], bend: Array) -> tuple[dict[str, Array], None]:
             bent = angles.at[:, gait.contact].set(bend[0])
@@ -196,18 +236,18 @@ def _forces_over_gait(
                 "most_torque": jnp.maximum(carry["most_torque"], torque),
             }, None  # fmt: skip
 
-        none = jnp.zeros(len(at))
+        none = jnp.zeros(len(chosen.route))
         start = {"mean": none, "least": none + jnp.inf, "most": none, "torque": none, "most_torque": none - jnp.inf}
         return jax.lax.scan(step, start, bends)[0]
 
-    def forces_of_draw(z_and_mounting: Array, at: Array, bends: Array) -> dict[str, Array]:
+    def forces_of_draw(z_and_mounting: Array, bends: Array) -> dict[str, Array]:
         values = model.space.constrain(z_and_mounting[:-1])
-        mounted = average_over_gait(values, at, bends, z_and_mounting[-1])["mean"]
-        return average_over_gait(values, at, bends, jnp.zeros(())) | {"mounted": mounted}
+        mounted = average_over_gait(values, bends, z_and_mounting[-1])["mean"]
+        return average_over_gait(values, bends, jnp.zeros(())) | {"mounted": mounted}
 
     with jax.enable_x64(True):
         arms = np.zeros(len(gait.angles)) if gait.arms is None else gait.arms
-        data = jnp.asarray(lengths, dtype=float), jnp.asarray(np.column_stack([gait.angles, arms]))
-        program = for_each_draw(forces_of_draw, model.space.size + 1, *data, run_once=True)
+        bends = jnp.asarray(np.column_stack([gait.angles, arms]))
+        program = for_each_draw(forces_of_draw, model.space.size + 1, bends, run_once=True)
         forces_by_draw: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
     return forces_by_draw

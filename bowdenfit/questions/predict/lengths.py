@@ -1,6 +1,6 @@
 """Predictions as rows of a table, for the command line and for other programs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -9,9 +9,9 @@ import numpy as np
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
-from bowdenfit.inference.draws import output_force_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
+from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles, predict_forces
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
 
@@ -24,6 +24,7 @@ def predict_at_lengths(
     input_force: tuple[float, str] | None = None,
     stroke: str = "pull",
     output_force: tuple[float, str] | None = None,
+    stated: Mapping[int, float] = NO_ANGLES,
 ) -> list[dict[str, Any]]:
     """Predict efficiency or a force at route values; a note says what lies outside the measurements or where a rope is slack.
 
@@ -33,6 +34,7 @@ def predict_at_lengths(
         input_force: Force and unit, of which the output force is predicted; efficiencies are predicted without.
         stroke: "pull" or "return".
         output_force: Force and unit that is wanted, of which the input force is predicted.
+        stated: Stated wrap angles [rad], by number of the contact; the others keep their own.
 
     Raises:
         UsageError: A force is not a positive force, or there is no posterior.
@@ -47,7 +49,8 @@ def predict_at_lengths(
         divisor = force
     inverse = output_force is not None
     slack_word = "held by friction alone" if inverse else "slack"
-    force_draws = _output_forces(fit, lengths, force, sign, inverse)
+    angles = choose_angles(fit.model, lengths, stated)
+    force_draws = _output_forces(fit, angles, force, sign, inverse)
     (mean, words), (mounted, _) = (clip_to_tension(forces, force, slack_word) for forces in force_draws)
     mean, mounted = mean / divisor, mounted / divisor
     of_load = {"at_input_force_N": force} if fit.model.cable.friction.depends_on_load and stated_force is None else {}
@@ -66,7 +69,7 @@ def predict_at_lengths(
         row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
         row |= of_load
         load = interval.median if inverse else stated_force
-        notes = [words[i], *limits.notes(None if route is None else float(length), load)]
+        notes = [words[i], angles.notes[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             notes.append(outside := route.outside(length))
             row["in_range"] = not outside
@@ -118,15 +121,18 @@ def to_route_unit(route: Route | None, lengths: Sequence[float | NumberWithUnit]
     return values
 
 
-def _output_forces(fit: Record, lengths: np.ndarray, force: float, sign: int, inverse: bool) -> tuple[np.ndarray, np.ndarray]:
+def _output_forces(
+    fit: Record, angles: PredictionAngles, force: float, sign: int, inverse: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Return forces at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
     route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
-    if not inverse and route is not None and (force, sign, tuple(lengths)) == (reference, 1, tuple(route.choices)):
+    is_usual = not inverse and route is not None and not angles.is_own.any()
+    if route is not None and is_usual and (force, sign, tuple(angles.route)) == (reference, 1, tuple(route.choices)):
         return fit.along_route.mean, fit.along_route.mounted
     z = fit.draws().flat_z
     with jax.enable_x64(True):
         mountings = np.zeros(len(z)), fit.mounting()
-        mean, mounted = output_force_at(fit.model, z, lengths, force, sign, mountings, inverse=inverse)
+        mean, mounted = predict_forces(fit.model, z, angles, force, sign, mountings, inverse=inverse)
     return mean, mounted
 
 

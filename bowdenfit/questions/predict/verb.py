@@ -17,7 +17,7 @@ from bowdenfit.arguments import (
     Stroke,
     as_pair,
     number_with_unit,
-    numbers_with_units,
+    numbers_with_units_by_name,
     read_first,
 )  # fmt: skip
 from bowdenfit.display import csv_text
@@ -39,7 +39,9 @@ _NOT_STORED = (  # what is not kept
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
 Force: TypeAlias = Annotated[Quantity | None, Parameter(metavar="FORCE"), number_with_unit("100N")]
 Angles: TypeAlias = Annotated[
-    Quantity | Sequence[Quantity], Parameter("--wrap-angle", metavar="ANGLE"), numbers_with_units("90deg")
+    Quantity | Sequence[Quantity] | Mapping[str, Quantity],
+    Parameter("--wrap-angle", metavar="[NAME=]ANGLE"),
+    numbers_with_units_by_name("90deg", "bracket edge=45deg"),
 ]
 _QUANTITY = Parameter(metavar="QUANTITY", show_default="efficiency, or what --input-force and --output-force ask for")
 
@@ -71,7 +73,8 @@ def predict(
         stroke: Direction of sliding.
         output_force: Force that is wanted at the load side, such as 100N: what input force gives it.
         quantity: What to predict.
-        wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; may be repeated.
+        wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; or give a contact this one, such as
+            "bracket edge=45deg"; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
         friction_limit: What may be felt in free motion, for the preload window: 50N*mm (or 5N without a pulley radius).
         spring: Stiffness of springs in series, one with each rope, for the stiffness: 5N/mm.
@@ -84,22 +87,35 @@ def predict(
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
     applied_force, wanted_force = as_pair(input_force), as_pair(output_force)
-    angles = cast("list[NumberWithUnit]", wrap_angles)
+    pairs = cast("list[tuple[str, NumberWithUnit]]", wrap_angles)
+    angles, named = [angle for name, angle in pairs if not name], [pair for pair in pairs if pair[0]]
     quantity = _choose_quantity(quantity, input_force, output_force)
     over_gait = any(option is not None for option in (contact, gait, gait_column))
+    _refuse_nameless_angles(angles, named, over_gait)
     without_route = fit.dataset.description.route is None and fit.model.cable.is_loop
-    if not over_gait and (wrap_angles or quantity not in AT_LENGTHS or without_route):
+    if not (over_gait or named) and (angles or quantity not in AT_LENGTHS or without_route):
         _refuse_lengths(lengths)
         fit.draws()
         limit, stiffness = as_pair(friction_limit), as_pair(spring)
         query = room.make_query(fit, angles, applied_force, wanted_force, as_pair(preload), limit, stroke, stiffness)
         return room.Predictions(room.predict_at_wrap_angles(fit, quantity, query))
-    _refuse_bend_options(quantity, over_gait, preload or spring, friction_limit, input_force)
+    _refuse_bend_options(quantity, over_gait or bool(named), preload or spring, friction_limit, input_force)
     route_values = room.choose_route_values(fit, cast("list[float | NumberWithUnit] | None", lengths))
-    if over_gait:
-        gait_angles = room.make_gait(fit, contact, angles, gait, gait_column)
-        return room.Predictions(room.predict_over_gait(fit, route_values, gait_angles, applied_force, stroke, wanted_force))
-    return room.Predictions(room.predict_at_lengths(fit, route_values, applied_force, stroke, wanted_force))
+    gait_angles = room.make_gait(fit, contact, angles, gait, gait_column) if over_gait else None
+    forces, stated = (applied_force, stroke, wanted_force), room.read_stated_angles(fit, named, gait_angles)
+    if gait_angles is not None:
+        return room.Predictions(room.predict_over_gait(fit, route_values, gait_angles, *forces, stated))
+    return room.Predictions(room.predict_at_lengths(fit, route_values, *forces, stated))
+
+
+def _refuse_nameless_angles(angles: Sequence[NumberWithUnit], named: Sequence[object], over_gait: bool) -> None:
+    """Refuse wrap angles of which some say whose they are and others do not."""
+    if angles and named and not over_gait:
+        value, unit = angles[0]
+        raise UsageError(
+            f"--wrap-angle {value:g}{unit} does not say which contact is bent, and others do; write NAME={value:g}{unit}, or "
+            "name the contact that goes through several as --contact NAME."
+        )
 
 
 def _refuse_lengths(lengths: object) -> None:
@@ -110,15 +126,17 @@ def _refuse_lengths(lengths: object) -> None:
 
 def _refuse_bend_options(
     quantity: QuantityName,
-    over_gait: bool,
+    of_contacts: bool,
     preload: Quantity | None,
     friction_limit: Quantity | None,
     input_force: Quantity | None,
 ) -> None:
     """Refuse at lengths what is predicted at wrap angles alone."""
     of_bends = preload is not None or friction_limit is not None
-    if over_gait and (quantity not in AT_LENGTHS or of_bends):
-        raise UsageError(f"--contact and --gait are asked of {', '.join(AT_LENGTHS)}; leave the rest out.")
+    if of_contacts and (quantity not in AT_LENGTHS or of_bends):
+        raise UsageError(
+            f"--contact, --gait and --wrap-angle NAME=ANGLE are asked of {', '.join(AT_LENGTHS)}; leave the rest out."
+        )
     if of_bends:
         raise UsageError(
             "--preload, --spring and --friction-limit belong to predictions at wrap angles; name some, as --wrap-angle 90deg."
@@ -194,6 +212,9 @@ VERB = Verb(
                       --friction-limit, and the best
 
     LENGTHS are in the unit of the route, or have their own: 455, 455mm, 18 in.
+
+    --wrap-angle NAME=ANGLE gives a contact this wrap angle, one for each contact; the
+    others keep theirs.
 
     --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while
     this contact bends, such as over a stride; with moment arms in that file

@@ -1,0 +1,79 @@
+"""Predictions with a stated wrap angle for each contact, and at lengths outside the angle curves."""
+
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.errors import UsageError
+from bowdenfit.inference.draws import curve_function, for_each_draw
+
+EDGE, FREE = "bracket edge", "free sheath"
+
+
+@pytest.fixture(scope="module")
+def fit(quick_fit):
+    """A fit of the on-body data: two curved contacts, and an edge at 45 deg."""
+    return quick_fit
+
+
+def expected(fit, length, free_deg, edge_deg):
+    """Efficiency of every draw at a length inside the curves, by the capstan equation."""
+    curves = for_each_draw(curve_function(fit.model, np.array([float(length)])), fit.model.space.size)(fit.posterior.flat_z)
+    own = np.deg2rad(curves["free_sheath_angle"][:, 0])
+    mu1, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu3"))
+    more = mu1 * (np.deg2rad(free_deg) - own) + mu3 * np.deg2rad(edge_deg - 45)
+    return curves["efficiency"][:, 0] * np.exp(-more)
+
+
+def test_each_contact_can_be_given_its_wrap_angle(fit):
+    (row,) = bf.predict(fit, [470], wrap_angles={EDGE: "30deg", FREE: (100, "deg")})
+    right = expected(fit, 470, 100, 30)
+    assert row["efficiency"] == pytest.approx(np.median(right), rel=1e-9)
+    assert row["q05"] == pytest.approx(np.quantile(right, 0.05), rel=1e-9)
+    assert row["note"] == "'bracket edge' bent by 30 deg and 'free sheath' bent by 100 deg"
+    assert bf.predict(fit, 470, wrap_angles=["free sheath=100deg", "bracket edge = 30 deg"])[0]["mean"] == row["mean"]
+    (force,) = bf.predict(fit, 470, "50N", wrap_angles={EDGE: "30deg", FREE: "100deg"})
+    assert force["output_force_N"] == pytest.approx(50 * np.median(right), rel=1e-9)
+
+
+def test_other_contacts_keep_a_stated_angle_while_one_goes_through_several(fit):
+    (row,) = bf.predict(fit, [470], contact=EDGE, wrap_angles=["0deg", "60deg", "free sheath=100deg"])
+    mean = (expected(fit, 470, 100, 0) + expected(fit, 470, 100, 60)) / 2
+    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-9)
+    assert "mean over 2 wrap angles of 'bracket edge', 0 to 60 deg; 'free sheath' bent by 100 deg" in row["note"]
+
+
+def test_the_command_takes_an_angle_for_each_contact(fit, quick_results, run):
+    code, out, _ = run(
+        "predict", quick_results, "470", "--wrap-angle", "bracket edge=45deg", "--wrap-angle", "free sheath=100deg"
+    )
+    assert code == 0
+    assert f"Efficiency at 470 mm: {100 * np.median(expected(fit, 470, 100, 45)):.1f}" in out
+    assert "'bracket edge' bent by 45 deg and 'free sheath' bent by 100 deg" in " ".join(out.split())
+
+
+def test_what_would_not_be_used_is_refused(quick_results, refuse, tmp_path):
+    twice = ("--contact", EDGE, "--wrap-angle", "45deg", "--contact", FREE, "--wrap-angle", "100deg")
+    assert "--contact is given twice, and only one can count" in refuse("predict", quick_results, "470", *twice)
+    (tmp_path / "swing.csv").write_text("wrap_angle_deg\n45\n")
+    gait = ("--gait", tmp_path / "swing.csv")
+    for typed, words in (
+        (("--wrap-angle", "braket edge=45deg"), "there is no such contact; did you mean 'bracket edge'?"),
+        (("--wrap-angle", "bracket edge=45deg", "--wrap-angle", "bracket edge=20deg"), "states 'bracket edge' twice"),
+        (("--wrap-angle", "45deg", "--wrap-angle", "bracket edge=20deg"), "does not say which contact is bent"),
+        (("--wrap-angle", "bracket edge=45"), "'bracket edge', '45' is not a number with its unit"),
+        (("--wrap-angle", "=45deg"), "has no name before its '='"),
+        (("--wrap-angle", "bracket edge=-45deg"), "write it without a sign"),
+        (("--contact", EDGE, *gait, "--wrap-angle", "bracket edge=20deg"), "both state the wrap angles of 'bracket edge'"),
+        (("--contact", EDGE, "--wrap-angle", "20deg", "--gait-column", "knee"), "none is given; leave it out"),
+        (("--wrap-angle", "bracket edge=20deg", "--quantity", "friction"), "leave the rest out"),
+        (("--input-force", "50N", "--input-force", "60N"), "--input-force is given twice"),
+    ):
+        assert words in refuse("predict", quick_results, "470", *typed), typed
+
+
+def test_a_wrong_angle_of_a_contact_is_refused_in_a_notebook(fit):
+    with pytest.raises(UsageError, match=r"wrap_angles\['bracket edge'\] = 45 is not a number with its unit"):
+        bf.predict(fit, 470, wrap_angles={EDGE: 45})
+    with pytest.raises(UsageError, match="did you mean 'free sheath'"):
+        bf.predict(fit, 470, wrap_angles={"free sheat": "45deg"})

@@ -305,14 +305,14 @@ def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_l
     assert found.ranked == 95
     assert found.is_conclusive
     assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(found)
-    assert "they would change nothing." in " ".join(calibration_text(found).split())
+    assert "they are, they would change nothing." in " ".join(calibration_text(found).split())
     spoiled = [
         replace(each, ranked={"mu": replace(each.ranked["mu"], rank=0.01)}) for each in replications(100, bad=10)[:10]
     ]
     suspect = summarize_replications([*spoiled, *replications(100, bad=10)[10:]], {})
     assert not suspect.faults
     assert suspect.faults_with_all == {"mu": "ranks are not uniform"}
-    assert "wrong would be mu (ranks are not uniform)" in " ".join(calibration_text(suspect).split())
+    assert "mu (ranks are not uniform) would be wrong" in " ".join(calibration_text(suspect).split())
     worse = summarize_replications(replications(100, bad=30), {})
     assert not worse.is_calibrated
     assert "NOT JUDGED: 70 of 100" in calibration_text(worse)

@@ -89,7 +89,7 @@ def test_the_printed_study_shows_what_it_can_show():
     assert "-6.98 % for 550 mm does not follow" in found.contradictions[0] and "-6.19 %" in found.contradictions[0]
     assert "No mean of no exoskeleton gives both" in found.contradictions[1]
     text = str(found)
-    assert "470 mm is not shown to be lower than 550 mm" in text and "same order" in text
+    assert "470 mm is not significantly lower than 550 mm" in text and "same order" in text
     assert max(len(line.encode()) for line in text.splitlines()) <= 80
 
 
@@ -99,7 +99,7 @@ def test_numbers_that_go_together_contradict_nothing():
     assert not list(find_contradictions(study.model_copy(update={"difference": tuple(right)})))
     wild = study.difference[0].model_copy(update={"p": "0.9", "percent": None})
     (said,) = find_contradictions(study.model_copy(update={"difference": (wild,)}))
-    assert "does not go with their standard errors" in said
+    assert "contradicts their standard errors" in said
     assert rounding_range("-6.98") == pytest.approx((-6.985, -6.975)) and rounding_range("6.3") == pytest.approx((6.25, 6.35))
 
 

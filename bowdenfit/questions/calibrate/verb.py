@@ -1,4 +1,4 @@
-"""Asking whether the intervals of a description contain the truth as often as they claim."""
+"""The verb `calibrate`: whether the intervals of a description contain the truth as often as they claim."""
 
 import secrets
 from collections.abc import Callable, Sequence
@@ -122,17 +122,17 @@ VERB = Verb(
     _reply,
     """Test whether intervals contain the truth as often as they claim.
 
-    This is simulation-based calibration of DATASET, of this very description and
-    for tables like these. Again and again, true values are drawn from the priors,
-    tables like the measured ones (the same lengths, runs, loads and wrap angles)
-    are simulated with them and fitted. Then intervals must contain the truth as often
-    as they claim, for every parameter, the optimal length and the efficiency there.
-    What was measured enters only by the design.
+    This is simulation-based calibration of the description in DATASET. Again and
+    again, true values are drawn from the priors, and tables like the measured ones
+    (the same lengths, runs, loads and wrap angles) are simulated with them and
+    fitted. Then intervals must contain the truth as often as they claim, for every
+    parameter, the optimal length and the efficiency there. The measured values
+    themselves are not used, only where they were taken.
 
-    With --truth FILE the true values are those of a file, not of the priors:
-    whether a default prior suits cables like that.
+    With --truth FILE the true values are taken from a file instead of the priors,
+    to test whether a default prior suits such cables.
 
-    It takes a fraction of a second a replication; recordings take some seconds.
+    A replication takes a fraction of a second, with recordings some seconds.
     Exit code 3: not calibrated.
     """,
     json="Print calibration.json instead of the summary for people.",

@@ -40,7 +40,7 @@ def details_text(calibration: Calibration) -> str:
 
 
 def calibration_page(calibration: Calibration) -> HtmlPage:
-    """Return a calibration as a page: whether intervals keep their word, quantity by quantity, and what was left out.
+    """Return a calibration as a page: whether intervals contain the truth, quantity by quantity, and what was left out.
 
     Args:
         calibration: The calibration.
@@ -129,10 +129,8 @@ def verdict_sentences(calibration: Calibration) -> list[str]:
 
 def _power_sentence(calibration: Calibration) -> str:
     """Say what so many replications can see."""
-    seen = listed(
-        [f"too small by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in calibration.power]
-    )
-    return f"For a single quantity, intervals {seen} would be detected by {calibration.ranked} replications."
+    detected = listed([f"by {percent(p.too_small, 0)} with probability {p.caught:.2f}" for p in calibration.power])
+    return f"For a single quantity, {calibration.ranked} replications would detect intervals that are too small {detected}."
 
 
 def quantity_rows(calibration: Calibration) -> list[tuple[str, ...]]:
@@ -177,7 +175,8 @@ def evidence_note(calibration: Calibration) -> str:
     return (
         "p of ranks: probability that uniform ranks would be this far from uniform; corrected (Holm) for the number of "
         f"quantities, {criterion}. "
-        "Shrinkage: 0 where the data add nothing to the prior, 1 where they determine the value completely."
+        "Shrinkage (posterior contraction): 0 where the data add nothing to the prior, 1 where they determine the value "
+        "completely."
     )
 
 
@@ -192,10 +191,9 @@ def _quantity_row(q: CheckedQuantity) -> tuple[str, ...]:
 def _describe_with_unconverged(calibration: Calibration) -> str:
     """Say what would be wrong if replications that did not converge were ranked too."""
     if calibration.faults_with_all == calibration.faults:
-        return "Ranked as far as they came, they would change nothing."
+        return "Counted as they are, they would change nothing."
     wrong = [f"{name} ({fault})" for name, fault in calibration.faults_with_all.items()]
-    says = f"wrong would be {listed(wrong)}" if wrong else "nothing would be wrong"
-    return f"Ranked with them, as far as they came, {says}."
+    return f"With them, counted as they are, {listed(wrong) if wrong else 'nothing'} would be wrong."
 
 
 def _describe_unconverged(numbers: list[int]) -> str:
@@ -213,7 +211,7 @@ def omission_sentences(calibration: Calibration) -> list[str]:
         words = {
             "laplace": "importance sampling",
             "ensembles": "full sampling",
-            "nuts": "sampling by gradients",
+            "nuts": "NUTS",
         }
         lines[0] += (
             f" Fitted by {listed([f'{words.get(name, name)} ({n})' for name, n in calibration.engines.items()])}."
@@ -225,7 +223,7 @@ def omission_sentences(calibration: Calibration) -> list[str]:
         )
         lines.append(
             f"{counted(n, 'simulated data set was', 'simulated data sets were')} drawn again, truth and tables together, "
-            f"because no bench would hand {'it' if n == 1 else 'them'} in: {why}. "
+            f"because no bench would produce {'it' if n == 1 else 'them'}: {why}. "
             "The rule looks at the simulated readings alone"
             f"{', whatever the truth is' if calibration.truths else ', so it leaves the ranks uniform'}."
         )

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.compensate.answer import Compensation
 
-HEADING = "How much friction may be hidden"
+HEADING = "How much friction may be compensated"
 _HEIGHT = 1.9  # in
 _TORQUE = "Torque (N m)"
 

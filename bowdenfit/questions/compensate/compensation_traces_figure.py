@@ -24,7 +24,7 @@ def caption(answer: Compensation) -> str:
     n = len(answer.simulated.laws) if answer.simulated is not None else 0
     return (
         "Simulated torques at the motor and at the joint while a hand moves the device to and fro, a panel for each way of "
-        f"hiding friction. n = {counted(n, 'simulation')}."
+        f"compensating friction. n = {counted(n, 'simulation')}."
     )
 
 

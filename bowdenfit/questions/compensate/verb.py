@@ -1,4 +1,4 @@
-"""Asking how much of a cable's friction a controller may hide."""
+"""The verb `compensate`: how much of a cable's friction a controller may compensate."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -31,7 +31,7 @@ def compensate(
     risk: Annotated[Quantity | None, Parameter(metavar="PERCENT", show_default="5%"), number_with_unit("5%")] = None,
     output: Output = None,
 ) -> "Compensation":
-    """How much of a loop's friction a controller may hide before the device moves by itself, and what is left to feel.
+    """How much of a loop's friction a controller may compensate before the device moves by itself, and what a hand still feels.
 
     Args:
         fit: The fit.
@@ -78,10 +78,11 @@ def _reply(answer: "Compensation", options: dict[str, Any]) -> Reply:
 VERB = Verb(
     compensate,
     _reply,
-    """Say how much friction a controller may hide.
+    """Say how much friction a controller may compensate.
 
-    More than that, and the device moves by itself. The answer holds over all that
-    the fit leaves open and over mountings, and says what is left to feel.
+    With more than that, the device moves by itself. The answer covers the
+    uncertainty of the fit and the scatter between mountings, and says how much
+    friction a hand still feels.
 
       karnopp  a torque in the direction of motion, fed forward outside a dead zone
       active   the torque measured at the joint, fed back

@@ -15,7 +15,7 @@ from bowdenfit.questions.compensate.answer import (
 from bowdenfit.words import decimals, filled, listed, percent, table
 
 _ROWS = 3  # of the bends in the table; a judgement
-_LAWS = {NONE: "with nothing hidden", KARNOPP: "when it is fed forward", ACTIVE: "when it is fed back"}
+_LAWS = {NONE: "without compensation", KARNOPP: "with feed-forward", ACTIVE: "with feedback"}
 _WORTHWHILE = 1.2  # times better, from which on a schedule is worth its trouble; a judgement
 _LIKELY_SLACK = 0.005  # probability that rounds to 1 %
 
@@ -30,7 +30,7 @@ def compensation_text(answer: Compensation) -> str:
 
 
 def sentences(answer: Compensation) -> list[str]:
-    """Say what to do, what is left, what it rests on, and what would be needed to say more."""
+    """Say what to do, what friction remains, what it rests on, and what would be needed to say more."""
     parts = [
         *_feed_forward_sentences(answer),
         *_feedback_sentences(answer),
@@ -60,19 +60,21 @@ def _feed_forward_sentences(answer: Compensation) -> Iterator[str]:
     bends = _describe_bends(answer)
     if answer.bends[0] == answer.bends[1]:
         yield (
-            f"Feed forward at most {format_torque(fixed.torque)} {bends}: {risk}. That leaves {left} of {friction} to "
-            "feel."
+            f"Feed forward at most {format_torque(fixed.torque)} {bends}: {risk}. The hand then feels {left} of the "
+            f"{friction} of friction."
         )
     elif scheduled.left * _WORTHWHILE < fixed.left:
         yield (
             f"Feed forward by bend, {scheduled.share:.2f} times the median friction: {risk} somewhere {bends}. At "
-            f"{most.wrap_angle:.4g} deg that leaves {format_torque(scheduled.left)} of {friction} to feel. One torque for all "
-            f"bends may be {format_torque(fixed.torque)}, the limit at {fixed.decided_at:.4g} deg, and leaves {left}."
+            f"{most.wrap_angle:.4g} deg the hand then feels {format_torque(scheduled.left)} of the {friction} of friction. One "
+            f"torque for all bends may be {format_torque(fixed.torque)}, the limit at {fixed.decided_at:.4g} deg, and leaves "
+            f"{left}."
         )
     else:
         yield (
             f"Feed forward at most {format_torque(fixed.torque)} at all bends: {risk} somewhere {bends}. At "
-            f"{most.wrap_angle:.4g} deg that leaves {left} of {friction} to feel, and by bend {format_torque(scheduled.left)}."
+            f"{most.wrap_angle:.4g} deg the hand then feels {left} of the {friction} of friction; with feed-forward by bend it "
+            f"would feel {format_torque(scheduled.left)}."
         )
     yield _mounting_sentence(answer, scheduled)
 
@@ -85,8 +87,8 @@ def _mounting_sentence(answer: Compensation, scheduled: FeedForward) -> str:
     elif scheduled.share >= answer.share_without_scatter:
         seem = "that hardly matters here"
     else:
-        seem = f"without it {answer.share_without_scatter:.2f} would seem safe, and is not"
-    return f"The friction exponent scatters from mounting to mounting by {answer.scatter:.2g} of itself ({source}); {seem}."
+        seem = f"neglecting it, {answer.share_without_scatter:.2f} would seem safe, and is not"
+    return f"The relative scatter of the friction exponent between mountings (tau) is {answer.scatter:.2g} ({source}); {seem}."
 
 
 def _feedback_sentences(answer: Compensation) -> Iterator[str]:
@@ -95,8 +97,8 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
         return
     if gain.safe <= 0:
         yield (
-            "No gain on the measured torque is safe: some devices that agree with what is known oscillate even at the "
-            f"smallest. The quantity that decides is {gain.decided_by}; {_describe_remedy(gain)}, and damp the "
+            "No gain on the measured torque is safe: some devices within the uncertainty of the fit oscillate even at "
+            f"the smallest. The deciding quantity is {gain.decided_by}; {_describe_remedy(gain)}, and damp the "
             f"rope{_describe_integral_remedy(gain)}."
         )
         return
@@ -108,17 +110,16 @@ def _feedback_sentences(answer: Compensation) -> Iterator[str]:
     yield (
         f"Feed back {most} times the torque measured at the joint{beside}: with at most {percent(answer.risk, 0)} probability "
         f"it then oscillates, {'with a hand on the device or without' if gain.with_hand else 'without a hand on the device'}. "
-        f"That leaves {format_torque(gain.left.median)} to feel{fades}. {_passivity_sentence(gain)} The largest gain is "
-        f"{gain.stable.q05:.2g} to {gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of that "
-        f"depends on {gain.decided_by}: "
-        f"{_describe_remedy(gain)}."
+        f"The hand then feels {format_torque(gain.left.median)} of friction{fades}. {_passivity_sentence(gain)} The "
+        f"largest gain is {gain.stable.q05:.2g} to {gain.stable.q95:.2g} (90 % interval); {percent(gain.decided_share, 0)} of "
+        f"that uncertainty comes from {gain.decided_by}: {_describe_remedy(gain)}."
     )
 
 
 def _passivity_sentence(gain: FeedbackGain) -> str:
     if gain.passive <= 0:
         return "Some hand can make it oscillate at any gain."
-    return f"Up to {gain.passive:.2g} no hand can make it oscillate."
+    return f"Up to a gain of {gain.passive:.2g} it is passive: no hand can make it oscillate."
 
 
 def _describe_integral_remedy(gain: FeedbackGain) -> str:
@@ -160,9 +161,10 @@ def _preload_sentence(answer: Compensation) -> str:
     if least.preload >= own.preload:
         return f"Less preload than {own.preload:.3g} N would mean less friction to feel, but the loop could be slack at rest."
     return (
-        f"Preloaded with {least.preload:.3g} N instead of {own.preload:.3g} N the loop is felt as "
-        f"{format_torque(least.friction.median)} instead of {format_torque(own.friction.median)}, but one side is slack from "
-        f"{format_torque(least.slack_from.median)} at the motor on instead of {format_torque(own.slack_from.median)}."
+        f"Preloaded with {least.preload:.3g} N instead of {own.preload:.3g} N, a hand feels "
+        f"{format_torque(least.friction.median)} of friction instead of {format_torque(own.friction.median)}, but one side "
+        f"goes slack at {format_torque(least.slack_from.median)} at the motor, not at "
+        f"{format_torque(own.slack_from.median)}."
     )
 
 
@@ -174,8 +176,8 @@ def _find_own_preload(answer: Compensation) -> float:
 def _missing_sentences(answer: Compensation) -> Iterator[str]:
     if not answer.device:
         yield (
-            "Friction of the motor and damping, which would allow more, are taken as zero: name a device.toml that says them "
-            "with --device."
+            "Friction of the motor and damping, which would allow more, are taken as zero: name a device.toml that states "
+            "them with --device."
         )
     if answer.missing:
         keys = listed([f"{key.replace('.', ', ')}" for key in answer.missing])
@@ -193,7 +195,7 @@ def _bend_table(answer: Compensation) -> str:
         bend = answer.by_bend[round(i * last / (_ROWS - 1))]
         friction = f"{bend.friction.median:.3f} ({bend.friction.q05:.3f} to {bend.friction.q95:.3f})"
         rows.append([f"{bend.wrap_angle:.4g}", friction, f"{bend.scheduled:.3f}", f"{bend.left_scheduled:.3f}"])
-    return table(["bend (deg)", "friction (N m)", "fed forward (N m)", "left (N m)"], rows)
+    return table(["bend (deg)", "friction (N m)", "fed forward (N m)", "remaining (N m)"], rows)
 
 
 def _simulation_sentences(answer: Compensation) -> Iterator[str]:
@@ -206,9 +208,10 @@ def _simulation_sentences(answer: Compensation) -> Iterator[str]:
     runaways = (
         ""
         if simulation.runaway_share is None
-        else f" Pushed and let go, {percent(simulation.runaway_share, 1)} go on by themselves."
+        else f" Pushed and let go, {percent(simulation.runaway_share, 1)} keep moving by themselves."
     )
     yield (
-        f"{simulation.draws} simulated devices, moved at up to {simulation.speed:.2g} rad/s at {simulation.wrap_angle:.4g} "
-        f"deg, are felt as {means}; turning round, as {peaks}.{runaways}"
+        f"In {simulation.draws} simulated devices, moved at up to {simulation.speed:.2g} rad/s at "
+        f"{simulation.wrap_angle:.4g} deg, a hand feels {means} on average, with peaks of {peaks} where the motion "
+        f"reverses.{runaways}"
     )

@@ -11,8 +11,8 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.words import counted, decimals, filled, give_or_take, listed, table
 
 _NAMED = 12  # broken or untrusted inspections that are named; a judgement
-_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "sampling by gradients"}
-_HEADS = ("quantity", "unit", "middle", "from", "to", "± of one")
+_ENGINES = {"laplace": "importance sampling", "ensembles": "full sampling", "nuts": "NUTS"}
+_HEADS = ("quantity", "unit", "middle", "from", "to", "± of one fit")
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def status_sentence(fleet: Fleet) -> str:
         return f"{fleet.name}: {what}, every one fitted, and every fit may be trusted."
     wrong = [f"{len(fleet.broken)} could not be fitted"] if fleet.broken else []
     wrong += [f"{len(fleet.untrusted)} must not be trusted"] if fleet.untrusted else []
-    return f"{fleet.name}: of {what} {listed(wrong)}; the others are as they would be without these."
+    return f"{fleet.name}: of {what} {listed(wrong)}; the others are not affected."
 
 
 def _list_inspections(what: str, named: list[tuple[str, str]]) -> list[str]:
@@ -181,8 +181,8 @@ def _explain_columns(fleet: Fleet) -> str:
     first = next(iter(fleet.units))
     _, middle, _, sd = fleet.summarize_quantity(first)
     return (
-        f"Middle, from and to: median, 5 % and 95 % of all inspections, each fitted by itself; a single {first} is known to "
-        f"about {give_or_take(middle, sd)}, which is in these ranges too."
+        f"Middle, from and to: median, 5 % and 95 % quantiles over all inspections, each fitted by itself. A single {first} is "
+        f"known to about {give_or_take(middle, sd)}, and the ranges include that uncertainty."
     )
 
 
@@ -196,8 +196,8 @@ def _method_sentences(fleet: Fleet) -> list[str]:
     lines.append(f"Fitted by {engines}; seed {fleet.seed}." if fleet.fitted else f"Seed {fleet.seed}.")
     unknown = sum(math.isnan(inspection.cycles) for inspection in fleet.fitted)
     if unknown:
-        some = counted(unknown, "inspection")
-        lines.append(f"Nothing about wear follows from {some} without a stated number of cycles.")
+        state = "states no number of cycles, so it says" if unknown == 1 else "state no number of cycles, so they say"
+        lines.append(f"{counted(unknown, 'inspection')} {state} nothing about wear.")
     if len(fleet.cables) == 1:
         lines.append("It is one cable only, so there is no population to compare it with.")
     return lines

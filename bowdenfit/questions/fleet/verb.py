@@ -87,8 +87,8 @@ VERB = Verb(
     program, on one machine or a cluster, into one fleet.nc.
 
     FOLDER has fleet.csv, a row an inspection with the columns cable, cycles,
-    temperature_degC, lubricated and file, and fleet.toml, which says of all of them
-    what cable.toml says of one; or a folder for each cable with a cable.toml of its
+    temperature_degC, lubricated and file, and fleet.toml, which describes all of
+    them as a cable.toml describes one; or a folder for each cable with a cable.toml of its
     own, or CABLE/CYCLES/cable.toml. datasets/synthetic-fleet is one.
 
     What is done is kept piece by piece; --resume goes on, with cables that were

@@ -217,9 +217,8 @@ def _check_scatter(study: Study) -> Iterator[str]:
         matrix[i, j] = matrix[j, i] = (one**2 + other**2 - error**2) / (2 * one * other)
         if abs(matrix[i, j]) > 1 + _ROUNDING_SLACK:
             yield (
-                f"p = {difference.p} for {difference.condition} less {difference.less} does not go with their standard "
-                "errors: persons would "
-                f"have to agree with a correlation of {matrix[i, j]:.2f}."
+                f"p = {difference.p} for {difference.condition} minus {difference.less} contradicts their standard errors: "
+                f"the two conditions would have to correlate by {matrix[i, j]:.2f}."
             )
             return
     if (
@@ -227,7 +226,7 @@ def _check_scatter(study: Study) -> Iterator[str]:
         and len(study.difference) == math.comb(len(names), 2)
         and np.linalg.eigvalsh(matrix).min() < -_ROUNDING_SLACK
     ):
-        yield "The probabilities do not go with the standard errors: no persons have such correlations between conditions."
+        yield "The p-values contradict the standard errors: no correlations between the conditions give both."
 
 
 def _percent_change(mean: Range, less: Range) -> Range:
@@ -274,7 +273,7 @@ def _difference_sentence(comparison: ConditionDifference) -> str:
         )
     needed = f"{comparison.needed} persons would" if comparison.needed else "no realistic number of persons would"
     return (
-        f"{comparison.condition} is not shown to be {way} than {comparison.less}: {size} with {comparison.persons} "
+        f"{comparison.condition} is not significantly {way} than {comparison.less}: {size} with {comparison.persons} "
         f"persons, p = {comparison.p:.2g}; "
         f"{needed} show a difference as large in four of five studies."
     )
@@ -291,13 +290,13 @@ def _remark_sentences(result: Metabolic) -> list[str]:
     persons = counted(max(comparison.persons for comparison in result.comparisons), "person")
     least = max(result.comparisons, key=lambda comparison: comparison.least)
     lines.append(
-        f"With {persons} the least true difference that four of five studies find is {least.least:.2f} W/kg "
+        f"With {persons} the smallest true difference that four of five studies would detect is {least.least:.2f} W/kg "
         f"({least.condition} minus {least.less})."
     )
     lines.append(
-        "Lower with probability: the first number assumes beforehand that differences are a few percent either way, the "
-        "second assumes nothing."
+        "Lower with prob.: probability that the cost is truly lower; the first number is by a prior on which differences are a "
+        "few percent either way, the second by a flat prior."
     )
     if not result.from_persons:
-        lines.append("Each person's numbers were not printed; all follows from printed means and probabilities.")
+        lines.append("The results of each person were not printed; everything follows from the printed means and p-values.")
     return lines

@@ -1,4 +1,4 @@
-"""Looking at a study of metabolic cost again."""
+"""The verb `metabolic`: analyze a study of metabolic cost."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -37,17 +37,17 @@ def _reply(result: "Metabolic", _: dict[str, Any]) -> Reply:
 VERB = Verb(
     metabolic,
     _reply,
-    """Look at a study of what walking costs with a device.
+    """Analyze a study of the metabolic cost of walking with a device.
 
     The study compares walking with and without a device. DATASET has
     metabolic.toml, and either a table of persons (net_W_per_kg, or
     oxygen and carbon dioxide, from which Brockway's equation gives the rate) or
-    what was printed of it. datasets/on-body-metabolic is one.
+    the numbers that its paper prints. datasets/on-body-metabolic is one.
 
-    The answer says for each pair of conditions the difference with its interval,
-    whether it is shown with all pairs looked at together, with what probability
-    one is lower, and how many persons it would take; and which printed numbers
-    cannot all be right.
+    For each pair of conditions the answer has the difference with its interval,
+    whether it is significant (adjusted for all pairs), with what probability one is
+    lower, and how many persons would be needed to show it; and it names printed
+    numbers that contradict each other.
     """,
     csv="Print the comparisons as CSV, one a row.",
 )

@@ -135,7 +135,7 @@ def _describe_bends(answer: Teleoperation) -> str:
 
 def _wall_sentences(answer: Teleoperation) -> Iterator[str]:
     hardest, sure = answer.stated.hardest, percent(answer.probability, 0)
-    at = f"one of {answer.wall:.4g} N*m/rad with {percent(answer.at_wall, 0)}"
+    at = f"the stated wall, {answer.wall:.4g} N*m/rad, with {percent(answer.at_wall, 0)}"
     if hardest is None:
         yield (
             f"Through this cable a hand feels walls of up to {answer.walls[-1]:.0f} N*m/rad, the hardest looked at, without "
@@ -171,9 +171,9 @@ def _instability_sentences(answer: Teleoperation) -> Iterator[str]:
     for scheme in answer.schemes:
         if scheme.free_motion_stable < answer.probability:
             yield (
-                f"Caution, {scheme.name}: it oscillates in free motion already, with "
-                f"{percent(1 - scheme.free_motion_stable, 0)} probability; from sample to sample "
-                f"oscillations grow by a factor of {scheme.radius:.4g} (median), and only up to 1 is stable. "
+                f"Caution, {scheme.name}: it already oscillates in free motion, with "
+                f"{percent(1 - scheme.free_motion_stable, 0)} probability; the spectral radius, the factor by which "
+                f"oscillations grow from sample to sample, is {scheme.radius:.4g} (median), and at most 1 is stable. "
                 "Lower the stiffnesses of the coupling, or sample faster."
             )
 
@@ -181,10 +181,11 @@ def _instability_sentences(answer: Teleoperation) -> Iterator[str]:
 def _simulation_sentences(answer: Teleoperation) -> Iterator[str]:
     contact = answer.contact
     if contact.bounces is None:
-        yield "Simulated with median numbers the slave never reaches the wall: friction holds it."
+        yield "In a simulation with median parameters, the slave never reaches the wall: friction holds it."
     else:
         does = "still bounces" if contact.bounces else "does not bounce"
-        yield f"Simulated with median numbers it {does} 1.2 s after it touched a wall of {contact.wall_stiffness:.4g} N*m/rad."
+        wall = f"{contact.wall_stiffness:.4g} N*m/rad"
+        yield f"In a simulation with median parameters, the slave {does} 1.2 s after it touched a wall of {wall}."
 
 
 def _scheme_table(answer: Teleoperation) -> str:

@@ -22,9 +22,9 @@ def caption(answer: Teleoperation) -> str:
     """Say what is drawn, in plain words."""
     return (
         "Top left: probability that the slave touches a wall without oscillating, by the stiffness of the wall, for each "
-        f"coupling; the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median numbers, in "
-        "the open for 2 s and then against the wall: angles of the master's joint and of the slave, torques of hand and wall, "
-        "and each torque against its angle in contact, with the stiffness felt by the formula. "
+        f"coupling; the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median parameters, "
+        "in free motion for 2 s and then against the wall: angles of the master's joint and of the slave, torques of hand and "
+        "wall, and each torque against its angle in contact, with the stiffness that a hand feels by the formula. "
         f"n = {answer.draws} devices and {len(answer.walls)} walls."
     )
 

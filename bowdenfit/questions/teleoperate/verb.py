@@ -1,4 +1,4 @@
-"""Asking what a hand feels of a remote wall through a cable."""
+"""The verb `teleoperate`: what a hand feels of a remote wall through a cable."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -58,13 +58,14 @@ VERB = Verb(
     _reply,
     """Say what a hand feels of a remote wall through a cable.
 
-    For a loop of a slave and its wall, over all that the fit leaves open: torque in
-    free motion, stiffness in contact, and which walls are touched without bouncing,
+    For a loop that drives a slave against a wall, over the uncertainty of the fit:
+    torque in free motion, stiffness in contact, and which walls are touched without
+    bouncing,
     with four channels between master and slave, with two, and with feedback of the
     master's own torque.
 
     DEVICE is a device.toml; datasets/haptic-teleoperation has one, whose README
-    says what is printed and what assumed.
+    says which numbers are published and which are assumed.
     """,
     json="Print as JSON.",
     csv="Print probabilities by wall as CSV.",

@@ -2,7 +2,8 @@
 
 Copies count as measurements, and a copied run as another mounting, so that every interval is too narrow and nothing else shows
 it. Two readings often agree to the last digit where a display is coarse, so copies are reported only where *all* rows of a run
-are those of another, or all rows appear equally often, and where noise larger than the last digit would hardly ever do that.
+are those of another, all rows appear equally often, or many rows follow each other as others did before, and where noise larger
+than the last digit would hardly ever do that.
 
 Someone who reads 14 N six times off a display of whole newtons knows the force to half a newton, and no better for the
 repetition: a scatter estimated from differences between such readings is meaningless.
@@ -41,6 +42,10 @@ _MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
 _LEAST_AGAIN = 3  # repeated readings, all alike, from which a display is called coarse; a judgement
 _POWERS = range(6, -10, -1)  # powers of ten that a last digit may be
 _WHOLE = 1e-9  # relative rounding error of a multiple of the last digit, in double precision with room
+_FEWEST_IN_BLOCK = 6  # rows in a row that repeat others, from which they may be a pasted part of a table; a judgement
+_MOST_COMPARED = 4000  # rows that are compared with each other in a second
+_FEWEST_VALUES, _MOST_VALUES = 8, 24  # different values that show the steps of a converter, and those that are enough
+_STEPS_AT_ONCE = 20_000
 
 
 def explain_impossible_loss(loss: np.ndarray, what: str) -> str:
@@ -77,6 +82,7 @@ class ComparedReadings:
         read: What was read, a column a quantity; NaN where nothing was.
         along: What the readings change smoothly with.
         curve: Number of the curve on which a row lies: those of one run and stroke.
+        origin: Where its rows were read; None where that is not known.
     """
 
     file: str
@@ -86,6 +92,7 @@ class ComparedReadings:
     read: Float[np.ndarray, "rows readings"]
     along: Vector
     curve: Labels
+    origin: RowOrigin | None = None
 
     @property
     def rows(self) -> Matrix:
@@ -104,7 +111,8 @@ def compare_without_runs(
     """
     n = len(along)
     none, curves = np.zeros(n, dtype=int), np.broadcast_to(np.asarray(curve), n)
-    return ComparedReadings(listed(origin.files), none, (), settings.reshape(n, -1), read.reshape(n, -1), along, curves)
+    settings, read = settings.reshape(n, -1), read.reshape(n, -1)
+    return ComparedReadings(listed(origin.files), none, (), settings, read, along, curves, origin)
 
 
 def route_or_wrap_angle(rows: ForceRows) -> Vector:
@@ -116,8 +124,8 @@ def describe_copies(compared: ComparedReadings) -> list[str]:
     """Describe readings that are copies of others, in sentences without first capital or remedy; empty if chance may do it."""
     rows = compared.rows
     parts = {int(k): np.flatnonzero(compared.part == k) for k in np.unique(compared.part)}
-    alike, repeated = _find_equal_runs(rows, parts), _find_repeated_rows(rows, parts)
-    if not alike and not repeated:
+    alike, repeated, block = _find_equal_runs(rows, parts), _find_repeated_rows(rows, parts), _find_copied_block(rows)
+    if not alike and not repeated and not block:
         return []
     chances, sentences = _agreement_probabilities(compared), []
     for same in alike:
@@ -129,12 +137,57 @@ def describe_copies(compared: ComparedReadings) -> list[str]:
                 f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
             )
     for times, those in repeated.items():
-        where = np.concatenate([parts[k] for k in those])
+        where = np.sort(np.concatenate([parts[k] for k in those]))
         if (1 - 1 / times) * _log_agreement_probability(chances, compared.read[where]) < np.log(FALSE_ALARM):
             whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
             often = _MULTIPLES.get(times, f"{times} times")
             sentences.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
+            if pasted := _describe_block(compared, *_halves(rows, where, times)):
+                sentences[-1] += f": {pasted}"
+    if not sentences and block:
+        original, again = block
+        chance = _log_agreement_probability(chances, compared.read[original]) + 2 * np.log(len(rows))
+        pasted = _describe_block(compared, original, again)
+        sentences += [f"{pasted}, to the last digit"] if pasted and chance < np.log(FALSE_ALARM) else []
     return sentences
+
+
+def _halves(rows: Matrix, where: np.ndarray, times: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows of which the others among some are copies in the same order, and these; both empty in another order."""
+    first, again = where[: len(where) // times], where[len(where) // times :]
+    same = np.array_equal(np.tile(rows[first], (times - 1, 1)), rows[again])
+    return (first, again) if same else (where[:0], where[:0])
+
+
+def _describe_block(compared: ComparedReadings, first: np.ndarray, again: np.ndarray) -> str:
+    """Return which rows of which file are copies of which; empty where they do not stand one below the other."""
+    if compared.origin is None or len(first) == 0 or np.any(np.diff(first) != 1) or np.any(np.diff(again) != 1):
+        return ""
+    origin = compared.origin
+    places = [(origin.file[at[0]], origin.file[at[-1]], origin.row[at[0]], origin.row[at[-1]]) for at in (again, first)]
+    if any(file != last for file, last, _, _ in places):
+        return ""
+    (file, _, start, stop), (other, _, first_start, first_stop) = places
+    copies = f"rows {start} to {stop} of {origin.files[file]} are copies of rows {first_start} to {first_stop}"
+    return copies if file == other else f"{copies} of {origin.files[other]}"
+
+
+def _find_copied_block(rows: Matrix) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the longest stretch of rows that follow each other as others did before, which come first; None without one."""
+    labels = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    best, start, n = 0, (0, 0), len(labels)
+    if len(np.unique(labels)) == n or n > _MOST_COMPARED:
+        return None
+    for shift in range(_FEWEST_IN_BLOCK, n - _FEWEST_IN_BLOCK + 1):
+        ends = np.flatnonzero(np.append(labels[:-shift] != labels[shift:], True))
+        lengths = np.diff(ends, prepend=-1) - 1
+        longest = int(np.argmax(lengths))
+        length = min(int(lengths[longest]), shift)
+        if length > best:
+            begin = int(ends[longest] - lengths[longest])
+            best, start = length, (begin, begin + shift)
+    block = np.arange(best)
+    return (start[0] + block, start[1] + block) if best >= _FEWEST_IN_BLOCK else None
 
 
 def _find_equal_runs(rows: Matrix, parts: Mapping[int, np.ndarray]) -> list[list[int]]:
@@ -163,8 +216,8 @@ def _log_agreement_probability(chances: Float[np.ndarray, " columns"], read: Mat
 def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " readings"]:
     """Return the probability that two readings of one quantity agree to the last digit, by column; 1 where it is unknown.
 
-    By the last digit q and the scatter s about a smooth curve: the difference of two normal readings falls into a class of
-    width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
+    By the step of the display q and the scatter s about a smooth curve: the difference of two normal readings falls into a
+    class of width q with a chance of q / (2 sqrt(pi) s), which is an upper bound where their means differ.
     """
     probabilities = np.ones(compared.read.shape[1])
     for c, read in enumerate(compared.read.T):
@@ -179,10 +232,34 @@ def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " 
         if freedom < _LEAST_FREEDOM or len(values) < 2:
             continue
         scatter = np.sqrt(squares / freedom)
-        last_digit = np.diff(values).min()
+        last_digit = _step_of_display(values)
         if scatter > max(_FINE * last_digit, NO_NOISE * np.sqrt(np.mean(values**2))):
             probabilities[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
     return probabilities
+
+
+def _step_of_display(values: Vector) -> float:
+    """Return the step in which a display or converter counts: the largest of which all values may be rounded multiples.
+
+    A converter with steps of 0.0488 N shows 0.049, 0.098 and 0.146 N. Where there are too few values to see its steps, the
+    smallest difference is an upper bound of them.
+
+    Args:
+        values: Different values, in increasing order.
+    """
+    smallest, last_digit = float(np.diff(values).min()), _last_digit(np.abs(values[values != 0]))
+    if last_digit == 0 or len(values) < _FEWEST_VALUES:
+        return smallest
+    some = values[:: max(len(values) // _MOST_VALUES, 1)][:_MOST_VALUES]
+    counts = np.round((some - some[0]) / last_digit)
+    fineness = 1 / (2 * counts.max())  # so fine that the largest count moves by half of one
+    logs = np.arange(np.log(max(smallest / last_digit, 2.0)), np.log(2.0) - fineness, -fineness)
+    for begin in range(0, len(logs), _STEPS_AT_ONCE):
+        steps = np.exp(logs[begin : begin + _STEPS_AT_ONCE])[:, None]
+        fits = np.all(np.abs(counts - steps * np.round(counts / steps)) <= 1.0, axis=1)
+        if fits.any():
+            return float(steps[np.argmax(fits), 0]) * last_digit
+    return last_digit
 
 
 def _residuals_of_polynomial(x: Vector, y: Vector) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """Tables that were once misread without a word: each is refused in a sentence that names the row, or read rightly."""
 
+import numpy as np
 import pytest
 
 import bowdenfit as bf
@@ -90,6 +91,30 @@ def test_a_ratio_of_two_symbols_is_no_clock():
     assert names_time("bench/Time") and names_time("t (s)")
 
 
+def measured_rows():
+    """Sixteen rows at four wrap angles, with a noise of many last digits."""
+    noise = iter(np.random.default_rng(3).normal(0, 0.1, 32))
+    settings = [(angle, load) for angle in (45, 90, 180, 270) for load in (12, 23, 34, 45)]
+    return [f"{a},{load + next(noise):.3f},{load * np.exp(-0.002 * a) + next(noise):.3f}" for a, load in settings]
+
+
+@pytest.mark.parametrize(("copied", "said"), [(slice(0, 16), "rows 18 to 33"), (slice(4, 12), "rows 18 to 25")])
+def test_rows_that_were_pasted_again_are_called_copies(tmp_path, run, copied, said):
+    rows = measured_rows()
+    text = "wrap_angle_deg,input_force_N,output_force_N\n" + "\n".join([*rows, *rows[copied]])
+    (tmp_path / "t.csv").write_text(text + "\n")
+    _, out, _ = run("check", tmp_path / "t.csv")
+    first = f"rows {copied.start + 2} to {copied.stop + 1}"
+    assert f"{said} of t.csv are copies of {first}" in " ".join(out.split()).replace("Rows", "rows")
+
+
+def test_equal_readings_of_a_converter_with_coarse_steps_are_no_copies(tmp_path):
+    """A cell with steps of 0.0488 N shows three decimals, and the same number again wherever noise is smaller than a step."""
+    rows = [f"180,{load},{0.0488 * round(0.767 * load / 0.0488):.3f}" for load in range(12, 132, 12)]
+    (tmp_path / "t.csv").write_text("wrap_angle_deg,input_force_N,output_force_N\n" + "\n".join(rows * 2) + "\n")
+    assert "copies" not in str(bf.check(tmp_path / "t.csv"))
+
+
 ANGLES = [
     "bend", "Bend (deg)", "curve", "curvature (deg)", "elbow (deg)", "Total direction change (deg)", "configuration (deg)",
     "theta", "Winkel", "deg", "Turns", "Wraps", "Umlenkwinkel [°]", "bend_rad", "Cable angle (deg)", "x (rad)",
@@ -121,8 +146,6 @@ def test_fractions_of_a_turn_are_numbers(tmp_path):
 
 def test_an_index_beside_a_tdms_file_is_not_believed(tmp_path):
     nptdms = pytest.importorskip("nptdms")
-    import numpy as np
-
     def write(path, *names):
         channels = [nptdms.ChannelObject("bench", name, np.arange(10.0) + 100 * (name == "in")) for name in names]
         with nptdms.TdmsWriter(path, index_file=True) as writer:
@@ -154,8 +177,6 @@ def test_a_unit_that_contradicts_its_heading_is_refused(tmp_path, run, named):
 
 def recording(tmp_path, step, heading, missing=0):
     """A file of three strokes with one sample each `step` in the column of time."""
-    import numpy as np
-
     force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, 600))
     output = np.where(np.gradient(force) > 0, 0.7, 1.4) * force
     output[: 20 * missing : 20] = -9999

@@ -44,7 +44,8 @@ def pasted(folder, name, file):
 @pytest.mark.parametrize(("name", "file"), TABLES)
 def test_a_table_that_was_pasted_twice_is_said_to_be(tmp_path, name, file):
     (sentence,) = describe_copied_readings(pasted(tmp_path, name, file))
-    assert sentence.startswith("Every reading") and f"{file} stands there twice, to the last digit." in sentence
+    assert sentence.startswith("Every reading") and f"{file} stands there twice, to the last digit: rows " in sentence
+    assert f" of {file} are copies of rows " in sentence
     assert "leave them out" in sentence
 
 

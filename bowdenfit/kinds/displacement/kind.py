@@ -143,7 +143,9 @@ class DisplacementKind(
     def copied_readings(self, table: DisplacementTable) -> list[str]:
         files, names = listed(table.origin.files), tuple(f"run {name}" for name in table.run_names)
         moved, force = table.displacement[:, None], table.force[:, None]
-        return describe_copies(ComparedReadings(files, table.run, names, moved, force, table.displacement, table.run))
+        return describe_copies(
+            ComparedReadings(files, table.run, names, moved, force, table.displacement, table.run, table.origin)
+        )
 
     @override
     def why_implausible(self, measured: DisplacementTable, simulated: DisplacementTable) -> str:

@@ -180,7 +180,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
             return describe_copies(compare_without_runs(table.origin, settings, loss, route_or_wrap_angle(table), table.stroke))
         names = tuple(f"run {name}" for name in table.run_names)
         return describe_copies(
-            ComparedReadings(listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve)
+            ComparedReadings(
+                listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve, table.origin
+            )
         )
 
     @override

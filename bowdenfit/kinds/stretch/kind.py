@@ -255,7 +255,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         curve = 2 * table.cycle + table.unloading
         read = table.stretch[:, None]
         return describe_copies(
-            ComparedReadings(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve)
+            ComparedReadings(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve, table.origin)
         )
 
     @override

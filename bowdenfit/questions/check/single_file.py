@@ -30,7 +30,12 @@ from bowdenfit.kinds.fit_command import (
     make_table_command,
 )
 from bowdenfit.kinds.recordings.kind import describe_preparations
-from bowdenfit.questions.check.data_set_words import check_data_set, describe_first_and_last_rows, describe_row_account
+from bowdenfit.questions.check.data_set_words import (
+    check_data_set,
+    describe_copied_readings,
+    describe_first_and_last_rows,
+    describe_row_account,
+)
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.recording import Recordings
@@ -181,6 +186,7 @@ def describe_table_file(
     lines += ["", *describe_row_account(raw.lines)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
+        lines += [filled(f"Warning: {sentence}") for sentence in describe_copied_readings(data)]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
     return "\n".join([*lines, "", *describe_commands(commands, usable)]) + "\n"

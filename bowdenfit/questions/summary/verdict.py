@@ -93,14 +93,15 @@ class Verdict(Display):
 @cached_per_fit
 def assess_fit(fit: Record) -> Verdict:
     """Return the verdict on a fit."""
+    copies = describe_copied_readings(fit.dataset)
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(describe_unidentified(fit)),
         CONTRADICTORY: _sentences(describe_contradiction(fit)),
         IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
-        COPIED: describe_copied_readings(fit.dataset),
+        COPIED: copies,
         COARSE: describe_coarse_readings(fit),
-        NOT_DESCRIBED: describe_lack_of_fit(fit),
+        NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit))

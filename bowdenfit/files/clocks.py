@@ -34,7 +34,9 @@ _EPOCH_UNITS = (
 _YEARS = 1e8  # [s], three years: no recording lasts so long, so such numbers are dates
 _HALF_DAY, _DAY = 43200.0, 86400.0
 _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4}(?: .*)?")
-_TIME_OF_DAY = re.compile(r"\d{1,3}:\d\d(?::\d\d(?:[.,]\d+)?)?")
+_HALF = r"(?P<half>[AaPp])\.?\s?[Mm]\.?"  # AM or PM
+_TIME_OF_DAY = re.compile(rf"\d{{1,3}}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:\s*{_HALF})?")
+_AM_OR_PM = re.compile(rf"(?<=\d)\s*{_HALF}$")
 _RATE_NAMES = {
     "fs", "f_s", "rate", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency", "sampfreq", "fsample",
     "fsampling", "acquisitionrate", "samplespersecond",
@@ -204,20 +206,22 @@ def parse_dates(texts: Iterable[str], source: str) -> Vector:
     """Return seconds from the first of some dates; a time of day may pass midnight.
 
     Args:
-        texts: Dates such as "2021-02-04 14:52:00.120", "04.02.2021 14:52:00,120" or "14:52:00.120"; blank is missing.
+        texts: Dates such as "2021-02-04 14:52:00.120", "04.02.2021 14:52:00,120", "14:52:00.120" or "2:52:00.120 PM"; blank
+            is missing.
         source: File and column, for the error.
 
     Raises:
         DatasetError: A text is no date.
     """
     pandas = load_library("pandas", "CSV")
-    written = pandas.Series([text.strip().replace(",", ".") for text in texts], dtype=object)
+    plain = [_AM_OR_PM.sub(r" \g<half>M", text.strip()).replace(",", ".") for text in texts]
+    written = pandas.Series(plain, dtype=object)
     written = written.where(written != "", None)
     first = str(next((text for text in written if text), ""))
     try:
         if _TIME_OF_DAY.fullmatch(first):
             return _subtract_first(_unwrap_midnight(_times_of_day(written)))
-        form = "ISO8601" if re.match(r"\d{4}-\d\d-\d\d", first) else "mixed"
+        form = "ISO8601" if re.match(r"\d{4}-\d\d-\d\d", first) and first[-1:] not in {*"Mm"} else "mixed"
         dates = pandas.to_datetime(written, format=form, dayfirst="." in first[:3], utc=True)
     except ValueError as error:
         raise DatasetError(
@@ -227,13 +231,24 @@ def parse_dates(texts: Iterable[str], source: str) -> Vector:
 
 
 def _times_of_day(texts: Iterable[str | None]) -> Vector:
-    """Return seconds of "14:52:00.120" or "52:00"; two numbers are hours and minutes.
+    """Return seconds of "14:52:00.120", "2:52:00.120 PM" or "52:00"; two numbers are hours and minutes.
 
     Raises:
-        ValueError: A text is neither.
+        ValueError: A text is neither, or only some have AM or PM.
     """
-    parts = [(text or "nan:nan").split(":") for text in texts]
-    return np.array([sum(float(part) * 60.0 ** (2 - i) for i, part in enumerate(row)) for row in parts], dtype=float)
+    written = [text or "nan:nan" for text in texts]
+    parts = [text.rstrip("APMapm ").split(":") for text in written]
+    seconds = np.array([sum(float(part) * 60.0 ** (2 - i) for i, part in enumerate(row)) for row in parts], dtype=float)
+    halves = [text[-2:].upper() if text[-1:] in {*"Mm"} else "" for text in written]
+    if not any(halves):
+        return seconds
+    for text, half, second in zip(written, halves, seconds.tolist(), strict=True):
+        if not half and math.isfinite(second):
+            raise ValueError(f"{text} lacks the AM or PM that others have")
+        if second >= 13 * 3600:
+            raise ValueError(f"{text} is no time of a 12-hour clock")
+    # 12 AM is midnight, and 12 PM noon.
+    return seconds % _HALF_DAY + _HALF_DAY * (np.array(halves) == "PM")
 
 
 def _unwrap_midnight(seconds: Vector) -> Vector:

@@ -211,3 +211,60 @@ def test_a_known_quantity_in_an_unknown_unit_is_named(tmp_path):
     (tmp_path / "t.csv").write_text("wrap_angle_deg,wrap_angle [bit] (mean),input_force_N,output_force_N\n90,3,10,8\n")
     with pytest.raises(bf.DatasetError, match="is not just a unit; state the unit that its numbers are in"):
         bf.read(tmp_path / "t.csv")
+
+
+def clock_recording(tmp_path, times, heading="time", forces="input_force_N,output_force_N"):
+    """A file of three strokes with these times."""
+    force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, len(times)))
+    output = np.where(np.gradient(force) > 0, 0.7, 1.4) * force
+    rows = [f"{time},{one:.3f},{other:.3f}" for time, one, other in zip(times, force, output, strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([f"{heading},{forces}", *rows]) + "\n", encoding="utf-8")
+    return tmp_path / "log.csv"
+
+
+def twelve_hours(second, form="{h:02d}:{m:02d}:{s:02d} {half}"):
+    """A second of the day as a clock of twelve hours shows it."""
+    h = second // 3600 % 24
+    return form.format(h=h % 12 or 12, m=second // 60 % 60, s=second % 60, half="AM" if h < 12 else "PM")
+
+
+@pytest.mark.parametrize(
+    "form", ["{h:02d}:{m:02d}:{s:02d} {half}", "{h}:{m:02d}:{s:02d}.000\u202f{half}", "3/1/2024 {h}:{m:02d}:{s:02d} {half}",
+             "2024-03-01 {h}:{m:02d}:{s:02d} {half}"],
+)  # fmt: skip
+@pytest.mark.parametrize("start", [43200 - 100, 46800 - 100])
+def test_a_clock_of_twelve_hours_is_read(tmp_path, form, start):
+    from bowdenfit.files import read_channels
+
+    path = clock_recording(tmp_path, [twelve_hours(start + i, form) for i in range(200)])
+    channel = next(channel for channel in read_channels(path).channels if channel.name == "input_force_N")
+    assert np.array_equal(channel.time, np.arange(200.0))
+
+
+def test_a_clock_of_twelve_hours_passes_midnight_with_small_letters_and_stops():
+    from bowdenfit.files.clocks import parse_dates
+
+    texts = ["11:59:59.250 p.m.", "11:59:59.750 P.M.", "12:00:00.250 am", "12:00:00,750am", ""]
+    assert np.array_equal(parse_dates(texts, "log.csv")[:4], [0, 0.5, 1.0, 1.5])
+
+
+def test_a_time_without_am_or_pm_among_others_is_refused(tmp_path, run):
+    times = [twelve_hours(3600 + i) for i in range(200)]
+    times[120] = times[120][:8]
+    code, out, err = run("check", clock_recording(tmp_path, times))
+    assert code == 2 and "lacks the AM or PM that others have" in " ".join((out + err).split())
+
+
+FALLS = [
+    ([f"{0.02 * (i % 300):.2f}" for i in range(600)], "two recordings in one file"),
+    ([f"{12 - 0.02 * i:.2f}" for i in range(600)], "a file whose last sample stands first"),
+    ([twelve_hours(46800 - 100 + i)[:8] for i in range(300)], "a 12-hour clock written without AM and PM"),
+]
+
+
+@pytest.mark.parametrize(("times", "cause"), FALLS)
+@pytest.mark.parametrize("forces", ["input_force_N,output_force_N", "cell A,cell B"])
+def test_a_clock_that_runs_backwards_is_said_by_check(tmp_path, run, times, cause, forces):
+    code, out, err = run("check", clock_recording(tmp_path, times, "time", forces))
+    words = " ".join((out + err).split())
+    assert code == 2 and "runs backwards at sample" in words and cause in words

@@ -38,6 +38,7 @@ from bowdenfit.questions.check.data_set_words import (
 )
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.named_channels import parse_channels
+from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
 
@@ -45,6 +46,7 @@ _CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the c
 _ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
 _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named
+_LONG = 50  # rows from which a table beside a clock is meant as a recording; with fewer its clock may say when each was read
 _MAX_LISTED = 100  # channels that are listed
 _MAX_LENGTH = 60  # characters of a name or unit
 _CHANNEL_HEADS = ("channel", "unit", "samples", "rate", "length", "lowest", "highest", "clock")
@@ -78,7 +80,9 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
     raw = read_table(path)
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if file.other:
-        return describe_table_file(raw, file, make_both_commands(path, raw, file), None, "", headings), True
+        backwards = _backward_clock(path)
+        text = describe_table_file(raw, file, make_both_commands(path, raw, file), None, backwards, headings, not backwards)
+        return text, not backwards
     command = make_table_command(path, raw, file.kind, named)
     has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
     strict = any(reading.values()) and not command.names_more
@@ -92,6 +96,8 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
             path, cast(Reading, {**reading, "wrap_angle": angle, "columns": columns}), False
         )
         obstacle += f"\n{remaining}" if remaining not in obstacle else ""
+    if obstacle and (backwards := _backward_clock(path)):
+        obstacle, remaining = f"{obstacle}\n{backwards}", backwards
     return describe_table_file(
         raw, file, [_with_settings(command, reading)], data, obstacle, headings, not remaining
     ), not obstacle
@@ -121,9 +127,30 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
 def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
     """Describe a recording alone; and return whether it can be fitted as it stands."""
     file, recordings, obstacle = read_recording(path, channels)
+    backwards = describe_backward_clock(file) if obstacle and "backwards" not in obstacle else ""
+    obstacle = "\n".join(filter(None, [obstacle, backwards]))
     command = _recording_command(path, file, channels)
-    usable = not obstacle or (not channels and "--channel" in command.text)
+    usable = not obstacle or (not channels and "--channel" in command.text and not backwards)
     return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
+
+
+def describe_backward_clock(file: ChannelFile) -> str:
+    """Return the sentence that a clock of a file runs backwards; empty where none does."""
+    for channel in file.channels:
+        time = channel.values if is_clock(channel) else channel.time
+        if time is not None and (backwards := explain_backward_clock(channel.name, time)):
+            return f"{file.path.name}: {backwards}"
+    return ""
+
+
+def _backward_clock(path: Path) -> str:
+    """Return that the clock of a table that may be a recording runs backwards; empty where it does not, or has few rows."""
+    try:
+        file = read_channels(path)
+    except DatasetError:
+        return ""
+    long = any(len(channel.values) > _LONG for channel in file.channels)
+    return describe_backward_clock(file) if long else ""
 
 
 def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:

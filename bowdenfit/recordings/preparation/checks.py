@@ -11,6 +11,7 @@ _MISSING_CODE = 10.0  # judged, times all other forces: -9999 and the like; no l
 FEWEST_SAMPLES = 20  # judged: fewer are a table
 LARGEST_FORCE = 1e6  # N, far beyond any Bowden cable
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 86_400.0  # s, of any converter, and of what is still a recording
+_HALF_DAY = 43_200.0  # s; the fall of a 12-hour clock from 12:59:59 to 1:00:00, but for one step
 _MOST_REPEATED = 0.5  # judged: share of times that stand there twice, from which the clock is not one of samples
 
 
@@ -115,13 +116,8 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
             f"{file}: the time of {name} is missing at sample {missing + 1}; every sample needs a time. "
             "Delete that row, or export the recording again."
         )
-    steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in split_pieces(len(time)))
-    at = next((start + int(np.argmax(back)) for start, back in steps if back.any()), None)
-    if at is not None:
-        raise DatasetError(
-            f"{file}: the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to "
-            f"{time[at + 1]:.10g} s; the usual cause is two recordings in one file. Split the file there."
-        )
+    if backwards := explain_backward_clock(name, time):
+        raise DatasetError(f"{file}: {backwards}")
     step = (time[-1] - time[0]) / max(len(time) - 1, 1)
     if step and not SHORTEST_STEP <= step <= LONGEST_STEP:
         raise DatasetError(
@@ -134,6 +130,29 @@ def _check_clock(file: str, name: str, time: Vector) -> None:
             f"{file}: {100 * repeated:.0f} % of the times of {name} repeat the one before (the first is {time[0]:.10g} s)"
             "; the usual cause is a clock written with too few digits. Export the time with more digits."
         )
+
+
+def explain_backward_clock(name: str, time: Vector) -> str:
+    """Return where the clock of a channel runs backwards and what to do, as a clause; empty where it never does.
+
+    Args:
+        name: What the channel is called.
+        time: Its times [s].
+    """
+    steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in split_pieces(len(time)))
+    at = next((start + int(np.argmax(back)) for start, back in steps if back.any()), None)
+    if at is None:
+        return ""
+    where = (
+        f"the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to {time[at + 1]:.10g} s; "
+        "the usual cause is"
+    )
+    some = np.diff(subsample(time))
+    if -_HALF_DAY <= time[at + 1] - time[at] < -_HALF_DAY + max(60.0, 10 * float(np.nanmedian(np.abs(some)))):
+        return f"{where} a 12-hour clock written without AM and PM. Export the time with 24 hours, or in seconds."
+    if np.mean(some < 0) > _MOST_REPEATED:
+        return f"{where} a file whose last sample stands first. Sort its rows by the time."
+    return f"{where} two recordings in one file. Split the file there."
 
 
 def _check_forces(file: str, name: str, force: Vector) -> None:

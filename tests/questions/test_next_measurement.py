@@ -1,5 +1,6 @@
 """What to measure next: how much a reading tells of an answer, which candidates there are, and what is said of them."""
 
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -16,6 +17,7 @@ from laboratory import Laboratory
 from one_page import faults
 from scipy import stats
 
+import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.finished_fit import Fit
@@ -37,6 +39,7 @@ from bowdenfit.questions.next.variance_reduction import (
     explained_share,
     mean_and_spread,
     simulate_readings,
+    spread_after_outcomes,
 )
 from bowdenfit.questions.next.words import next_measurement_text
 from bowdenfit.questions.simulate.tables import empty_tables
@@ -576,3 +579,37 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     for candidate, (share, error) in realized.items():
         assert abs(share - expected[candidate]) < 4.5 * np.hypot(error, 0.02), (candidate, realized, expected)
     assert max(expected, key=expected.__getitem__) == max(realized, key=lambda c: realized[c][0])
+
+
+def test_the_spread_after_an_outcome_is_that_of_a_normal_distribution():
+    rng = np.random.default_rng(3)
+    reading = rng.normal(size=20_000)
+    answer = 0.8 * reading + 0.6 * rng.normal(size=20_000)
+    spread = spread_after_outcomes(reading[:, None], answer)
+    assert np.median(spread) == pytest.approx(0.6, rel=0.05)
+    assert np.quantile(spread, 0.95) < 0.75
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
+    rng, rows = np.random.default_rng(4), ["run,stroke,input_force_N,output_force_N"]
+    for run in range(runs):
+        mounting = rng.normal(0, 0.02)
+        for stroke, force in itertools.product((1, -1), (20, 50, 100)):
+            output = force * np.exp(-stroke * (0.12 * np.pi + mounting)) * (1 + rng.normal(0, 0.004))
+            rows.append(f"r{run},{'pull' if stroke > 0 else 'return'},{force},{output:.4f}")
+    (tmp_path / "table.csv").write_text("\n".join(rows) + "\n")
+    fit = bf.fit(tmp_path / "table.csv", wrap_angle="180deg", seed=1)
+    ranking = bf.next_measurement(fit)
+    second = ranking.second_mounting
+    said = " ".join(next_measurement_text(ranking).split())
+    if runs == 1:
+        assert second is not None
+        assert second.low < second.sd < second.high
+        assert second.sd < ranking.answer.sd
+        assert said.startswith("Mount the cable anew and measure a force run next: all readings come from one mounting")
+        assert "uncertainty lower by" not in said
+        assert "Next: mount the cable anew" in " ".join(str(fit).split())
+    else:
+        assert second is None
+        assert "Mount the cable anew" not in said

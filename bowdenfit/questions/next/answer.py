@@ -218,6 +218,27 @@ class LoadAndStroke(Part):
     JSON: ClassVar = ("usual", ("candidates", "ranked"))
 
 
+@dataclass(frozen=True)
+class SecondMounting:
+    """What a second mounting would do where all readings come from one.
+
+    How far mountings differ is then known by its prior alone, whose tail is so long that the average of what may come says
+    little: the middle of all outcomes stands here, and their range.
+
+    Args:
+        words: The measurement in a sentence.
+        name: As `--candidate` takes it.
+        sd: Median over all outcomes of the standard deviation of the answer afterwards.
+        low, high: 5 and 95 % quantiles of it.
+    """
+
+    words: str
+    name: str
+    sd: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, repr=False)
 class NextMeasurement(Display):
     """Candidates from the most to the least worth measuring.
@@ -233,6 +254,7 @@ class NextMeasurement(Display):
         loads: Lowest and highest input force of a run like those made so far [N]; None where there is none.
         stop: Whether nothing needs to be measured, in a sentence.
         within: At which load and stroke the best is best made; None where it says so itself, or is not made under any.
+        second_mounting: What a second mounting would do; None where there are several already.
     """
 
     answer: TargetQuantity
@@ -245,10 +267,11 @@ class NextMeasurement(Display):
     loads: tuple[float, float] | None = None
     stop: str = ""
     within: LoadAndStroke | None = None
+    second_mounting: SecondMounting | None = None
 
     JSON: ClassVar = (
         "answer", ("best", "best_name"), ("candidates", "ranked"), ("load_and_stroke", "within"), "repeats", "plan",
-        "converged", "loads?", "stop",
+        "converged", "loads?", "stop", "second_mounting?",
     )  # fmt: skip
 
     @property

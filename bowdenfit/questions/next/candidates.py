@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
-from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds import find_readings, iterate_tables
 from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Situation
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.kinds.terms import candidate_kinds
+from bowdenfit.kinds.term import Term
+from bowdenfit.kinds.terms import candidate_kinds, find_term_kind
 from bowdenfit.model import Model
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
@@ -64,6 +66,17 @@ def _example_candidate(fit: Record, kind: CandidateKind) -> Candidate:
 def has_candidates(fit: Record) -> bool:
     """Whether the tables of the description hold anything whose next reading can be simulated."""
     return bool(_suitable_candidates(fit))
+
+
+def rests_on_one_mounting(fit: Record) -> bool:
+    """Whether how far mountings differ is to be found and all readings of friction come from one mounting."""
+    is_free = any(p.name == RUN_SCATTER for p in fit.model.space.free)
+    runs = [len(term.labels) if find_readings(term.name).are_runs else 2 for term in fit.model.terms if _shows_scatter(term)]
+    return is_free and sum(runs) == 1
+
+
+def _shows_scatter(term: Term) -> bool:
+    return find_term_kind(term.name).shows_mounting_scatter
 
 
 def _suitable_candidates(fit: Record) -> tuple[Candidate, ...]:

@@ -20,6 +20,7 @@ from bowdenfit.questions.next.answer import (
     PlannedMeasurement,
     RankedCandidate,
     Repeats,
+    SecondMounting,
     TargetQuantity,
     choose_target,
     is_noticeable,
@@ -30,6 +31,7 @@ from bowdenfit.questions.next.candidates import (
     format_candidate,
     list_candidates,
     parse_candidates,
+    rests_on_one_mounting,
 )
 from bowdenfit.questions.next.variance_reduction import (
     Explained,
@@ -37,6 +39,7 @@ from bowdenfit.questions.next.variance_reduction import (
     explained_share,
     mean_and_spread,
     simulate_readings,
+    spread_after_outcomes,
 )
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 from bowdenfit.results.store import load
@@ -85,12 +88,29 @@ def rank_measurements(
     route = fit.dataset.description.route
     route_axis = (route.label, route.range) if route else ("", (0.0, 0.0))
     loads, stop = _load_range(fit), _stopping_advice(fit, target)
+    if (second := _second_mounting(fit, target, chosen, readings)) is not None:
+        return NextMeasurement(
+            target, ranked, None, (), *route_axis, fit.converged, loads, stop="", second_mounting=second
+        )
     if not ranked[0].is_noticeable:
         return NextMeasurement(target, ranked, None, (), *route_axis, fit.converged, loads, stop)
     repeats = _repeat_measurement(fit, target, ranked[0].candidate)
     plan = _plan_measurements(target, ranked, dict(zip(chosen, readings, strict=True)))
     within = _vary_load_and_stroke(fit, target, ranked[0].candidate)
     return NextMeasurement(target, ranked, repeats, plan, *route_axis, fit.converged, loads, stop, within)
+
+
+def _second_mounting(
+    fit: Record, target: TargetQuantity, chosen: Sequence[Candidate], readings: Sequence[np.ndarray]
+) -> SecondMounting | None:
+    """Return what mounting the cable anew would do, of a fit that rests on one mounting; None of any other."""
+    anew = [i for i, candidate in enumerate(chosen) if candidate_kinds()[candidate.kind].mounted_anew]
+    if not anew or not rests_on_one_mounting(fit):
+        return None
+    first = chosen[anew[0]]
+    sds = spread_after_outcomes(readings[anew[0]][:, 0], target.draws)
+    low, middle, high = (float(sd) for sd in np.quantile(sds, (0.05, 0.5, 0.95)))
+    return SecondMounting(describe_candidate(fit, first), format_candidate(first), middle, low, high)
 
 
 def _load_range(fit: Record) -> tuple[float, float] | None:

@@ -6,7 +6,7 @@ from bowdenfit.display import text_of
 from bowdenfit.kinds.candidate import STROKE_WORDS
 from bowdenfit.kinds.terms import candidate_kinds
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
-from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate
+from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate, SecondMounting
 from bowdenfit.words import decimals, few, filled, percent, significant, table
 
 TITLE = "What to measure next"
@@ -26,6 +26,8 @@ def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
         ranking: The ranking.
         top: How many candidates the table shows.
     """
+    if ranking.second_mounting is not None:  # beside which averages over all outcomes would mislead
+        return "\n".join(filled(line) for line in ranking_sentences(ranking)) + "\n"
     more = len(ranking.ranked) - top
     lines = [
         "\n".join(filled(line) for line in ranking_sentences(ranking)),
@@ -38,6 +40,8 @@ def next_measurement_text(ranking: NextMeasurement, top: int = 10) -> str:
 
 def ranking_section(ranking: NextMeasurement) -> PageSection:
     """Return the advice, and the best candidates in a table."""
+    if ranking.second_mounting is not None:
+        return prose_section(TITLE, ranking_sentences(ranking))
     heads, rows = ranking_table(ranking, _MAX_ROWS)
     return prose_section(
         TITLE, ranking_sentences(ranking), [PageTable(tuple(heads), tuple(map(tuple, rows)), HOW_TO_READ)]
@@ -46,6 +50,8 @@ def ranking_section(ranking: NextMeasurement) -> PageSection:
 
 def ranking_sentences(ranking: NextMeasurement) -> list[str]:
     """Say what to measure next, at which load, when to stop, and what would come after it."""
+    if ranking.second_mounting is not None:
+        return _second_mounting_sentences(ranking, ranking.second_mounting)
     sentences = [
         *_advice_sentences(ranking),
         *_load_and_stroke_sentences(ranking),
@@ -54,6 +60,18 @@ def ranking_sentences(ranking: NextMeasurement) -> list[str]:
         *_repeat_sentences(ranking),
     ]
     return [sentence for sentence in sentences if sentence]
+
+
+def _second_mounting_sentences(ranking: NextMeasurement, second: SecondMounting) -> list[str]:
+    """Say that a second mounting comes first, and what it may bring."""
+    answer, now = ranking.answer, _format_sd(ranking, ranking.answer.sd)
+    low, high = _format_sd(ranking, second.low).removeprefix("± "), _format_sd(ranking, second.high)
+    return [
+        f"Mount the cable anew and measure {second.words} next: all readings come from one mounting, which cannot show how "
+        "far mountings differ.",
+        f"Then {answer.words} would be known to {_format_sd(ranking, second.sd)}, now to {now}; how the second mounting turns "
+        f"out decides, and 90 % of the outcomes leave {low} to {high.removeprefix('± ')}.",
+    ]
 
 
 def _format_sd(ranking: NextMeasurement, sd: float) -> str:

@@ -20,7 +20,7 @@ from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import describe_assumed_widths, describe_misfits
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
-from bowdenfit.questions.next.candidates import has_candidates
+from bowdenfit.questions.next.candidates import has_candidates, rests_on_one_mounting
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals, few, filled, listed
@@ -187,6 +187,8 @@ def suggest_next_step(fit: Record) -> str:
         return f"Next: look at how {_name_reading(outliers[0])} was measured and written down: it is an outlier (see below)."
     if describe_misfits(checks):
         return "Next: look at the noise that is stated for these readings; checks.png shows where each of them lies."
+    if rests_on_one_mounting(fit):
+        return "Next: mount the cable anew and repeat a measurement; one mounting cannot show how far mountings differ."
     influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
     what = "reading" if len(checks.influential) == 1 else "readings"
     remeasure = f"; if in doubt, first repeat the most influential {what}: {influential}" if influential else ""

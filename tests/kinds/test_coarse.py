@@ -69,7 +69,7 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
     hidden = _fit(tmp_path, 0, 0.003)
     assert not hidden.parameter("mu").q05 < TRUE_MU < hidden.parameter("mu").q95
     (sentence,) = hidden.verdict().troubles[COARSE]
-    assert sentence.startswith("Whatever was read more than once in forces.csv is alike to the last digit, 1 N,")
+    assert sentence.startswith("Repeated readings in forces.csv agree to the last digit, 1 N,")
     assert (
         "open by 3.6 % up or down" in sentence and "may be off: [prior.sigma_F] fixed = 0.29 in cable.toml." in sentence
     )

@@ -148,10 +148,10 @@ def test_an_fmu_says_where_it_is_from_and_is_the_same_each_time(tmp_path):
 def test_without_a_compiler_a_sentence_says_so(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
-    with pytest.raises(UsageError, match=r"no C compiler here: none of cc, gcc, clang is there.*--to c"):
+    with pytest.raises(UsageError, match=r"no C compiler here: none of cc, gcc, clang is installed.*--to c"):
         build_fmu(cable("rope"), "x")
     monkeypatch.setenv("CC", "nocc -m64")
-    with pytest.raises(UsageError, match="CC names nocc, which is not there"):
+    with pytest.raises(UsageError, match="CC names nocc, which does not exist"):
         build_fmu(cable("rope"), "x")
     bad = tmp_path / "bad"
     bad.write_text("#!/bin/sh\necho 'x: error: it is broken' >&2\nexit 1\n")

@@ -264,7 +264,7 @@ def test_what_the_command_could_not_fit_ends_with_2_and_says_so(run, tmp_path):
     both = ("does not say its unit", "are swapped")
     for path, said in ((more_out_than_in, ("are swapped",)), (without_unit, both), (above_one, ("is above 1",))):
         code, out, _ = run("check", path)
-        assert code == 2 and "To fit it once that is mended:" in out
+        assert code == 2 and "To fit it once that is corrected:" in out
         assert all(words in " ".join(out.split()) for words in said), out
         (words,) = command(out)
         assert run(*words, "--no-mcmc", "--output", tmp_path / "fit")[0] == 2
@@ -297,4 +297,4 @@ def test_a_recording_that_cannot_be_used_ends_with_2(run, tmp_path):
     time, force, output = recorded()
     path = write(tmp_path, ("Time (s)", "Fin (N)", "Fout (N)"), (time, force, np.full(len(time), 3.0)))
     code, out, _ = run("check", path)
-    assert code == 2 and "To fit it once that is mended:" in out, out
+    assert code == 2 and "To fit it once that is corrected:" in out, out

@@ -243,7 +243,7 @@ def test_what_is_said_of_a_file_is_short_however_many_channels_it_has_and_howeve
         file["s0"].attrs["unit"] = "u" * 50_000
     code, out, err = run("check", "wide.h5")
     assert (code, err) == (2, "")  # forces that are equal make no recording of a cable
-    assert "... and 904 more channels." in out and "To fit it once that is mended:" in out
+    assert "... and 904 more channels." in out and "To fit it once that is corrected:" in out
     assert len(out.splitlines()) < 400
     assert max(map(len, out.splitlines())) <= 80
 

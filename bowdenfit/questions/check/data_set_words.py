@@ -65,7 +65,7 @@ def describe_data_set(dataset: Dataset) -> str:
     lines = [description.name, "=" * len(description.name), f"Everything could be read. {state}", ""]
     if description.route:
         route = description.route
-        choices = f"; {len(route.choices)} lengths can be bought" if route.choices else ""
+        choices = f"; {counted(len(route.choices), 'length')} can be bought" if route.choices else ""
         line = f"Route: {route.variable}, {route.range[0]:g} to {route.range[1]:g} {route.unit}{choices}."
         lines.append(kept_narrow(line))
     else:
@@ -130,8 +130,8 @@ def collect_warnings(dataset: Dataset) -> list[str]:
         )
     elif 0 < conditions < len(free):
         warnings.append(
-            f"{len(free)} friction coefficients are to be found from {conditions} different "
-            f"condition{'s' if conditions > 1 else ''}; what these do not determine will rest on the priors."
+            f"{len(free)} friction coefficients are to be determined from {conditions} "
+            f"{'different conditions' if conditions > 1 else 'condition'}; what these do not determine will rest on the priors."
         )
     for kind, table in iterate_tables(measurements):
         warnings += kind.warnings(table, description, measurements)
@@ -210,7 +210,7 @@ def describe_row_account(account: RowAccount, file: str = "") -> list[str]:
     over = f", headings in row{'s' if len(account.headings) > 1 else ''} {', '.join(map(str, account.headings))}"
     before = f"{file}: of" if file else "Of"
     held = "holds a reading" if account.read == 1 else "hold readings"
-    lines = [f"{before} {account.rows} rows {account.read} {held}{over if account.headings else ''}."]
+    lines = [f"{before} {counted(account.rows, 'row')} {account.read} {held}{over if account.headings else ''}."]
     unused = [row.words for row in account.left_out] + [account.beside_in_words] * bool(account.beside)
     return [*map(kept_narrow, lines), *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
 

@@ -61,9 +61,10 @@ def describe_implausible_friction(fit: Record) -> str:
     if not implausible:
         return ""
     return (
-        f"Ropes in sheaths have coefficients of {_LEAST:g} to {_MOST:g}, and these readings say {', '.join(implausible)}. The "
-        "usual causes are the unit of the wrap angles (rad for deg), a contact that was left out, and a slipped decimal point "
-        "in a reading; if it is right, say so: [friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }."
+        f"Ropes in sheaths have friction coefficients of {_LEAST:g} to {_MOST:g}; these readings give "
+        f"{', '.join(implausible)}. The usual causes are the unit of the wrap angles (rad for deg), a contact that was left "
+        "out, and a slipped decimal point in a reading; if it is right, say so: "
+        "[friction.NAME] prior = { lognormal = { median = ..., log_sd = ... } }."
     )
 
 
@@ -128,8 +129,8 @@ def _coarse_sentence(coarse: CoarseReadings, term: Term) -> str:
         else f"a column efficiency_sd with {coarse.sd:.2g}"
     )
     return (
-        f"Whatever was read more than once in {coarse.file} is alike to the last digit, {coarse.last_digit}, and does not show "
-        "how much readings scatter. Intervals take it for next to nothing, while the last digit alone leaves a reading open by "
-        f"{percent(np.sqrt(3) * coarse.log_sd)} up or down. Read one more digit; or keep one of each reading and state how far "
-        f"it may be off: {stated}."
+        f"Repeated readings in {coarse.file} agree to the last digit, {coarse.last_digit}, so they do not show how much "
+        "readings scatter. The intervals assume almost no scatter, while rounding to the last digit alone leaves a reading "
+        f"uncertain by up to {percent(np.sqrt(3) * coarse.log_sd)} either way. Record one more digit; or keep one of each "
+        f"reading and state its standard deviation: {stated}."
     )

@@ -82,10 +82,11 @@ def _describe_far_readings(fit: Record, noise: str) -> tuple[str, ...]:
 
 def _far_reading_sentence(names: Sequence[str]) -> str:
     """Return the sentence about readings far outside what chance does."""
+    was, stands, them = ("it was", "it stands", "it") if len(names) == 1 else ("they were", "they stand", "them")
     return (
-        f"The model does not describe {few(names, _MAX_NAMED)}: so far off that it happens by chance in less than one "
-        f"healthy fit of {1 / FALSE_ALARM:.0f}. Look at how it was measured and written down; if it stays, fit with --noise "
-        "student, or leave it out and say so."
+        f"The model does not describe {few(names, _MAX_NAMED)}: a deviation as large happens by chance in less than one "
+        f"healthy fit in {1 / FALSE_ALARM:.0f}. Check how {was} measured and written down; if {stands}, fit with --noise "
+        f"student, or leave {them} out and say so."
     )
 
 
@@ -99,8 +100,8 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
     where = _where_low_and_high(departure, fit.model.cable.friction.conditions.groups)
     return (
-        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; by "
-        f"chance as much happens in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
+        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; as "
+        f"much happens by chance in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
     )
 
 
@@ -110,8 +111,8 @@ def _describe_drift(departure: Departure) -> str:
     return (
         f"The model does not describe {find_readings(departure.table).words}: the zero of the output drifts, by about "
         f"{significant(abs(departure.high - departure.low), 2)} N from the start of a recording to its end (or that of the "
-        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; by "
-        f"chance as much happens in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; "
+        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; as "
+        f"much happens by chance in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; "
         "leave out the part in which the zero moves."
     )
 
@@ -127,10 +128,10 @@ def _percent_excess(excess: float) -> str:
 
 
 def _odds(p_value: float) -> str:
-    """Return such as 'one healthy fit of 5,000'."""
+    """Return such as 'one healthy fit in 5,000'."""
     if p_value < 1e-6:
-        return "less than one healthy fit of a million"
-    return f"one healthy fit of {float(f'{1 / p_value:.1g}'):,.0f}"
+        return "less than one healthy fit in a million"
+    return f"one healthy fit in {float(f'{1 / p_value:.1g}'):,.0f}"
 
 
 def _where_low_and_high(departure: Departure, groups: Sequence[str]) -> tuple[str, str]:

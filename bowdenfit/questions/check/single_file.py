@@ -226,11 +226,11 @@ def describe_commands(commands: Sequence[FitCommand], usable: bool = True) -> li
         commands: Commands that fit a file; two where it could be either of two kinds.
         usable: Whether it can be fitted as it stands.
     """
-    lines, when = list[str](), "" if usable else " once that is mended"
+    lines, when = list[str](), "" if usable else " once that is corrected"
     for what, command in zip(("a table", "a recording") if len(commands) > 1 else ("",), commands, strict=True):
         lines += [f"To fit it{f' as {what}' if what else ''}{when}:", wrap_command(command.text)]
         granted = listed([f"that {assumption}" for assumption in command.provided])
-        lines += [filled(f"This takes for granted {granted}; change what is not so.")] if granted else []
+        lines += [filled(f"This assumes {granted}; change what is wrong.")] if granted else []
     return lines
 
 

@@ -37,7 +37,7 @@ def describe(
     prior_predictive: Annotated[Path | None, Parameter(metavar="FOLDER"), PATH] = None,
     **reading: Unpack[Reading],
 ) -> Reply:
-    """What was understood of a data set; of a file alone, what it is and the command that fits it.
+    """Say what was understood of a data set; of a single file, what it is and the command that fits it.
 
     Args:
         dataset: Folder, description or file.
@@ -62,9 +62,9 @@ VERB = Verb(
     """Say what was understood of a data set, and what is wrong.
 
     Nothing is fitted. DATASET is a folder with cable.toml and tables, or one table
-    or recording with --wrap-angle. Of a file alone it is said whether it is a table
-    or a recording and why, what its columns or channels and its rows are, and the
-    command that fits it.
+    or recording with --wrap-angle. For a single file the answer says whether it is a
+    table or a recording and why, what its columns or channels and its rows are, and
+    which command fits it.
     """,
     name="check",
     json="",

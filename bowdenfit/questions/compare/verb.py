@@ -1,4 +1,4 @@
-"""Comparing fits, and the comparison in its folder: as plain data, for people, and as a figure."""
+"""The verb `compare`: compare fits, and write the comparison as plain data, for people, and as a figure."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -82,8 +82,8 @@ VERB = Verb(
     _reply,
     """Compare fits of the same measurements.
 
-    The answer says which model predicts readings left out best, and what changes
-    between the fits.
+    The answer says which model best predicts readings that were left out, and what
+    changes between the fits.
 
     RESULTS are results folders, such as of the same data set fitted with and
     without --friction rate-dependent; then the comparison says whether efficiency
@@ -97,8 +97,8 @@ VERB = Verb(
     load at a time: then the comparison says which model describes the cable as it
     was mounted, not how well it predicts the next mounting.
 
-    Readings that would move the posterior take longer: it is fitted again without
-    them. The score is the expected log predictive density of leave-one-out (elpd
+    Influential readings take longer: the posterior is fitted again without them.
+    The score is the expected log predictive density of leave-one-out (elpd
     in the JSON).
     """,
     csv="Print the fits as CSV, the best first.",

@@ -118,10 +118,9 @@ def _preference_sentence(comparison: Comparison, name: str) -> str:
 
 
 def _leaning_sentence(comparison: Comparison, name: str) -> str:
-    n = len(comparison.readings)
+    n = counted(len(comparison.readings), "reading")
     return (
-        f"The data favor {comparison.best} over {name} ({_describe_difference(comparison, name)}), but with {n} "
-        "readings the "
+        f"The data favor {comparison.best} over {name} ({_describe_difference(comparison, name)}), but with {n} the "
         f"standard error is itself uncertain and tends to be too small: not proof.{_name_dominating_reading(comparison, name)}"
     )
 
@@ -155,8 +154,10 @@ def _format_reading(reading: tuple[str, str]) -> str:
 def basis_sentences(comparison: Comparison) -> list[str]:
     """Say what is compared, and what is not."""
     counts = Counter(name for name, _ in comparison.readings)
-    parts = "" if comparison.left_out == "run" else "parts "
-    what = listed([f"{n} {parts}of {name.replace('_', ' ')}" for name, n in counts.items()])
+    whole = comparison.left_out == "run"
+    what = listed(
+        [f"{n if whole else counted(n, 'part')} of {name.replace('_', ' ')}" for name, n in counts.items()]
+    )
     n, verdicts = len(comparison.readings), {comparison.verdict(name) for name in list(comparison.differences)[1:]}
     lines = [
         f"Compared on {counted(n, 'reading')}, each left out and predicted by the others: {what}. The score says how "
@@ -173,8 +174,8 @@ def basis_sentences(comparison: Comparison) -> list[str]:
         runs = "is one run" if comparison.few_runs == 1 else f"are only {comparison.few_runs} runs"
         why = f", because there {runs}" if comparison.few_runs else ""
         lines.append(
-            f"Left out at a time: {what} of a run{why}; what its mounting did is known from the rest of the run. This compares "
-            "how the models describe these mountings, not how they predict another mounting (--leave-out run does)."
+            f"Left out at a time: {what} of a run{why}; the effect of its mounting is known from the rest of the run. This "
+            "compares how the models describe these mountings, not how they predict another mounting (--leave-out run does)."
         )
     if comparison.counts_runs:
         lines.append(
@@ -182,7 +183,7 @@ def basis_sentences(comparison: Comparison) -> list[str]:
         )
     lines += [part.sentence() for part in comparison.omitted]
     if n < FEW_READINGS and verdicts - {"open"} and "leaning" not in verdicts:  # of which it is said already
-        lines.append(f"With {n} readings the standard errors tend to be too small.")
+        lines.append(f"With {counted(n, 'reading')} the standard errors tend to be too small.")
     return lines
 
 
@@ -197,8 +198,8 @@ def influential_text(comparison: Comparison) -> str:
         return ""
     rough = sum(how.count("rough") for how in ways.values())
     lines = [
-        "Influential readings (the fit would change without them) were left out by moving the fit to where it would be "
-        "without them or, where that was not enough, by fitting again."
+        "Influential readings (the fit would change without them) were left out by moment matching (moving the "
+        "draws to where they would be without them) or, where that was not enough, by fitting again."
     ]
     if rough:
         lines.append(

@@ -155,9 +155,9 @@ def find_compiler() -> list[str]:
         if path := shutil.which(command[0]):
             return [path, *command[1:]]
     looked = (
-        f"CC names {printable(stated[0])}, which is not there"
+        f"CC names {printable(stated[0])}, which does not exist"
         if stated
-        else f"none of {', '.join(_COMPILERS)} is there"
+        else f"none of {', '.join(_COMPILERS)} is installed"
     )
     raise UsageError(
         f"an FMU holds a compiled program, and there is no C compiler here: {looked}. Install one, or name it in CC; or export "

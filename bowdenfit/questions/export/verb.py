@@ -1,4 +1,4 @@
-"""Writing a fitted cable as other programs read it."""
+"""The verb `export`: write a fitted cable as other programs read it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -72,20 +72,20 @@ VERB = Verb(
     _reply,
     """Write a fitted cable for C, MuJoCo, FMI, MATLAB, ROS or as CSV.
 
-    The file says friction over lengths or wrap angles, with quantiles of the
+    The file tabulates friction over lengths or wrap angles, with quantiles of the
     cable's mean and of any one mounting.
 
       c       a header (C99): output force, input force, friction while moving to
               and fro, compensation
       mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch
               is known as a callback (--output cable.py)
-      matlab  a function of MATLAB and Octave that says the same
+      matlab  a function for MATLAB and Octave with the same answers
       fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header,
               compiled here, with its sources
       yaml    parameters of a controller, as ROS 2 reads them: friction by place,
               and what may be fed forward; with --device the largest safe share
               and gain, too
-      csv     a lookup table that says what bowdenfit predict says; with --draws,
+      csv     a lookup table of what bowdenfit predict answers; with --draws,
               cables drawn from the posterior
 
     Every file says which fit it was written from, with which seed and version, and

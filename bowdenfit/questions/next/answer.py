@@ -81,7 +81,7 @@ def _make_parameter_target(fit: Record, name: str) -> TargetQuantity:
     draws = fit.draws().values[name].ravel()
     if not np.all(np.isfinite(draws)):
         raise UsageError(
-            f"--for {name}: some draws have no finite {name}, so its variance is none that could be reduced; ask for another "
+            f"--for {name}: some draws have no finite {name}, so it has no variance that could be reduced; ask for another "
             "parameter of the same curve."
         )
     unit = units.get(name, "1")

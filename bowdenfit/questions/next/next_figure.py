@@ -30,9 +30,9 @@ def caption(ranking: NextMeasurement) -> str:
     best = f" Circle: {ranking.best.words}, most worth measuring." if ranking.best is not None else ""
     gray = " Gray: outside the range of the curves." if _is_along_route(ranking) and ranking.route_label else ""
     return (
-        f"How well {ranking.answer.words} would be known after one more measurement, as one standard deviation, on "
-        "average over "
-        "what it may read; bars: two standard errors of that estimate. Dashed: the present uncertainty."
+        f"How well {ranking.answer.words} would be known after one more measurement, as one standard deviation, "
+        "averaged over the readings that it may give; bars: two standard errors of that estimate. Dashed: the present "
+        "uncertainty."
         f"{best}{gray} n = {counted(len(ranking.ranked), 'measurement')} considered."
     )
 

@@ -1,4 +1,4 @@
-"""Asking what to measure next."""
+"""The verb `next`: what to measure next."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -71,8 +71,8 @@ VERB = Verb(
     _reply,
     """Rank what to measure next.
 
-    Candidates are ranked by how far each would narrow the answer, on average over
-    what it may read.
+    Candidates are ranked by how far each would narrow the answer, averaged over the
+    readings that it may give.
 
       KIND        a reading of
       angle       the wrap angles of all curved contacts at a length

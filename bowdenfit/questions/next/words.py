@@ -121,7 +121,7 @@ def _mounting_and_loads(ranking: NextMeasurement, best: RankedCandidate) -> str:
 
 
 def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:
-    """Say at which load and of which stroke its readings tell most, against the same number of them as usual."""
+    """Say at which load and of which stroke its readings help most, against the same number of them as usual."""
     within = ranking.within
     if within is None:
         return []
@@ -139,10 +139,9 @@ def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:
             f"leave {_format_sd(ranking, worst.sd)}."
         ]
     return [
-        f"{remark} As many readings {_describe_design(best)} do most: they leave {_format_sd(ranking, best.sd)}, those "
-        "as usual "
-        f"{_format_sd(ranking, usual.sd)}, and {_describe_design(worst)} {_format_sd(ranking, worst.sd)}; name it with "
-        f"--candidate {best.name}."
+        f"{remark} As many readings {_describe_design(best)} would help most: they leave {_format_sd(ranking, best.sd)}, the "
+        f"usual ones {_format_sd(ranking, usual.sd)}, and readings {_describe_design(worst)} {_format_sd(ranking, worst.sd)}; "
+        f"name them with --candidate {best.name}."
     ]
 
 

@@ -1,4 +1,4 @@
-"""Making a data set from known truth."""
+"""The verb `simulate`: make a data set whose true values are known."""
 
 import secrets
 from pathlib import Path
@@ -61,13 +61,13 @@ def _reply(_: "Dataset", options: dict[str, Any]) -> Reply:
 VERB = Verb(
     simulate,
     _reply,
-    """Make a data set from known truth.
+    """Simulate a data set whose true values are known.
 
     BENCH is a cable.toml with two more tables: [truth] with the value of each
     parameter (what is missing is drawn from its prior), and [design] with the
     lengths and forces to measure at; datasets/synthetic-bench/bench.toml is one.
-    With --recordings it has [recordings] in place of [design]: what the motor does,
-    what the bench is like, and what its load cells get wrong;
+    With --recordings it has [recordings] in place of [design]: the motion of the
+    motor, the bench, and the errors of its load cells;
     datasets/synthetic-recordings/bench.toml is one. With --fleet it has [fleet]
     besides: how many cables there are, and how they wear;
     datasets/synthetic-fleet/bench.toml is one. The truth and the seed are written

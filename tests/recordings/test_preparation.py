@@ -353,7 +353,7 @@ def test_a_recording_without_reversal_does_not_tell_the_delay():
     time = np.arange(10000) / 1000
     pull = np.exp(np.log(50) + 0.15 * time)
     found = estimate_delay(time, pull, pull * np.exp(-EXPONENT), np.ones(len(time), dtype=bool), 0.05)
-    assert found.value == 0 and np.isnan(found.sd) and "cannot be told" in found.remark
+    assert found.value == 0 and np.isnan(found.sd) and "cannot be known from this recording" in found.remark
 
 
 def test_a_given_delay_is_applied_as_it_is():

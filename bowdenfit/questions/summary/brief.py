@@ -35,6 +35,7 @@ _LONGEST_NAME, _LONGEST_READING = 44, 36  # characters of names in a line of 80
 _LEAST_QUANTITIES, _MOST_QUANTITIES, _MOST_OUTLIERS = 4, 8, 3  # rows
 _OTHER_LINES = 7  # lines that are neither sentences nor rows: headings, what is left out, blank lines, the last one
 WITH_BENCH = "with bench errors"
+_LEAST_ROOM = 12  # characters of a line in which words can be wrapped; a judgement
 READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
 _KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
@@ -91,9 +92,11 @@ def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:
     interval_width = max(len(q.interval) for q in shown)
     rows: list[tuple[str, ...]] = [(q.name, q.value, f"{q.interval:>{interval_width}} {q.unit}".rstrip()) for q in shown]
     heads: tuple[str, ...] = ("", "value", f"{'90 % interval':>{interval_width}}")
-    if widened := _widened_intervals(fit, [q.name for q in shown]):
-        heads, rows = (*heads, WITH_BENCH), [(*row, text) for row, text in zip(rows, widened, strict=True)]
     printed = table(heads, rows, left=heads[2:]).splitlines()
+    if widened := _widened_intervals(fit, [q.name for q in shown]):
+        wider_rows = [(*row, text) for row, text in zip(rows, widened, strict=True)]
+        wider = table((*heads, WITH_BENCH), wider_rows, left=(*heads[2:], WITH_BENCH)).splitlines()
+        printed = wider if max(map(len, wider)) <= WIDTH else printed
     start = max(map(len, printed)) + 2
     more = len(rows_to_show) - len(shown)
     lines_made, spare, complete = printed[:2], lines - len(shown) + (more <= 0), True
@@ -116,6 +119,8 @@ def _widened_intervals(fit: Record, names: Sequence[str]) -> list[str]:
 
 def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
     """Return what a coefficient is, in one line and at most so many more; cut, or left out, where there is no room."""
+    if room < _LEAST_ROOM:
+        return [""]
     whole = textwrap.wrap(meaning, room) or [""]
     if len(whole) <= 1 + max(spare, 0):
         return whole

@@ -371,7 +371,7 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     assert "Of wrap angle only 17 of 22 readings are compared" in words
     assert "continuous: below the limit, published: zeros, in the published regions" in words
     assert "4 of efficiency" in words
-    assert "Influential readings (the fit would change without them) were left out by moving" in words
+    assert "Influential readings (the fit would change without them) were left out by moment matching" in words
     assert progress == f"Wrote {where}.\n"  # what is being left out is said in a terminal alone, where it goes again
     page = json.loads((where / "comparison.json").read_text())
     assert sum(row["stacking_weight"] for row in page["fits"]) == pytest.approx(1.0)

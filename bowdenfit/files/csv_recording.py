@@ -44,6 +44,7 @@ from bowdenfit.files.text_file import (
     CsvRecord,
     Line,
     Section,
+    check_encoding,
     comment_mark,
     count_rows_before,
     declared_separator,
@@ -120,6 +121,7 @@ def read(path: Path) -> ChannelFile:
     data = first_bytes(path, _FIRST_BYTES)
     refuse_larger(path, LARGEST_BYTES, "convert it to Parquet with the needed columns only, or cut it into runs")
     sheet = read_start(path, data)
+    check_encoding(path)
     last = last_lines(path, sheet.encoding, sheet.start, _LAST_BYTES)[-_LAST_ROWS:]
     cut = _is_cut(last[-51:], sheet.separator)
     stop = last[-1].start if cut else path.stat().st_size

@@ -14,6 +14,7 @@ from bowdenfit.files.text_file import (
     SEPARATORS,
     CsvRecord,
     Line,
+    check_encoding,
     comment_mark,
     declared_separator,
     first_bytes,
@@ -105,6 +106,7 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     if content not in (UNKNOWN, PLAIN_TEXT):
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
     _, all_lines = first_lines(data, name, whole=most is None, most=most)
+    check_encoding(path)
     if most is not None and len(all_lines) > 1 and not all_lines[-1].ended:
         all_lines = all_lines[:-1]
     declared, lines = declared_separator(all_lines, name)

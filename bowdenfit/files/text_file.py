@@ -16,6 +16,11 @@ from bowdenfit.words import shown
 
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
 _COMMENT = re.compile(r"\s*\"?\s*(?P<mark>#(?!n/a|div/0!|value!|num!|ref!|na\b)|%)", re.IGNORECASE)
+# Two bytes of a table in UTF-8, or of one in the other order, read as one letter of UTF-16: no language has several in a row.
+_HIGH = (*range(0x30, 0x3A), *map(ord, "+,-.; |eE"))
+_LETTERS = "".join(chr(256 * high + low) for high in _HIGH for low in b"\x00\t\n\r +,-.;|Ee0123456789")
+_WITH_ENDS = _LETTERS + "".join(chr(256 * high + low) for high in b"\t\n\r" for low in b"0123456789")
+_OTHER_ENCODING = re.compile(f"[{re.escape(_LETTERS)}]{{4,}}|[{re.escape(_WITH_ENDS)}]{{12,}}")
 _PIECE = 1 << 24  # bytes at once, little beside the memory of any computer
 # Marks without width that spreadsheets and chat programs leave in cells: two labels that look alike would be two.
 _INVISIBLE = dict.fromkeys(map(ord, "\xad\u200b\u200c\u200d\u200e\u200f\u2060\u202a\u202b\u202c\u202d\u202e\ufeff"))
@@ -96,6 +101,45 @@ def first_bytes(path: Path, most: int = -1) -> bytes:
             f"{path.name} is empty (0 bytes); copy it again from the acquisition computer, or fill it in."
         )
     return data
+
+
+def check_encoding(path: Path) -> None:
+    """Refuse a text of which a part is in another encoding than its beginning, or that is cut off inside a letter.
+
+    Raises:
+        DatasetError: It is; the rows would be lost that cannot be read.
+    """
+    with path.open("rb") as file:
+        beginning = file.read(4)
+        encoding = next((name for mark, name in _BYTE_ORDER_MARKS if beginning.startswith(mark)), "utf-8")
+        file.seek(0)
+        before = 0
+        while data := file.read(_PIECE):
+            if (other := _other_encoding(data, encoding)) is not None:
+                row = count_rows_before(path, before + other) + 1
+                raise DatasetError(
+                    f"{path.name}, row {row}: from there on the file is not in {encoding[:6].upper()} as its beginning is. The "
+                    "usual cause is rows that another program appended, or a damaged copy. Export the table again in one "
+                    "encoding, such as UTF-8."
+                )
+            before += len(data)
+    if encoding.startswith("utf-16") and before % 2:
+        raise DatasetError(
+            f"{path.name} breaks off inside a letter: it is in UTF-16, two bytes a letter, and has {before} bytes. The usual "
+            "cause is a copy that was cut off; copy or export it again."
+        )
+
+
+def _other_encoding(data: bytes, encoding: str) -> int | None:
+    """Return where in a piece of a text another encoding begins [bytes]; None if it is all in one."""
+    if not encoding.startswith("utf-16"):
+        return at if (at := data.find(b"\x00")) >= 0 else None
+    high = data[encoding.endswith("le") :: 2]
+    if high.count(0) == len(high):
+        return None
+    text = data[: len(data) // 2 * 2].decode(encoding, errors="replace")
+    match = _OTHER_ENCODING.search(text)
+    return 2 * match.start() if match else None
 
 
 def first_lines(data: bytes, name: str, whole: bool, most: int | None = None) -> tuple[str, list[Line]]:

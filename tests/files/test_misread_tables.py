@@ -268,3 +268,40 @@ def test_a_clock_that_runs_backwards_is_said_by_check(tmp_path, run, times, caus
     code, out, err = run("check", clock_recording(tmp_path, times, "time", forces))
     words = " ".join((out + err).split())
     assert code == 2 and "runs backwards at sample" in words and cause in words
+
+
+def in_two_encodings(path, first, second, rows):
+    """Write rows of which the second half is in another encoding."""
+    half = len(rows) // 2
+    path.write_bytes(("\n".join(rows[:half]) + "\n").encode(first) + ("\n".join(rows[half:]) + "\n").encode(second))
+    return half + 1
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("utf-16", "utf-8"), ("utf-8", "utf-16-le"), ("utf-8-sig", "utf-16"), ("utf-16", "utf-16-be"), ("utf-16", "cp1252")],
+)
+@pytest.mark.parametrize("separator", [",", "\t"])
+@pytest.mark.parametrize("many", [40, 600])
+def test_a_file_in_two_encodings_is_refused(tmp_path, run, first, second, separator, many):
+    rows = [f"180,{10 + i % 50},{0.7 * (10 + i % 50):.1f}" for i in range(many)]
+    head = "time_s" if many == 600 else "wrap_angle_deg"
+    rows = [row.replace(",", separator) for row in [f"{head},input_force_N,output_force_N", *rows]]
+    row = in_two_encodings(tmp_path / "t.csv", first, second, rows)
+    code, out, err = run("check", tmp_path / "t.csv")
+    words = " ".join((out + err).split())
+    assert code == 2 and (("in UTF-" in words and f"row {row}" in words) or "not a text file" in words), words
+
+
+def test_a_file_in_utf_16_that_is_cut_inside_a_letter_is_refused(tmp_path):
+    text = HEADING + "10,8\n20,16\n30,24\n40,32"
+    (tmp_path / "t.csv").write_bytes(text.encode("utf-16")[:-1])
+    with pytest.raises(bf.DatasetError, match="breaks off inside a letter"):
+        read_csv(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("remark", ["これはばねのちからのけいそくです", "मापन केबल के साथ", "在實驗室測量的力", "+ – … †‡ €"])
+def test_a_file_in_utf_16_may_have_remarks_in_any_language(tmp_path, remark):
+    text = f"# {remark}\ninput_force_N,output_force_N,{remark.replace(',', '')}\n10,8,{remark}\n20,16,\n30,24,\n"
+    (tmp_path / "t.csv").write_text(text, encoding="utf-16")
+    assert len(read_csv(tmp_path / "t.csv").rows) == 3

@@ -72,16 +72,19 @@ class Efficiencies(Display, list[Interval]):
     """Efficiencies [1] with intervals at values of the route variable: a list that displays itself as `predict` does.
 
     Args:
-        found: One a length.
+        intervals: One a length.
         route: The route; None without one.
         lengths: Route values.
+        outside: That each lies outside the curves, in words; empty inside.
     """
 
-    def __init__(self, intervals: Iterable[Interval], route: Route | None, lengths: Iterable[float]) -> None:
+    def __init__(
+        self, intervals: Iterable[Interval], route: Route | None, lengths: Iterable[float], outside: Iterable[str]
+    ) -> None:
         super().__init__(intervals)
         at = [float(length) for length in lengths]
         self._at = [{} if route is None else {f"{route.variable}_{route.unit}": length} for length in at]
-        self._outside = ["" if route is None else route.outside(length) for length in at]
+        self._outside = list(outside)
 
     @property
     def rows(self) -> list[dict[str, Any]]:

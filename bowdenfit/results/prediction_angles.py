@@ -1,58 +1,138 @@
-"""Wrap angles that predictions at route values use: the curves', and stated ones in their place."""
+"""Wrap angles that predictions at route values use: the curves', measured ones outside their range, or stated ones."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from bowdenfit.cable.cable import Cable
+from bowdenfit.dataset import Dataset
+from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
+from bowdenfit.kinds import iterate_tables
+from bowdenfit.kinds.kind import FrictionKind
+from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
+from bowdenfit.kinds.rows import OwnAngles, RowConditions
+from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.words import listed
 
 NO_ANGLES: Mapping[int, float] = MappingProxyType({})
+_ROUNDING = 1e-9  # share of a route value by which another may differ and be the same, above rounding of units
+_STREAM = 11  # of random numbers, beside the fit's own
 
 
 @dataclass(frozen=True)
 class PredictionAngles:
-    """Wrap angle of each contact at each route value: the curve's, or one of its own.
+    """Wrap angle of each contact at each route value: the curve's, or one of its own with its error.
 
     Args:
-        route: Route values; any one number without a route.
-        own: Own wrap angles [rad], route values by contacts; 0 without one.
-        is_own: Whether there is one.
-        notes: What takes the place of the contacts' usual wrap angles at each route value, in words; empty for nothing.
+        rows: Route values and own angles, as of rows of a table.
+        seed: Of the errors.
+        notes: Stated angles at each route value, in words; empty without any.
+        outside: That a route value lies outside the curves, and what serves there, in words; empty inside.
     """
 
-    route: Float[np.ndarray, " places"]
-    own: Float[np.ndarray, "places contacts"]
-    is_own: Bool[np.ndarray, "places contacts"]
+    rows: RowAngles
+    seed: int
     notes: tuple[str, ...]
+    outside: tuple[str, ...]
 
-    def resolve(self, cable: Cable, values: Mapping[str, Array]) -> Float[Array, "places contacts"]:
-        """Return the wrap angles [rad] at given parameters."""
-        return jnp.where(self.is_own, self.own, cable.wrap_angles(values, jnp.asarray(self.route)))
+    def draw_errors(self, n: int) -> Float[np.ndarray, "draws errors"]:
+        """Return normal scores of the errors of own angles in each draw; no columns where all angles are exact.
+
+        Those at a route value are the same whatever others are asked for beside it.
+        """
+        rows = self.rows
+        if not (rows.known_sd.any() or rows.has_angle_noise.any()):
+            return np.zeros((n, 0))
+        seeds = [[self.seed, _STREAM, int(bits)] for bits in np.asarray(rows.route, dtype=float).view(np.uint64)]
+        scores = [np.random.default_rng(seed).standard_normal((n, rows.own.shape[1])) for seed in seeds]
+        return np.concatenate(scores, axis=1)
+
+    def resolve(self, cable: Cable, values: Mapping[str, Array], errors: Array) -> Float[Array, "places contacts"]:
+        """Return the wrap angles [rad] at given parameters and errors, which make none negative."""
+        angles, variance = resolve_angles(cable, values, {name: jnp.asarray(x) for name, x in self.rows.data.items()})
+        if not errors.size:
+            return angles
+        return jnp.maximum(angles + errors.reshape(angles.shape) * jnp.sqrt(variance), 0.0)
 
 
-def choose_angles(model: Model, route: np.ndarray, stated: Mapping[int, float]) -> PredictionAngles:
+def choose_angles(
+    dataset: Dataset, route: np.ndarray, stated: Mapping[int, float], seed: int, bent: int | None = None
+) -> PredictionAngles:
     """Return the wrap angles that a prediction uses.
 
+    A stated angle comes first. Outside the range of the curves follow the angle table's row at the same length, then the mean
+    of what rows of forces and efficiencies have there, with errors as the likelihood has them; inside, the curve.
+
     Args:
-        model: The model.
+        dataset: The data set.
         route: Route values.
         stated: Stated wrap angles [rad], by number of the contact; they hold at all route values.
+        seed: Of the errors of measured angles.
+        bent: Number of a contact that takes other wrap angles than these, so that none is needed; None without one.
+
+    Raises:
+        UsageError: Outside the range of the curves no wrap angle was measured or stated.
     """
-    contacts = model.description.contact
-    shape = len(route), len(contacts)
-    own, is_own = np.zeros(shape), np.zeros(shape, dtype=bool)
+    description, at = dataset.description, np.array(route, dtype=float)
+    contacts, limits = description.contact, description.route
+    outside = ["" if limits is None else limits.outside(value) for value in at]
+    curved = [k for k, c in enumerate(contacts) if c.wrap_angle.curve and c.wrap_angle.column and k not in (*stated, bent)]
+    names = tuple(contacts[k].wrap_angle.column or "" for k in curved)
+    own = OwnAngles.none(names, len(at))
+    for i in [i for i, words in enumerate(outside) if words and curved]:
+        missing = []
+        for j, name in enumerate(names):
+            measured = next(_measured_angles(dataset, name, at[i]), None)
+            if measured is None:
+                missing.append(contacts[curved[j]].name)
+            else:
+                own.angle[i, j], own.sd[i, j] = measured
+        if missing:
+            _refuse_unmeasured(f"{at[i]:.6g} {limits.unit if limits else ''}", outside[i], missing)
+        outside[i] += ": by the wrap angles measured there"
+    rows = collect_row_angles(description, RowConditions(at, own), None)
     for contact, angle in stated.items():
-        own[:, contact], is_own[:, contact] = angle, True
+        rows.own[:, contact], rows.is_own[:, contact] = angle, True
+        rows.known_sd[:, contact], rows.has_angle_noise[:, contact] = 0.0, False
     words = listed([f"{contacts[k].name!r} bent by {np.rad2deg(angle):.4g} deg" for k, angle in stated.items()])
-    return PredictionAngles(np.asarray(route, dtype=float), own, is_own, (words,) * len(route))
+    return PredictionAngles(replace(rows, route=at), seed, (words,) * len(at), tuple(outside))
+
+
+def _measured_angles(dataset: Dataset, column: str, at: float) -> Iterator[tuple[float, float]]:
+    """Yield wrap angles [rad] that were measured at a route value, and their sd (NaN for that of the angle table's noise)."""
+    table = dataset.measurements.table(AngleTable)
+    if table is not None and column in table.names:
+        measured, limit = table.column(column)
+        here = np.isclose(table.route, at, rtol=_ROUNDING, atol=0.0)
+        readings = np.where(np.isnan(measured[here]), limit[here] / 2, measured[here])
+        if len(readings) and np.all(np.isfinite(readings)):
+            undetected = limit[here][np.isnan(measured[here])]
+            yield float(readings.mean()), float(undetected.max() / np.sqrt(12)) if len(undetected) else np.nan
+    for kind, rows in iterate_tables(dataset.measurements):
+        if isinstance(kind, FrictionKind):
+            conditions = kind.conditions(rows)
+            angle, sd = conditions.own.column(column)
+            here = np.isclose(conditions.route, at, rtol=_ROUNDING, atol=0.0) & ~np.isnan(angle)
+            if here.any():
+                known = sd[here][~np.isnan(sd[here])]
+                yield float(angle[here].mean()), float(known.mean()) if len(known) else np.nan
+
+
+def _refuse_unmeasured(place: str, outside: str, contacts: Sequence[str]) -> None:
+    """Refuse a route value at which no wrap angle is known."""
+    named = listed([repr(name) for name in contacts])
+    raise UsageError(
+        f"{place} lies {outside}, and no wrap angle of {named} was measured there; a curve says nothing beyond its range. "
+        f"Measure the wrap angles there, in a row of the angle table, or give each to predict, as --wrap-angle "
+        f"'{contacts[0]}=30deg'."
+    )
 
 
 def predict_forces(
@@ -79,10 +159,12 @@ def predict_forces(
     cable = model.cable
     function = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 
-    def other_end(z_and_mounting: Float[Array, " free_and_one"]) -> Float[Array, " places"]:
-        values = model.space.constrain(z_and_mounting[:-1])
-        bends = angles.resolve(cable, values)
-        return function(values, bends, jnp.asarray(float(force)), jnp.asarray(float(stroke)), z_and_mounting[-1])
+    def other_end(draw: Float[Array, " free_and_more"]) -> Float[Array, " places"]:
+        z, mounting, errors_of_draw = jnp.split(draw, [model.space.size, model.space.size + 1])
+        values = model.space.constrain(z)
+        bends = angles.resolve(cable, values, errors_of_draw)
+        return function(values, bends, jnp.asarray(float(force)), jnp.asarray(float(stroke)), mounting[0])
 
-    program = for_each_draw(other_end, model.space.size + 1)
-    return [program(np.column_stack([z, mounting])) for mounting in mountings]
+    errors = angles.draw_errors(len(z))
+    program = for_each_draw(other_end, model.space.size + 1 + errors.shape[1])
+    return [program(np.column_stack([z, mounting, errors])) for mounting in mountings]

@@ -29,6 +29,7 @@ from bowdenfit.results.along_route import (
     summarize_optimum,
 )
 from bowdenfit.results.optimal_length import OptimalLength
+from bowdenfit.results.prediction_angles import NO_ANGLES, choose_angles, predict_forces
 from bowdenfit.words import few, shown
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
@@ -205,15 +206,24 @@ class Record(Display):
             lengths: Route values; the description's choices if omitted.
 
         Raises:
-            UsageError: There is no posterior, or a length is no number.
+            UsageError: There is no posterior, or a length is no number, or outside the range of the angle curves no wrap
+                angle was measured at it.
         """
         at = self._lengths(lengths)
-        return Efficiencies(map(Interval.of, self.efficiency_draws(at).T), self.dataset.description.route, at)
+        outside = choose_angles(self.dataset, at, NO_ANGLES, self.provenance.seed).outside
+        intervals = map(Interval.of, self.efficiency_draws(at).T)
+        return Efficiencies(intervals, self.dataset.description.route, at, outside)
 
     def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:
         """Return the efficiency of every draw (rows) at values of the route variable (columns); see `efficiency`."""
+        at, z = self._lengths(lengths), self.draws().flat_z
+        angles = choose_angles(self.dataset, at, NO_ANGLES, self.provenance.seed)
         with jax.enable_x64(True):
-            return efficiency_at(self.model, self.draws().flat_z, self._lengths(lengths))
+            if not angles.rows.is_own.any():
+                return efficiency_at(self.model, z, at)
+            force = self.model.cable.friction.conditions.reference_force
+            (forces,) = predict_forces(self.model, z, angles, force, 1, (np.zeros(len(z)),))
+        return forces / force
 
     def _lengths(self, lengths: float | Iterable[float] | None) -> np.ndarray:
         route = self.dataset.description.route

@@ -146,7 +146,7 @@ def test_length_gives_the_design_answer(run, results):
 
 
 def test_predict_marks_lengths_outside_the_range(run, results):
-    code, out, _ = run("predict", results, "470", "600", "--csv")
+    code, out, _ = run("predict", results, "470", "550", "--csv")
     assert code == 0
     heads, inside, outside = (line.split(",") for line in out.splitlines())
     assert heads[0] == "cable_length_mm"
@@ -158,15 +158,15 @@ def test_predict_marks_lengths_outside_the_range(run, results):
 
 
 def test_predictions_are_a_page_with_units_for_people(run, results):
-    code, out, _ = run("predict", results, "470", "600")
+    code, out, _ = run("predict", results, "470", "550")
     assert code == 0 and all(len(line) <= 80 for line in out.splitlines())
     first, table, notes = out.split("\n\n")
     heads, _, inside, outside = table.splitlines()
     assert re.match(r"Efficiency, inside the curves: 7\d\.\d % at 470 mm\.", first)
     within = run("predict", results, "470", "500")[1]
     assert re.match(r"Efficiency: highest 7\d\.\d % at 470 mm, lowest \d\d(\.\d)? % at 500 mm\.", within)
-    assert heads.split("  ")[0] == "cable length (mm)" and inside.startswith("470 ") and outside.startswith("600 ")
-    assert "600 mm: outside the lengths measured, 430 to 550 mm" in " ".join(notes.split())
+    assert heads.split("  ")[0] == "cable length (mm)" and inside.startswith("470 ") and outside.startswith("550 ")
+    assert "550 mm: outside the curves, 430 to 530 mm: by the wrap angles measured there" in " ".join(notes.split())
     assert re.match(r"Efficiency at 470 mm: 7\d\.\d % \(90 % interval ", run("predict", results, "470")[1])
 
 
@@ -181,9 +181,9 @@ def test_lengths_are_read_with_their_units(run, results):
 
 
 def test_no_place_outside_the_curves_is_said_to_be_the_best_and_no_length_is_negative(run, results):
-    assert run("predict", results, "455", "480", "1000")[1].startswith("Efficiency, inside the curves: highest")
-    assert run("predict", results, "455", "1000")[1].startswith("Efficiency, inside the curves: 78.")
-    assert run("predict", results, "900", "1000")[1].startswith("Efficiency, all outside the curves: highest")
+    assert run("predict", results, "455", "480", "550")[1].startswith("Efficiency, inside the curves: highest")
+    assert run("predict", results, "455", "550")[1].startswith("Efficiency, inside the curves: 78.")
+    assert run("predict", results, "540", "550")[1].startswith("Efficiency, all outside the curves: highest")
     code, _, err = run("predict", results, "--", "-455")
     assert code == 2
     assert "-455 mm: no cable length is negative where the route goes from 430 to 530 mm" in " ".join(err.split())

@@ -247,9 +247,9 @@ def test_all_that_can_be_reached_from_a_result_is_short(fit, answers):
 
 
 def test_efficiencies_say_where_the_curves_do_not_hold(fit):
-    outcome = fit.efficiency([470, 600])
+    outcome = fit.efficiency([470, 550])
     assert [row["in_range"] for row in outcome.rows] == [True, False]
-    assert "inside the curves" in str(outcome) and "600 mm: outside the curves, 430 to 530 mm." in str(outcome)
+    assert "inside the curves" in str(outcome) and "550 mm: outside the curves, 430 to 530 mm: by the wrap" in str(outcome)
     for nothing in ([np.nan], "455mm", [None], ["a"]):
         with pytest.raises(bf.UsageError, match=r"must be numbers in the unit of the route, such as \[455, 470\]"):
             fit.efficiency(nothing)

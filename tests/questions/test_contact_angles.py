@@ -77,3 +77,44 @@ def test_a_wrong_angle_of_a_contact_is_refused_in_a_notebook(fit):
         bf.predict(fit, 470, wrap_angles={EDGE: 45})
     with pytest.raises(UsageError, match="did you mean 'free sheath'"):
         bf.predict(fit, 470, wrap_angles={"free sheat": "45deg"})
+
+
+# Outside the angle curves -----------------------------------------------------------------------------------------
+
+
+def test_a_prediction_outside_the_curves_is_what_the_measured_angles_say(fit):
+    """At 550 mm the angle table has 37 and 100 deg, and the fit expects its reading there by these; the bell said 64 %."""
+    row = bf.predict(fit, [550])[0]
+    mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
+    right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
+    assert row["efficiency"] == pytest.approx(np.median(right), abs=5e-4)
+    assert row["efficiency"] == pytest.approx(0.680, abs=0.003)
+    noise = np.deg2rad(fit.posterior.values["sigma_theta"].ravel())
+    assert row["sd"] == pytest.approx(np.sqrt(np.var(right) + np.mean((mu1**2 + mu2**2) * (right * noise) ** 2)), rel=0.03)
+    assert row["note"] == "outside the curves, 430 to 530 mm: by the wrap angles measured there"
+    assert not row["in_range"]
+
+
+def test_all_ways_to_ask_outside_the_curves_agree(fit):
+    rows = bf.predict(fit, [540, 550])
+    assert bf.predict(fit, ["55cm"])[0]["mean"] == rows[1]["mean"]  # whatever stands beside it
+    assert [one.mean for one in fit.efficiency([540, 550])] == pytest.approx([row["mean"] for row in rows], rel=1e-12)
+    assert "540 mm and 550 mm: outside the curves" in " ".join(str(fit.efficiency([470, 540, 550])).split())
+    (bent,) = bf.predict(fit, [550], contact=EDGE, wrap_angles="45deg")
+    assert bent["efficiency"] == pytest.approx(rows[1]["efficiency"], rel=1e-12)
+    wanted = bf.predict(fit, [550], output_force="100N")[0]
+    assert wanted["input_force_N"] == pytest.approx(100 / rows[1]["efficiency"], rel=1e-6)
+
+
+def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(fit, quick_results, refuse):
+    words = refuse("predict", quick_results, "560")
+    assert "560 mm lies outside the curves, 430 to 530 mm, and no wrap angle of 'free sheath' and 'squeezed sheath'" in words
+    assert "Measure the wrap angles there" in words and "--wrap-angle 'free sheath=30deg'" in words
+    with pytest.raises(UsageError, match="560 mm lies outside the curves"):
+        fit.efficiency([470, 560])
+    with pytest.raises(UsageError, match="no wrap angle of 'squeezed sheath' was measured"):
+        bf.predict(fit, 560, wrap_angles={FREE: "100deg"})
+    (stated,) = bf.predict(fit, 560, wrap_angles={FREE: "100deg", "squeezed sheath": "37deg"})
+    mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
+    right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
+    assert stated["efficiency"] == pytest.approx(np.median(right), rel=1e-9)

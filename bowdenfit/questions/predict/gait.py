@@ -185,7 +185,7 @@ def predict_over_gait(
         name, force = "output_force_N", to_newtons(input_force, "--input-force")
     else:
         divisor = force
-    angles = choose_angles(fit.model, lengths, stated)
+    angles = choose_angles(fit.dataset, lengths, stated, fit.provenance.seed, gait.contact)
     forces = _forces_over_gait(fit, angles, gait, force, _STROKES[stroke], inverse=output_force is not None)
     words = clip_to_tension(forces["mean"], force, slack_word)[1]
     of_load = {"at_input_force_N": force} if friction.depends_on_load and name == "efficiency" else {}
@@ -204,8 +204,8 @@ def predict_over_gait(
         load = None if name == "efficiency" else float(np.median(forces["mean"][:, i])) if output_force else force
         notes = [words[i], gait.description, angles.notes[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
-            notes.append(outside := route.outside(length))
-            row["in_range"] = not outside
+            notes.append(angles.outside[i])
+            row["in_range"] = not angles.outside[i]
         rows.append(row | {"note": "; ".join(note for note in notes if note)})
     return rows
 
@@ -223,8 +223,8 @@ def _forces_over_gait(
     model, cable = fit.model, fit.model.cable
     function: Callable[..., Array] = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 
-    def average_over_gait(values: Mapping[str, Array], bends: Array, mounting: Array) -> dict[str, Array]:
-        angles = chosen.resolve(cable, values)
+    def average_over_gait(values: Mapping[str, Array], bends: Array, mounting: Array, errors: Array) -> dict[str, Array]:
+        angles = chosen.resolve(cable, values, errors)
 
         def step(carry: dict[str, Array], bend: Array) -> tuple[dict[str, Array], None]:
             bent = angles.at[:, gait.contact].set(bend[0])
@@ -236,18 +236,20 @@ def _forces_over_gait(
                 "most_torque": jnp.maximum(carry["most_torque"], torque),
             }, None  # fmt: skip
 
-        none = jnp.zeros(len(chosen.route))
+        none = jnp.zeros(len(chosen.rows.route))
         start = {"mean": none, "least": none + jnp.inf, "most": none, "torque": none, "most_torque": none - jnp.inf}
         return jax.lax.scan(step, start, bends)[0]
 
-    def forces_of_draw(z_and_mounting: Array, bends: Array) -> dict[str, Array]:
-        values = model.space.constrain(z_and_mounting[:-1])
-        mounted = average_over_gait(values, bends, z_and_mounting[-1])["mean"]
-        return average_over_gait(values, bends, jnp.zeros(())) | {"mounted": mounted}
+    def forces_of_draw(draw: Array, bends: Array) -> dict[str, Array]:
+        z, mounting, errors_of_draw = jnp.split(draw, [model.space.size, model.space.size + 1])
+        values = model.space.constrain(z)
+        mounted = average_over_gait(values, bends, mounting[0], errors_of_draw)["mean"]
+        return average_over_gait(values, bends, jnp.zeros(()), errors_of_draw) | {"mounted": mounted}
 
     with jax.enable_x64(True):
         arms = np.zeros(len(gait.angles)) if gait.arms is None else gait.arms
-        bends = jnp.asarray(np.column_stack([gait.angles, arms]))
-        program = for_each_draw(forces_of_draw, model.space.size + 1, bends, run_once=True)
-        forces_by_draw: dict[str, np.ndarray] = program(np.column_stack([fit.draws().flat_z, fit.mounting()]))
+        bends, z = jnp.asarray(np.column_stack([gait.angles, arms])), fit.draws().flat_z
+        errors = chosen.draw_errors(len(z))
+        program = for_each_draw(forces_of_draw, model.space.size + 1 + errors.shape[1], bends, run_once=True)
+        forces_by_draw: dict[str, np.ndarray] = program(np.column_stack([z, fit.mounting(), errors]))
     return forces_by_draw

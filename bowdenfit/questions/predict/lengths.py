@@ -37,7 +37,7 @@ def predict_at_lengths(
         stated: Stated wrap angles [rad], by number of the contact; the others keep their own.
 
     Raises:
-        UsageError: A force is not a positive force, or there is no posterior.
+        UsageError: A force is not a positive force, or there is no posterior, or no wrap angle is known outside the curves.
     """
     route, sign, limits = fit.dataset.description.route, _STROKES[stroke], find_measured_range(fit)
     name, force, divisor, stated_force = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
@@ -49,7 +49,7 @@ def predict_at_lengths(
         divisor = force
     inverse = output_force is not None
     slack_word = "held by friction alone" if inverse else "slack"
-    angles = choose_angles(fit.model, lengths, stated)
+    angles = choose_angles(fit.dataset, lengths, stated, fit.provenance.seed)
     force_draws = _output_forces(fit, angles, force, sign, inverse)
     (mean, words), (mounted, _) = (clip_to_tension(forces, force, slack_word) for forces in force_draws)
     mean, mounted = mean / divisor, mounted / divisor
@@ -71,8 +71,8 @@ def predict_at_lengths(
         load = interval.median if inverse else stated_force
         notes = [words[i], angles.notes[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
-            notes.append(outside := route.outside(length))
-            row["in_range"] = not outside
+            notes.append(angles.outside[i])
+            row["in_range"] = not angles.outside[i]
         row["note"] = "; ".join(note for note in notes if note)
         rows.append(row)
     return rows
@@ -126,8 +126,8 @@ def _output_forces(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return forces at the other end [N] of every draw (rows) at route values (columns), and the same in a new mounting."""
     route, reference = fit.dataset.description.route, fit.model.cable.friction.conditions.reference_force
-    is_usual = not inverse and route is not None and not angles.is_own.any()
-    if route is not None and is_usual and (force, sign, tuple(angles.route)) == (reference, 1, tuple(route.choices)):
+    is_usual = not inverse and route is not None and not angles.rows.is_own.any()
+    if route is not None and is_usual and (force, sign, tuple(angles.rows.route)) == (reference, 1, tuple(route.choices)):
         return fit.along_route.mean, fit.along_route.mounted
     z = fit.draws().flat_z
     with jax.enable_x64(True):

@@ -13,6 +13,7 @@ from bowdenfit.files import FORMATS
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.describe import write_description
 from bowdenfit.questions.start.folder import (
+    DEVICE_FILE,
     describe_written_files,
     find_examples,
     find_measured_files,
@@ -126,7 +127,10 @@ def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | 
         return
     name, folder = named[0], folder or Path(named[-1])
     write_example(name, folder)
-    say(f"Wrote {folder}. Next: bowdenfit {find_verb(folder)} {shlex.quote(str(folder))}")
+    verb, place = find_verb(folder), shlex.quote(str(folder))
+    if (folder / DEVICE_FILE).is_file():  # which is read beside a fit
+        verb, place = f"{verb} RESULTS", shlex.quote(str(folder / DEVICE_FILE))
+    say(f"Wrote {folder}. Next: bowdenfit {verb} {place}")
 
 
 def _ask_folder(ask: Asker) -> Path:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import TypeVar
+from typing import Self, TypeVar
 from weakref import WeakKeyDictionary
 
 import jax
@@ -193,6 +193,10 @@ class Record(Display):
         """
         self._needs_route()
         return compute_along_route(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
+
+    def with_seed(self, seed: int | None) -> Self:
+        """Return the same fit with another seed of what is drawn beside its posterior; itself for None."""
+        return self if seed is None else replace(self, provenance=replace(self.provenance, seed=seed))
 
     def mounting(self) -> np.ndarray:
         """Return the effect of one new mounting on the friction exponent of each draw [1]."""

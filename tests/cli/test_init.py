@@ -196,10 +196,11 @@ def test_every_example_is_written_whole_and_accepted(run, tmp_path, monkeypatch)
     assert listing.split() == list(find_examples()) and "on-body-exoskeleton" in listing
     for name in find_examples():
         code, out, _ = run("init", "--example", name)
-        verb = {"synthetic-fleet": "fleet", "on-body-metabolic": "metabolic"}.get(name, "fit")
-        assert (code, out) == (0, f"Wrote {name}. Next: bowdenfit {verb} {name}\n")
+        verb = {"synthetic-fleet": "fleet", "on-body-metabolic": "metabolic", "haptic-teleoperation": "device"}.get(name, "fit")
+        following = "teleoperate RESULTS haptic-teleoperation/device.toml" if verb == "device" else f"{verb} {name}"
+        assert (code, out) == (0, f"Wrote {name}. Next: bowdenfit {following}\n")
         assert run("check", name)[0] == (0 if verb == "fit" else 2)
-    assert {"synthetic-fleet", "on-body-metabolic"} < set(find_examples())
+    assert {"synthetic-fleet", "on-body-metabolic", "haptic-teleoperation"} < set(find_examples())
     assert "the folder holds a fleet: `bowdenfit fleet synthetic-fleet`" in run("check", "synthetic-fleet")[2]
     assert "did you mean 'on-body-exoskeleton'" in run("init", "--example", "on-body-exoskelton")[2]
     assert "exists already" in run("init", "--example", "yarn-on-cylinder")[2]
@@ -245,7 +246,7 @@ def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_cal
     kept = ("mu1", " µ  edge ", "knie_mu", "friction")
     assert [question.read(name) for name in kept] == ["mu1", "µ edge", "knie_mu", "friction"]
     for name in find_examples():
-        if name in {"synthetic-fleet", "on-body-metabolic"}:
+        if name in {"synthetic-fleet", "on-body-metabolic", "haptic-teleoperation"}:
             continue
         space = build_model(bf.read(find_examples()[name])).space
         others = [parameter.name for parameter in space.parameters if parameter.role not in {"friction", "curve"}]

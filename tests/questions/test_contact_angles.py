@@ -1,11 +1,14 @@
 """Predictions with a stated wrap angle for each contact, and at lengths outside the angle curves."""
 
+from inspect import signature
+
 import numpy as np
 import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import curve_function, for_each_draw
+from bowdenfit.questions.predict.predictions import predictions_text
 
 EDGE, FREE = "bracket edge", "free sheath"
 
@@ -118,3 +121,37 @@ def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(
     mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
     right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
     assert stated["efficiency"] == pytest.approx(np.median(right), rel=1e-9)
+
+
+# Words and seeds --------------------------------------------------------------------------------------------------
+
+
+def test_a_dynamic_range_is_a_ratio_without_a_unit():
+    row = {"wrap_angle_deg": 90.0, "dynamic_range": 55.5, "mean": 55.4, "sd": 1.0, "q05": 54.1, "q95": 56.9, "note": ""}
+    assert predictions_text([row]) == "Dynamic range at 90 deg: 55.5 (90 % interval 54.1 to 56.9).\n"
+    several = predictions_text([row, row | {"wrap_angle_deg": 180.0, "dynamic_range": 30.2}])
+    assert "Dynamic range: highest 55.5 at 90 deg, lowest 30.2 at 180 deg." in " ".join(several.split())
+    assert several.split("\n\n")[1].splitlines()[0].split() == ["wrap", "angle", "(deg)", "dynamic", "range"]
+
+
+def test_a_column_of_a_gait_is_named_by_the_option_that_there_is(fit, quick_results, refuse, tmp_path):
+    path = tmp_path / "stride.csv"
+    path.write_text("time_s,theta_deg,knee\n0,45,45\n1,0,0\n")
+    at = {"contact": EDGE, "gait": path}
+    (right,) = bf.predict(fit, 470, contact=EDGE, wrap_angles=["45deg", "0deg"])
+    for column in ("theta_deg", "knee:deg"):
+        assert bf.predict(fit, 470, **at, gait_column=column)[0]["mean"] == right["mean"]
+    typed = ("predict", quick_results, "470", "--contact", EDGE, "--gait", path)
+    assert "write it behind the heading, as --gait-column 'knee:deg'" in refuse(*typed, "--gait-column", "knee")
+    assert "has no such column; did you mean 'theta_deg'?" in refuse(*typed, "--gait-column", "theta_dg")
+    words = refuse(*typed)
+    assert "--gait-column 'NAME:deg'" in words and "--column wrap_angle" not in words
+
+
+def test_another_seed_leaves_the_posterior_and_draws_other_mountings(fit):
+    other = fit.with_seed(fit.provenance.seed + 1)
+    assert isinstance(other, bf.Fit) and fit.with_seed(None) is fit
+    assert other.parameter("mu1") == fit.parameter("mu1")
+    assert not np.array_equal(other.mounting(), fit.mounting())
+    for verb in (bf.compensate, bf.teleoperate):
+        assert signature(verb).parameters["seed"].default is None

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Quantity, as_pair, number_with_unit, read_first
+from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Quantity, Seed, as_pair, number_with_unit, read_first
 from bowdenfit.errors import UsageError
 from bowdenfit.questions import compensate as _compensate
 from bowdenfit.questions.writing import answer_figures, answer_files, write_answer
@@ -29,6 +29,7 @@ def compensate(
     schedule: bool = False,
     simulate: bool = False,
     risk: Annotated[Quantity | None, Parameter(metavar="PERCENT", show_default="5%"), number_with_unit("5%")] = None,
+    seed: Annotated[Seed, Parameter(show_default="that of the fit")] = None,
     output: Output = None,
 ) -> "Compensation":
     """How much of a loop's friction a controller may compensate before the device moves by itself, and what a hand still feels.
@@ -41,6 +42,7 @@ def compensate(
         schedule: Simulate what is fed forward by bend, not one value for all bends.
         simulate: Simulate 400 devices through time: what is felt, and how many move by themselves.
         risk: Probability that is accepted.
+        seed: Seed of everything random.
         output: Folder for compensation.json, the text and the figures.
 
     Raises:
@@ -54,7 +56,7 @@ def compensate(
             "fed forward by bend is part of every answer."
         )
     path = None if device is None else Path(device)
-    answer = _compensate.answer_compensation(fit, path, wrap_angle, law, as_pair(risk), schedule, simulate)
+    answer = _compensate.answer_compensation(fit.with_seed(seed), path, wrap_angle, law, as_pair(risk), schedule, simulate)
     if output is not None:
         _write(answer, Path(output), fit.name)
     return answer

@@ -11,8 +11,9 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
-from bowdenfit.files.columns import Quantity, find_columns, require_column
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.columns import Quantity, find_columns
+from bowdenfit.files.headings import split_brackets
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.interval import Interval
 from bowdenfit.kinds.rows import read_angle
@@ -22,9 +23,10 @@ from bowdenfit.questions.predict.measured_range import clip_to_tension, find_mea
 from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles
 from bowdenfit.results.record import Record
 from bowdenfit.units import ColumnSource, conversion_factor
-from bowdenfit.words import counted
+from bowdenfit.words import counted, quoted
 
 _MOST_ANGLES = 512  # angles of a gait; of more, 512 quantiles stand for them
+_ANGLE_UNITS = ("deg", "rad", "mrad")  # as a heading ends: theta_deg
 _TORQUE = "torque_N_m"
 _STROKES = {"pull": 1.0, "return": -1.0}
 
@@ -141,15 +143,44 @@ def _convert_angles(angles: Sequence[tuple[float, str]]) -> np.ndarray:
 def _read_gait(path: Path, column: str | None) -> tuple[np.ndarray, np.ndarray | None]:
     """Read wrap angles of a table [rad], and moment arms where it has some [mm]."""
     table = read_table(path)
-    named = {} if column is None else {"wrap_angle": ColumnSource(name=column)}
+    named = {} if column is None else {"wrap_angle": _name_gait_column(table, column)}
     columns = find_columns(table, (Quantity("wrap_angle", "angle"), Quantity("moment_arm", "length")), named)
-    source = require_column(table, columns, "wrap_angle", "wrap_angle_deg")
+    if "wrap_angle" not in columns:
+        raise DatasetError(
+            f"{path.name} has no column wrap_angle; it has {quoted(table.header)}. Name the column wrap_angle_deg, or say "
+            "which it is, with its unit: --gait-column 'NAME:deg'."
+        )
+    source = columns["wrap_angle"]
     angles = np.array(source.read_cells(lambda cell: read_angle(cell, source), np.nan))
     arms = np.array(columns["moment_arm"].numbers()) if "moment_arm" in columns else None
     table.faults.refuse()
     if not len(angles):
         raise DatasetError(f"{path.name} has a heading and no rows; a gait needs a row for each wrap angle.")
     return angles, arms
+
+
+def _name_gait_column(table: RawTable, column: str) -> ColumnSource:
+    """Return the column that --gait-column names, with its unit: behind a colon, in brackets, or behind the last underscore.
+
+    Raises:
+        DatasetError: There is no such column, or its unit is not said.
+    """
+    heading, _, unit = (column, "", "") if column in table.header else column.rpartition(":")
+    if heading not in table.header:
+        raise DatasetError(
+            f"--gait-column {column!r}: {table.file} has no such column{suggest_name(heading or column, table.header)}"
+        )
+    if unit:
+        return ColumnSource(name=heading, unit=unit)
+    ending = heading.rpartition("_")[2]
+    if ending in _ANGLE_UNITS:
+        return ColumnSource(name=heading, unit=ending)
+    if not split_brackets(heading)[1] and not table.units[table.header.index(heading)]:
+        raise DatasetError(
+            f"--gait-column {column!r}: the column does not say its unit; write it behind the heading, as --gait-column "
+            f"{f'{heading}:deg'!r}."
+        )
+    return ColumnSource(name=heading)
 
 
 def predict_over_gait(

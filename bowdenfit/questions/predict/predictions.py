@@ -9,6 +9,7 @@ from bowdenfit.words import decimals, few, filled, narrow_table, percent, signif
 Row = Mapping[str, Any]
 _UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N_m": "N*m", "N": "N", "mm": "mm", "deg": "deg"}
 _MOUNTING, _PROBABILITY = "mounting", "_probability"
+_RATIOS = ("dynamic_range",)  # quantities without a unit
 
 
 def predictions_text(rows: Sequence[Row]) -> str:
@@ -55,6 +56,8 @@ def _name_and_unit(name: str) -> tuple[str, str]:
     """Return a column's name in words, and its unit; efficiencies are shown in percent."""
     if name.endswith("efficiency"):
         return name.replace("_", " "), "%"
+    if name in _RATIOS:
+        return name.replace("_", " "), ""
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
     if unit is not None:
         return name.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit]
@@ -85,7 +88,8 @@ def _single_prediction(row: Row) -> list[str]:
     for name in _quantities(row):
         (words, unit), (value, interval) = _name_and_unit(name), _format_value(row, name)
         lines.append(
-            f"{words[0].upper()}{words[1:]} at {_position_text(row)}: {value} {unit} (90 % interval {interval} {unit})."
+            f"{words[0].upper()}{words[1:]} at {_position_text(row)}: {f'{value} {unit}'.strip()} "
+            f"(90 % interval {f'{interval} {unit}'.strip()})."
         )
     if f"{_MOUNTING}_q05" in row:
         name = _quantities(row)[0]
@@ -100,14 +104,15 @@ def _highest_and_lowest(rows: Sequence[Row]) -> str:
     """Say where the first quantity is highest and lowest; among places outside the curves only where all are."""
     name, inside = _quantities(rows[0])[0], [row for row in rows if row.get("in_range", True)]
     words, unit = _name_and_unit(name)
+    unit = unit and f" {unit}"
     which = "" if len(inside) == len(rows) else ", inside the curves" if inside else ", all outside the curves"
     high, low = (choose(inside or rows, key=lambda row: row[name]) for choose in (max, min))
     sentence = f"{words[0].upper()}{words[1:]}{which}: "
     if high is low:
-        sentence += f"{_format_value(high, name)[0]} {unit} at {_position_text(high)}"
+        sentence += f"{_format_value(high, name)[0]}{unit} at {_position_text(high)}"
     else:
-        sentence += f"highest {_format_value(high, name)[0]} {unit} at {_position_text(high)}, "
-        sentence += f"lowest {_format_value(low, name)[0]} {unit} at {_position_text(low)}"
+        sentence += f"highest {_format_value(high, name)[0]}{unit} at {_position_text(high)}, "
+        sentence += f"lowest {_format_value(low, name)[0]}{unit} at {_position_text(low)}"
     return f"{sentence}. 90 % intervals are in brackets."
 
 
@@ -124,7 +129,7 @@ def _table_columns(rows: Sequence[Row]) -> Iterator[list[str]]:
     for name in _quantities(rows[0]):
         words, unit = _name_and_unit(name)
         known = [_format_value(row, name) for row in rows]
-        yield [f"{words} ({unit})", *(f"{value} ({interval})" for value, interval in known)]
+        yield [f"{words} ({unit})" if unit else words, *(f"{value} ({interval})" for value, interval in known)]
     if f"{_MOUNTING}_q05" in rows[0]:
         name = _quantities(rows[0])[0]
         yield ["in any one mounting", *(_format_value(row, name, f"{_MOUNTING}_")[1] for row in rows)]

@@ -14,10 +14,12 @@ from bowdenfit.results.folder import fill_folder_atomically, is_empty
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
+DEVICE_FILE = "device.toml"  # read beside a fit of a cable
 _VERB_BY_FILE = {  # the verb that reads a folder with such a description
     DESCRIPTION_FILE: "fit",
     FLEET_DESCRIPTION: "fleet",
     "metabolic.toml": "metabolic",
+    DEVICE_FILE: "teleoperate",
 }
 _PACKAGE, _CHECKOUT = "examples", "datasets"  # folders of the shipped data sets, in a wheel and beside the package
 

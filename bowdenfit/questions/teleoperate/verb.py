@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, read_first
+from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Seed, read_first
 from bowdenfit.questions import teleoperate as _teleoperate
 from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
@@ -25,6 +25,7 @@ def teleoperate(
     device: Annotated[str | Path, DEVICE, PATH],
     *,
     wrap_angle: Bends = None,
+    seed: Annotated[Seed, Parameter(show_default="that of the fit")] = None,
     output: Output = None,
 ) -> "Teleoperation":
     """What a hand feels through a loop of a slave and its wall, and which walls are touched without bouncing.
@@ -33,6 +34,7 @@ def teleoperate(
         fit: The fit.
         device: A device.toml that describes master, slave, hand, wall, and what is sent between them.
         wrap_angle: Range of wrap angles that the cable is bent to.
+        seed: Seed of everything random.
         output: Folder for teleoperation.json, the text and the figure.
 
     Raises:
@@ -40,7 +42,7 @@ def teleoperate(
         DescriptionError: Something that the answer needs is not said by the device, or has no sd.
         StoreError: `output` cannot be written.
     """
-    answer = _teleoperate.assess_teleoperation(fit, Path(device), wrap_angle, PROBABILITY)
+    answer = _teleoperate.assess_teleoperation(fit.with_seed(seed), Path(device), wrap_angle, PROBABILITY)
     if output is not None:
         text = _teleoperate.teleoperation_text(answer)
         write_answer(output, NAME, answer, text, {NAME: _teleoperate.teleoperation_figure}, fit.name)

@@ -1,14 +1,14 @@
 /*
 $about
  *
- * Forces are in newtons. Link with the mathematics library (-lm). Nothing here allocates memory, stops, or keeps a state.
+ * Forces are in newtons. Link with the mathematics library (-lm). No function allocates memory, aborts or keeps a state.
  *
- * Every function takes
- *   level   how much friction: BOWDEN_Q50 for the median, BOWDEN_Q05 and BOWDEN_Q95 for little and much,
+ * Arguments of every function:
+ *   level   amount of friction: BOWDEN_Q50 for the median, BOWDEN_Q05 and BOWDEN_Q95 for low and high friction,
  *           BOWDEN_MOUNTING_Q05 and BOWDEN_MOUNTING_Q95 for any one mounting of the cable, BOWDEN_DRAW + i for draw i
  *   place   $place_words
  *   speed   $speed_words
- *   flags   what is to be known is set in it, bit by bit (enum bowden_flag); 0 if nobody asks
+ *   flags   warnings are set in it, one bit each (enum bowden_flag); may be a null pointer (0)
  */
 #ifndef BOWDEN_H
 #define BOWDEN_H
@@ -29,9 +29,9 @@ $about
 enum bowden_level { BOWDEN_Q05, BOWDEN_Q50, BOWDEN_Q95, BOWDEN_MOUNTING_Q05, BOWDEN_MOUNTING_Q95, BOWDEN_DRAW };
 
 enum bowden_flag {
-    BOWDEN_CLAMPED = 1, /* the place is outside the range, and the nearest end was taken */
-    BOWDEN_SLACK = 2,   /* nothing is left of the force: a rope pulls or is slack, but never pushes */
-    BOWDEN_INVALID = 4  /* the level does not exist, or a number is none: the answer is NAN */
+    BOWDEN_CLAMPED = 1, /* the place is outside the range; the nearest end was used */
+    BOWDEN_SLACK = 2,   /* no force remains: a rope pulls or is slack, but never pushes */
+    BOWDEN_INVALID = 4  /* the level does not exist, or an input is NAN: the result is NAN */
 };
 
 static const double bowden_place[BOWDEN_PLACES] = {
@@ -50,7 +50,7 @@ static inline void bowden_raise(int *flags, int flag)
     }
 }
 
-/* Value of a table at a place: on straight lines, and at the nearest end outside the range. */
+/* Value of a table at a place: linear interpolation, and the value at the nearest end outside the range. */
 static inline double bowden_at(const double *table, double place, int *flags)
 {
     int low = 0, high = BOWDEN_PLACES - 1;
@@ -85,7 +85,7 @@ static inline double bowden_at(const double *table, double place, int *flags)
     return table[low] + (table[high] - table[low]) * ((place - bowden_place[low]) / (bowden_place[high] - bowden_place[low]));
 }
 
-/* Whether a question can be answered; says so in the flags where it cannot. */
+/* Whether the arguments are valid; sets BOWDEN_INVALID in the flags if they are not. */
 static inline int bowden_valid(int level, double speed, double force, int *flags)
 {
     if (level < 0 || level >= BOWDEN_LEVELS || isnan(force) || (BOWDEN_RATE_DEPENDENT && isnan(speed))) {
@@ -95,7 +95,7 @@ static inline int bowden_valid(int level, double speed, double force, int *flags
     return 1;
 }
 
-/* Factor of the speed on friction: 1 at the reference speed. */
+/* Factor by which speed changes friction: 1 at the reference speed. */
 static inline double bowden_rate(int level, double speed)
 {
 #if BOWDEN_RATE_DEPENDENT
@@ -117,7 +117,7 @@ static inline double bowden_lambda(int level, double place, double speed, int st
 
 $law
 /*
- * Force at the load side while the cable slides, from that at the motor side.
+ * Force at the load side while the cable slides, computed from the force at the motor side.
  * stroke: +1 pulling (a loop: moving forward), -1 returning (back).
  */
 static inline double bowden_output(int level, double place, double speed, double input_force, int stroke, int *flags)
@@ -128,7 +128,7 @@ static inline double bowden_output(int level, double place, double speed, double
     return bowden_slid(level, place, speed, input_force, stroke, 1.0, flags);
 }
 
-/* Force at the motor side that gives one at the load side while the cable slides: the inverse of bowden_output. */
+/* Force at the motor side that gives output_force at the load side while the cable slides: the inverse of bowden_output. */
 static inline double bowden_input(int level, double place, double speed, double output_force, int stroke, int *flags)
 {
     if (!bowden_valid(level, speed, output_force, flags)) {
@@ -138,9 +138,9 @@ static inline double bowden_input(int level, double place, double speed, double 
 }
 
 /*
- * Force at the load side through any motion, a call for each sample: it stands still until the input has crossed the
- * friction band. output_force: that of the sample before, from which the new one follows; returned and stored.
- * A state that is no number (NAN, before the first sample) starts in the middle of the band.
+ * Force at the load side during any motion; call it once per sample. The force stays constant until the input has crossed
+ * the friction band. output_force: the force at the previous sample on entry, the new one on return; also returned.
+ * If it is NAN (before the first sample), the force starts in the middle of the band.
  */
 static inline double bowden_step(int level, double place, double speed, double input_force, double *output_force, int *flags)
 {
@@ -148,7 +148,7 @@ static inline double bowden_step(int level, double place, double speed, double i
     const double high = bowden_output(level, place, speed, input_force, -1, flags);
 
     if (isnan(low) || isnan(high)) {
-        return NAN; /* the state is kept */
+        return NAN; /* the state is unchanged */
     }
     if (isnan(*output_force)) {
         *output_force = 0.5 * (low + high);
@@ -161,9 +161,9 @@ static inline double bowden_step(int level, double place, double speed, double i
 }
 
 /*
- * Force to add at the motor so that output_force arrives, by the friction that any one mounting of the cable exceeds with
- * 95 %: what may be compensated here without overcompensating, one place and one mounting taken by themselves. With the
- * unknown inertia, dead zone and damping of a device the share that is safe is smaller: bowdenfit compensate tells it.
+ * Force to add at the motor so that output_force arrives at the load, for the friction that any one mounting of the cable
+ * exceeds with a probability of 95 %: the most that can be compensated without overcompensation, considering one place and
+ * one mounting. With the unknown inertia, dead zone and damping of a device, less is safe: see bowdenfit compensate.
  */
 static inline double bowden_compensation(double place, double speed, double output_force, int stroke, int *flags)
 {

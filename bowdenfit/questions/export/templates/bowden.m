@@ -4,22 +4,24 @@ function [answer, flags] = $function(what, level, place, speed, force, stroke, s
 $about
 %
 %  output = $function('output', level, place, speed, input_force, stroke)
-%     Force at the load side while the cable slides, from that at the motor side.
+%     Force at the load side while the cable slides, computed from the force at the motor side.
 %  input = $function('input', level, place, speed, output_force, stroke)
-%     Force at the motor side that gives one at the load side: the inverse.
+%     Force at the motor side that gives output_force at the load side: the inverse of 'output'.
 %  output = $function('step', level, place, speed, input_force, 0, output_before)
-%     Force at the load side through any motion, a call for each sample; NaN before the first.
+%     Force at the load side during any motion; call it once per sample, with output_before = NaN for the first one.
 %  more = $function('compensation', 0, place, speed, output_force, stroke)
-%     Force to add at the motor so that output_force arrives, by the friction that any one mounting exceeds with 95 %.
+%     Force to add at the motor so that output_force arrives at the load, for the friction that any one mounting exceeds
+%     with a probability of 95 %.
 %  [names, places] = $function('levels')
-%     Names of the levels, and the places of the tables.
+%     Names of the levels, and the places at which friction is tabulated.
 %
 %  level: $level_words.
 %  place: $place_words
 %  speed: $speed_words
-%  stroke: +1 pulling (a loop: moving forward), -1 returning (back). Forces are in newtons; all may be arrays of one size.
-%  flags: 1 the place is outside the range, and the nearest end was taken; 2 nothing is left of the force; 4 not a number;
-%         sums of these.
+%  stroke: +1 pulling (a loop: moving forward), -1 returning (back). Forces are in newtons; arguments may be
+%          arrays of equal size.
+%  flags: 1 the place is outside the range, and the nearest end was used; 2 no force remains; 4 the result is not a number;
+%         or a sum of these.
     persistent T
     if isempty(T)
         T = tables();

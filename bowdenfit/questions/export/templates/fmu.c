@@ -1,8 +1,8 @@
 /*
 $about
  *
- * FMI 2.0 for co-simulation around bowden.h, which is compiled in. One step of the play operator a communication step, by the
- * inputs at its beginning.
+ * FMI 2.0 for co-simulation, as a wrapper of bowden.h, which is compiled in. Each communication step is one step of the play
+ * operator, with the inputs at the beginning of the step.
  */
 #include <stddef.h>
 #include <stdlib.h>
@@ -20,7 +20,7 @@ $about
 #define FMI2_EXPORT
 #endif
 
-/* The types of the standard, FMI 2.0.4, sections 2.1 and 4.2. */
+/* Types of the standard FMI 2.0.4, sections 2.1 and 4.2. */
 typedef void *fmi2Component;
 typedef void *fmi2ComponentEnvironment;
 typedef void *fmi2FMUstate;
@@ -156,7 +156,7 @@ static double real(const Instance *it, fmi2ValueReference which)
     double middle = NAN;
 
     switch (which) {
-    case OUTPUT_FORCE: /* before the first step: where it starts */
+    case OUTPUT_FORCE: /* before the first step: the initial force */
         return isnan(it->now.output) ? bowden_step(level, set[PLACE], set[SPEED], set[INPUT_FORCE], &middle, NULL)
                                      : it->now.output;
     case PULLING:
@@ -230,7 +230,7 @@ FMI2_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference 
     return fmi2OK;
 }
 
-/* There are no booleans and no strings. */
+/* The model has no Boolean and no string variables. */
 #define NOT_THERE(name, ...)                                                                      \
     FMI2_EXPORT fmi2Status name(fmi2Component c, const fmi2ValueReference which[], size_t n, __VA_ARGS__) \
     {                                                                                             \

@@ -5,7 +5,7 @@ static const double bowden_load[BOWDEN_LEVELS][2] = {
 $load
 };
 
-/* The scale on which friction is a shift, whatever the load. */
+/* Transform a force to the scale on which friction is the same shift at any load. */
 static inline double bowden_scale(int level, double force)
 {
     const double p = bowden_load[level][0], x = log((force + bowden_load[level][1]) / BOWDEN_REFERENCE_FORCE);
@@ -13,7 +13,7 @@ static inline double bowden_scale(int level, double force)
     return p < 1e-6 ? x * (1.0 + p * x / 2.0 * (1.0 + p * x / 3.0)) : expm1(p * x) / p;
 }
 
-/* The force at a value of that scale. */
+/* Inverse of bowden_scale. */
 static inline double bowden_force(int level, double scaled)
 {
     const double p = bowden_load[level][0];

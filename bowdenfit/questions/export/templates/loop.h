@@ -1,4 +1,4 @@
-/* A loop that slides: sign +1 from the input to the output force, -1 the other way. */
+/* Loop while it slides: sign +1 converts input to output force, -1 the reverse. */
 static inline double bowden_slid(int level, double place, double speed, double force, int stroke, double sign, int *flags)
 {
     const double s = stroke < 0 ? -1.0 : 1.0, along = s * force;

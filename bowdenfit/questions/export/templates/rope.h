@@ -1,4 +1,4 @@
-/* A single rope that slides: sign +1 from the input to the output force, -1 the other way. */
+/* Single rope while it slides: sign +1 converts input to output force, -1 the reverse. */
 static inline double bowden_slid(int level, double place, double speed, double force, int stroke, double sign, int *flags)
 {
     const double shift = sign * (stroke < 0 ? -1.0 : 1.0) * bowden_lambda(level, place, speed, stroke, flags);

@@ -4,9 +4,9 @@
     variable: what it says, in words
     ```
 
-What may be written and what counts if nothing is come from the class (with the option `:values:` what counts alone); the words
-stand in the page, or, of a dataclass or of keywords, in its docstring. A key without words, and words without a key, are
-warnings, so that the page cannot fall behind the program.
+Permitted values and defaults come from the class; with the option `:values:`, only defaults are shown. The descriptions are on
+the page, or, for a dataclass or for keywords, in its docstring. A key without a description, or a description without a
+key, causes a warning, so that the page cannot fall behind the program.
 """
 
 import dataclasses
@@ -40,21 +40,21 @@ _NAMED = {  # parts that are written between braces
 
 
 class Keys(SphinxDirective):
-    """A list of keys."""
+    """Directive that lists the keys of one class with their descriptions."""
 
     required_arguments = 1
     has_content = True
     option_spec = {"values": directives.flag}  # noqa: RUF012  (docutils has it so)
 
     def run(self) -> list[nodes.Node]:
-        """The list."""
+        """Return the list as nodes."""
         module, _, name = self.arguments[0].partition(":")
         model = getattr(import_module(module), name)
         words, known = _words(self.content), keys_of(model)
         if not issubclass(model, BaseModel):
             words = keywords_in(model)
         for key in words.keys() ^ known.keys():
-            what = "has no words" if key in known else f"is no key of {name}"
+            what = "has no description" if key in known else f"is not a key of {name}"
             _LOG.warning(f"the key {key!r} {what}", location=self.get_location())
         shown = "values" not in self.options
         lines = []
@@ -66,7 +66,7 @@ class Keys(SphinxDirective):
 
 
 def keys_of(model: Any) -> dict[str, tuple[Any, str]]:
-    """Type and default, in words, of each key."""
+    """Return the type of every key, and its default in words."""
     if is_typeddict(model):
         return {key: (kind, "") for key, kind in get_type_hints(model).items()}
     if issubclass(model, BaseModel):
@@ -80,13 +80,13 @@ def keys_of(model: Any) -> dict[str, tuple[Any, str]]:
 
 
 def keywords_in(documented: Any) -> dict[str, str]:
-    """What a docstring says of each of its arguments, and of two that it names together."""
+    """Return the description of every argument in a docstring, including arguments documented together."""
     said = parse(documented.__doc__ or "").params
     return {key.strip(): " ".join((each.description or "").split()) for each in said for key in each.arg_name.split(",")}
 
 
 def _words(content: StringList) -> dict[str, str]:
-    """What is said of each key; lines that are indented go on with the one before."""
+    """Return the description of every key; indented lines continue the line before."""
     words: dict[str, str] = {}
     key = ""
     for line in content:
@@ -99,7 +99,7 @@ def _words(content: StringList) -> dict[str, str]:
 
 
 def written(annotation: Any) -> str:
-    """What may be written for a key, in words."""
+    """Return the permitted values of a key in words."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return written(arguments[0])
@@ -124,7 +124,7 @@ def _plural(words: str) -> str:
 
 
 def default(value: Any) -> str:
-    """What counts if the key is left out, in words."""
+    """Return the default of a key in words."""
     if value is None or value is PydanticUndefined or value in ((), ""):
         return ""
     if isinstance(value, BaseModel):
@@ -142,6 +142,6 @@ def _toml(value: Any) -> str:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the directive."""
+    """Register the directive with Sphinx."""
     app.add_directive("keys", Keys)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

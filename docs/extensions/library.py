@@ -1,6 +1,6 @@
-"""The directives `verb-functions`, every function of the package, and `verb-answers`, what they answer.
+"""The directives `verb-functions`, every function of the package, and `verb-answers`, the classes that they return.
 
-Both come from the program, so that the page cannot fall behind it.
+Both are generated from the program, so that the page cannot fall behind it.
 """
 
 import ast
@@ -19,20 +19,20 @@ from bowdenfit.verbs import VERBS
 
 
 class VerbFunctions(SphinxDirective):
-    """All functions: those of verbs in the order of verbs, then the others."""
+    """Directive that documents all functions: first those of verbs in the order of verbs, then the others."""
 
     def run(self) -> list[nodes.Node]:
-        """A signature and a docstring each."""
+        """Return the signature and the docstring of every function."""
         return _documented(self, [f".. autofunction:: bowdenfit.{name}" for name in functions()])
 
 
 class VerbAnswers(SphinxDirective):
-    """What the functions answer, but for classes that the page shows by itself."""
+    """Directive that documents the classes that functions return, except those that the page shows itself."""
 
     option_spec = {"except": directives.unchanged}  # noqa: RUF012  (docutils has it so)
 
     def run(self) -> list[nodes.Node]:
-        """A docstring each."""
+        """Return the docstring of every class."""
         shown = self.options.get("except", "").split()
         found = {each.__name__: each for name in functions() for each in answers(getattr(bowdenfit, name))}
         classes = [each for name, each in sorted(found.items()) if name not in shown]
@@ -40,17 +40,17 @@ class VerbAnswers(SphinxDirective):
 
 
 def functions() -> list[str]:
-    """Names of all functions of the package."""
+    """Return the names of all functions of the package."""
     every = [name for name in bowdenfit.__all__ if inspect.isroutine(getattr(bowdenfit, name))]
     of_verbs = [name for verb in VERBS for name in every if getattr(bowdenfit, name) is verb.function]
     return [*of_verbs, *(name for name in every if name not in of_verbs)]
 
 
 def answers(function: Any) -> list[type]:
-    """Classes of ours that a function gives back."""
+    """Return the classes of this package that a function returns."""
     module = inspect.getmodule(function)
     known = dict(vars(module))
-    for node in ast.walk(ast.parse(inspect.getsource(module))):  # with what is imported for type checkers alone
+    for node in ast.walk(ast.parse(inspect.getsource(module))):  # includes imports made only for type checkers
         if isinstance(node, ast.ImportFrom) and node.module:
             known |= {each.asname or each.name: getattr(import_module(node.module), each.name, None) for each in node.names}
     hint = get_type_hints(function, known)["return"]
@@ -63,7 +63,7 @@ def _documented(directive: SphinxDirective, lines: list[str]) -> list[nodes.Node
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the directives."""
+    """Register the directives with Sphinx."""
     app.add_directive("verb-functions", VerbFunctions)
     app.add_directive("verb-answers", VerbAnswers)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

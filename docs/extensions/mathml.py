@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers show by themselves: no script, no font and no network is needed."""
+"""Formulas as MathML, which browsers render without scripts, fonts or network access."""
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
@@ -7,13 +7,13 @@ from sphinx.writers.html5 import HTML5Translator
 
 
 def inline(writer: HTML5Translator, node: nodes.math) -> None:
-    """A formula in a line of text."""
+    """Write a formula within a line of text."""
     writer.body.append(tex2mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def block(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """A formula on lines of its own, which can be scrolled where the page is narrow."""
+    """Write a displayed formula, which can be scrolled on a narrow page."""
     tex = node.astext()
     if r"\\" in tex and r"\begin" not in tex:
         tex = rf"\begin{{align}}{tex}\end{{align}}"
@@ -22,6 +22,6 @@ def block(writer: HTML5Translator, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the renderer "mathml"."""
+    """Register the renderer "mathml" with Sphinx."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,7 +1,7 @@
-"""Pages that stand elsewhere in the repository, and links among them: each page reads as well there as here.
+"""Pages whose text lies elsewhere in the repository, and the links among them, which work in both places.
 
-A page of `PAGES` is empty in docs/ and takes its text from the file that it names. Links from any page to such a file lead to
-the page, links to other files of the repository are taken from where they lie.
+A page of `PAGES` is empty in docs/ and takes its text from the file named there. Links from any page to such a file are
+redirected to the page; links to other files of the repository are resolved relative to the file that contains them.
 """
 
 import os
@@ -23,7 +23,7 @@ _LINK = re.compile(r"(\]\()([^)\s:#]+)((?:#[^)\s]*)?\))")
 
 
 def text_of(_: Sphinx, name: str, source: list[str]) -> None:
-    """The text of a page, with links that lead somewhere from here."""
+    """Replace the source of a page by its text, with links that are valid in the documentation."""
     here = ROOT / PAGES[name] if name in PAGES else DOCS / f"{name}.md"
     if name in PAGES:
         source[0] = here.read_text(encoding="utf-8")
@@ -38,6 +38,6 @@ def text_of(_: Sphinx, name: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Take part whenever a page is read."""
+    """Register the function that reads pages with Sphinx."""
     app.connect("source-read", text_of)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The directive `verb-help`: what every verb of the command line says with --help."""
+"""The directive `verb-help`: the output of --help for every command."""
 
 import io
 from contextlib import redirect_stdout
@@ -12,17 +12,17 @@ WIDTH = 80
 
 
 class VerbHelp(SphinxDirective):
-    """A section for the program and for each of its verbs."""
+    """Directive that writes a section for the program and for each of its commands."""
 
     def run(self) -> list[nodes.Node]:
-        """All sections."""
+        """Return all sections."""
         from bowdenfit.cli.commands import COMMANDS
 
         return [_section("bowdenfit"), *(_section("bowdenfit", verb.name[0]) for verb in COMMANDS)]
 
 
 def _section(*words: str) -> nodes.section:
-    """Heading, and the help as it is printed 80 columns wide."""
+    """Return a section with a heading and the help text, 80 columns wide."""
     from bowdenfit.cli import bowdenfit
 
     with redirect_stdout(io.StringIO()) as printed:
@@ -34,6 +34,6 @@ def _section(*words: str) -> nodes.section:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Offer the directive."""
+    """Register the directive with Sphinx."""
     app.add_directive("verb-help", VerbHelp)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

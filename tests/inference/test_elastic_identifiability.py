@@ -52,7 +52,7 @@ CASES = {
     ),
     "preloads alone": (
         ("preload",), {"preload": {"wrap_angles": tuple(np.linspace(60, 180, 8))}}, {},
-        ("mu", "stiffness", "bedding_stretch", "lengthening"), "without a table of stretch, preloads tell only",
+        ("mu", "stiffness", "bedding_stretch", "lengthening"), "without a table of stretch, preloads determine only",
     ),
     "free motion": (("loop",), FREE, {}, ("mu", "preload"), "determines only the product of friction and preload"),
     "a loop that is always slack": (

@@ -71,7 +71,7 @@ def test_a_display_of_whole_newtons_that_hides_the_scatter_is_not_trusted(tmp_pa
     (sentence,) = hidden.verdict().troubles[COARSE]
     assert sentence.startswith("Repeated readings in forces.csv agree to the last digit, 1 N,")
     assert (
-        "open by 3.6 % up or down" in sentence and "may be off: [prior.sigma_F] fixed = 0.29 in cable.toml." in sentence
+        "open by 3.6 % up or down" in sentence and "state its standard deviation: [prior.sigma_F] fixed = 0.29 in cable.toml." in sentence
     )
     assert "the readings are too coarse for such intervals" in " ".join(summary_text(hidden).split())
     assert "READINGS TOO COARSE" in details_text(hidden)
@@ -93,7 +93,7 @@ def test_scatter_that_is_stated_needs_no_digits(tmp_path):
     assert COARSE not in stated.verdict().troubles
     (tmp_path / "efficiencies.csv").write_text("wrap_angle_deg,efficiency\n" + "180,0.7\n" * 6)
     (sentence,) = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK).verdict().troubles[COARSE]
-    assert sentence.endswith("may be off: a column efficiency_sd with 0.029.")
+    assert sentence.endswith("state its standard deviation: a column efficiency_sd with 0.029.")
 
 
 @pytest.mark.slow

@@ -396,8 +396,8 @@ WRONG = [
     (lambda r: r["recordings"].update(faults={"gain": 0.1}), "did you mean 'gain_error'"),
     (lambda r: r["recordings"]["also"][0].update(sped="40 r/min"), "unknown key .*did you mean 'speed'"),
     (lambda r: r["recordings"].pop("speeds"), "'recordings.speeds' is missing"),
-    (lambda r: r["recordings"].update(speeds=["20 km/h"]), "'20 km/h' is no motor speed"),
-    (lambda r: r["recordings"].update(speeds=["0 r/min"]), "is no motor speed"),
+    (lambda r: r["recordings"].update(speeds=["20 km/h"]), "'20 km/h' is not a motor speed"),
+    (lambda r: r["recordings"].update(speeds=["0 r/min"]), "is not a motor speed"),
     (lambda r: r["recordings"]["bench"].update(rate=-5), "bench, rate: .*greater than 0.*found -5"),
     (lambda r: r["recordings"].update(faults={"bits": 12}), "needs input_range"),
     (lambda r: r["recordings"].pop("measured_angles"), "550 lies outside the range"),
@@ -435,5 +435,5 @@ def test_a_missing_or_broken_plan_is_refused_in_a_sentence(tmp_path):
 def test_an_unknown_name_in_the_truth_is_refused():
     raw = tomllib.loads(PLAN.read_text())
     raw["truth"]["mu9"] = 0.1
-    with jax.enable_x64(True), pytest.raises(UsageError, match="'mu9' is no parameter"):
+    with jax.enable_x64(True), pytest.raises(UsageError, match="'mu9' is not a parameter"):
         make_recordings(parse_recordings_plan(raw, ""), 1)

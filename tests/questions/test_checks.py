@@ -408,7 +408,7 @@ def forces(tmp_path_factory):
 def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prior, conflict):
     fit = bf.fit(forces, wrap_angle=(180.0, "deg"), seed=2, settings=(*QUICK, f"friction.mu.measured={{{prior}}}"))
     text = said(fit)
-    assert ("Prior and readings contradict each other about mu" in text) == conflict
+    assert ("Prior and readings disagree about mu" in text) == conflict
     assert ("Check the prior, its unit first." in text) == conflict
     (found,) = fit.checks.sensitivities
     assert (found.diagnosis == "conflict") == conflict

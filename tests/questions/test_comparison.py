@@ -253,8 +253,8 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
     alone = words([9.0, 0.2, -0.1, 0.2, 0.1, 0.3])
     assert "The data cannot distinguish good from poor" in alone
     assert "Prefer the simpler one." in alone
-    assert "even 0 rules no model out." in alone
-    assert "rules no model out" not in leaning
+    assert "even 0 excludes no model." in alone
+    assert "excludes no model" not in leaning
     assert "standard error unknown, with one reading" in words([3.0])
     rough = words([2.0, 2.1, 1.9, 2.0, 2.1, 2.0], ("rough", "refit", *("importance sampling",) * 4))
     assert "For 2 readings the fit without it did not converge" in rough

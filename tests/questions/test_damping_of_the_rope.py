@@ -79,8 +79,8 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
 @pytest.mark.parametrize(
     ("own", "other", "change", "says"),
     [
-        (False, Fitted(), {"new": STATED.replace("\n", '\nringdown = "../bar"\n')}, "names a ring-down, which tells it"),
-        (True, Fitted(), {"new": STATED}, "the fit itself has a ring-down, which tells it already"),
+        (False, Fitted(), {"new": STATED.replace("\n", '\nringdown = "../bar"\n')}, "names a ring-down, which determines it"),
+        (True, Fitted(), {"new": STATED}, "the fit itself has a ring-down, which determines it already"),
         (False, Fitted(rings=False), {}, "bar was fitted without a table ringdown; name the results of a fit that has one"),
         (False, Fitted(TOTAL / 30), {}, "joint.damping: 0.001 N.m.s/rad is more than the 0.000[45].* correct it"),
         (False, Fitted(), {"more": (", sd = 0.3e-3 }\n\n[rope]", " }\n\n[rope]")}, "joint.damping: 0.001 .* has no sd"),

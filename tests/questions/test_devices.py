@@ -63,7 +63,7 @@ def test_parameters_of_a_controller_hold_what_may_be_compensated(fit, tmp_path):
     assert (page["scheduled"]["share"], page["dead_zone_rad_per_s"]) == (said.scheduled.share, said.dead_zone)
     assert (page["gain"]["safe"], page["gain"]["stable_up_to"]["q05"]) == (said.gain.safe, said.gain.stable.q05)
     assert page["accepted_probability"] == 0.05 and page["friction_N_m"]["q95"][0] > page["friction_N_m"]["q50"][0]
-    with pytest.raises(UsageError, match="a C header tells of the cable alone"):
+    with pytest.raises(UsageError, match="a C header describes the cable alone"):
         bf.export(fit, "c", tmp_path / "cable.h", device=DEVICE)
     assert not (tmp_path / "cable.h").exists()
 
@@ -228,9 +228,9 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
     assert "--risk 90% is not between" in refused(UsageError, risk=(90.0, "%"))
     assert "under [rope] of device.toml" in refused(DescriptionError, device=None)
     without = device(tmp_path, "mounting_scatter", "# mounting_scatter")
-    assert "cannot tell how the next one will differ" in refused(DescriptionError, device=without)
+    assert "cannot say how the next one will differ" in refused(DescriptionError, device=without)
     both = device(tmp_path, "[rope] ", '[rope]\nstiffness = { value = 20, unit = "N*m/rad", sd = 2 }\n#')
-    assert "tells it already" in refused(DescriptionError, device=both)
+    assert "determines it already" in refused(DescriptionError, device=both)
     radius = device(tmp_path, "[joint]", '[joint]\npulley_radius = { value = 25, unit = "mm" }')
     assert "20 mm; leave it out" in refused(DescriptionError, device=radius)
     bare = tmp_path / "bare.toml"
@@ -272,7 +272,7 @@ NO_SD = 'damping = { value = 0.02, unit = "N*m*s/rad", sd = 0.004 }\nmounting'
 BAD = {
     "no loop": ("ROPE", RANGE, None, "pull-pull loop"),
     "beyond its bends": ("LOOP", "45deg:270deg", None, "leaves the wrap angles measured, 0 to 180 deg"),
-    "nothing tells tau": ("LOOP", RANGE, ("mounting_scatter", "# mounting_scatter"), "cannot tell how the next one"),
+    "nothing tells tau": ("LOOP", RANGE, ("mounting_scatter", "# mounting_scatter"), "cannot say how the next one"),
     "no sd": ("LOOP", RANGE, (NO_SD, NO_SD.replace(", sd = 0.004", "")), "has no sd, and the answer is a probability"),
     "no unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace(', unit = "N*m*s/rad"', "")), "the unit is missing"),
     "another unit": ("LOOP", RANGE, (NO_SD, NO_SD.replace("N*m*s/rad", "N*s/m")), "does not measure an angular damping"),

@@ -41,7 +41,7 @@ def fleet(tmp_path):
         ((ROWS[1], ROWS[0]), "cycles run backwards: fleet.csv, row 3 (cable-01: 0 after 25000 in row 2)"),
         ((ROWS[0].replace(",0,", ",-5,"),), "-5' cycles cannot be"),
         ((ROWS[0].replace("yes", "perhaps"),), "does not say whether the cable was lubricated"),
-        ((ROWS[0].replace("28.6", "900"),), "is no temperature"),
+        ((ROWS[0].replace("28.6", "900"),), "is not a temperature"),
         ((ROWS[0].replace("readings/", "gone/"),), "none of 1 inspections can be fitted"),
     ],
 )

@@ -124,7 +124,7 @@ def test_coefficients_that_cannot_be_told_apart_are_not_trusted(two_turns, tmp_p
     assert code == 3
     said = " ".join(out.split())
     assert "DO NOT USE THESE NUMBERS: the measurements do not determine every coefficient" in said
-    assert "do not tell mu_a and mu_b apart: what they determine is mu_a + 0.5 mu_b" in said
+    assert "do not separate mu_a and mu_b: what they determine is mu_a + 0.5 mu_b" in said
     page = json.loads((tmp_path / "fit" / "summary.json").read_text())
     assert page["verdict"]["converged"] is True
     assert page["verdict"]["trusted"] is False

@@ -81,7 +81,7 @@ def test_measurements_that_are_not_those_of_the_fleet_are_refused(run, fleet, tm
     ):
         load_readings(known, (0, 1), tmp_path / "other")
     code, _, error = run("pool", fits, "--measurements", tmp_path / "none")
-    assert code == 2 and "is no folder" in " ".join(error.split())
+    assert code == 2 and "is not a folder" in " ".join(error.split())
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ def limited(kind, mebibytes, *arguments, seconds=120):
 def test_a_fit_under_too_low_a_limit_is_refused_at_the_start(on_body, tmp_path, kind, limit):
     done = limited(kind, limit, "-m", "bowdenfit.cli", "fit", on_body, "-o", tmp_path / "fit", "--seed", 3)
     assert done.returncode == 1
-    assert done.stderr.startswith("Error: there are not the") and len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("Error: this takes") and len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "fit").exists()
 
 
@@ -37,7 +37,7 @@ def test_the_library_refuses_too_little_memory_too(tmp_path):
     fit = f"import bowdenfit as bf; bf.fit({recordings!r}, sampler='nuts', output={str(tmp_path / 'fit')!r})"
     done = limited("RLIMIT_DATA", 700, "-c", fit)
     assert done.returncode == 1
-    assert "MemoryShortageError: there are not the" in done.stderr.splitlines()[-1]
+    assert "MemoryShortageError: this takes" in done.stderr.splitlines()[-1]
     assert not (tmp_path / "fit").exists()
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Self, TypeVar
+from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import jax
@@ -194,7 +194,7 @@ class Record(Display):
         self._needs_route()
         return compute_along_route(self.model, along_route_program(self), self.draws().flat_z, self.mounting())
 
-    def with_seed(self, seed: int | None) -> Self:
+    def with_seed(self, seed: int | None) -> "Record":
         """Return the same fit with another seed of what is drawn beside its posterior; itself for None."""
         return self if seed is None else replace(self, provenance=replace(self.provenance, seed=seed))
 

@@ -17,6 +17,7 @@ import bowdenfit as bf
 from bowdenfit.display import Display, as_html, shorten_lines
 from bowdenfit.finished_fit import FigureMethods
 from bowdenfit.questions.calibrate.answer import Calibration, CheckedQuantity, Coverage
+from bowdenfit.questions.calibrate.words import calibration_text  # noqa: F401  registers the text of the answer
 from bowdenfit.questions.summary.verdict import CONTRADICTORY, NOT_CONVERGED, Verdict
 from bowdenfit.results.record import Record
 from bowdenfit.verbs import VERBS

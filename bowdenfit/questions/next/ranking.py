@@ -7,6 +7,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
+import bowdenfit.questions.next.words  # noqa: F401  registers the text of the answer
 from bowdenfit.display import Several
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.kinds.candidate import Candidate

@@ -32,8 +32,11 @@ class Interval(Display):
         return decimals(self.q95 - self.q05, self.median)
 
     def __str__(self) -> str:
-        digits = self.digits
-        return f"{self.median:z.{digits}f} (90 % interval {self.q05:z.{digits}f} to {self.q95:z.{digits}f})"
+        return f"{self.median:z.{self.digits}f} (90 % interval {self.range_text(self.digits)})"
+
+    def range_text(self, digits: int) -> str:
+        """Return its ends to so many decimals, such as '0.166 to 0.186'."""
+        return f"{self.q05:z.{digits}f} to {self.q95:z.{digits}f}"
 
     def _table(self) -> Rows:
         return [vars(self)], {}

@@ -13,6 +13,8 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.rows import ForceRows
 from bowdenfit.kinds.tables import AngleTable
 
+ROUNDING = 1e-9  # share of a route value by which another may differ and be the same, above rounding of units
+
 
 @dataclass(frozen=True)
 class RowAngles:
@@ -80,16 +82,28 @@ def _complete_outside_curves(
     """Complete own angles from the angle table for rows outside the range of the curves."""
     limits = description.route
     angle, sd = angle.copy(), sd.copy()
-    measured, detection_limit = angles.column(column)
     for i in np.flatnonzero(np.isnan(angle)):
         if limits is None or limits.range[0] <= route[i] <= limits.range[1]:
             continue
-        at = np.flatnonzero(angles.route == route[i])
-        readings = np.where(np.isnan(measured[at]), detection_limit[at] / 2, measured[at])
-        angle[i] = readings.mean()
-        if np.isnan(measured[at]).any():
-            sd[i] = np.nanmax(detection_limit[at]) / np.sqrt(12)
+        measured = find_measured_angle(angles, column, float(route[i]))
+        if measured is not None:
+            angle[i], sd[i] = measured[0], sd[i] if np.isnan(measured[1]) else measured[1]
     return angle, sd
+
+
+def find_measured_angle(angles: AngleTable, column: str, at: float) -> tuple[float, float] | None:
+    """Return the wrap angle that the angle table has at a route value, and its standard deviation [rad]; None without a row.
+
+    The standard deviation is NaN, for that of the angle table's noise, unless the angle was too small to detect there.
+    """
+    measured, detection_limit = angles.column(column)
+    here = np.isclose(angles.route, at, rtol=ROUNDING, atol=0.0)
+    if not here.any():
+        return None
+    undetected = np.isnan(measured[here])
+    readings = np.where(undetected, detection_limit[here] / 2, measured[here])
+    sd = float(np.nanmax(detection_limit[here])) / np.sqrt(12) if undetected.any() else np.nan
+    return float(readings.mean()), sd
 
 
 def resolve_angles(

@@ -32,9 +32,9 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import BATCH, run_in_batches
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.kinds import KINDS, iterate_tables
+from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.bench_error import BenchError
-from bowdenfit.kinds.tables import AngleTable
+from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.terms import TERMS
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record, cached_per_fit
@@ -44,7 +44,7 @@ _DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take l
 _STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
 TITLE = "Error budget: what errors of the bench that no reading shows would add"
-_KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
+KEY_ROLES = ("friction", "friction_model", "angle", "elastic")  # of coefficients that are answers, not means to them
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class ErrorBudget(Display):
         if not notable:
             return [f"Errors of the bench that no reading shows ({known}) would add less than half to each interval."]
         return [
-            f"Errors of the bench that no reading shows ({known}) would more than half widen "
+            f"Errors of the bench that no reading shows ({known}) would add more than half to the interval of "
             f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml."
         ]
 
@@ -132,56 +132,52 @@ def error_budget(fit: Record) -> ErrorBudget | None:
     Args:
         fit: The fit.
     """
-    uncertainties = dict(_standard_errors(fit))
+    uncertainties = list(_standard_errors(fit))
     quantities = _answers(fit) if fit.sampled is not None else {}
     if not quantities or not uncertainties:
         return None
     chosen = np.linspace(0, len(fit.draws().flat_z) - 1, _DRAWS).astype(int)
-    errors = [error for _, steps in uncertainties.values() for error, _ in steps]
-    scores = iter(_scores(fit, fit.draws().flat_z[chosen], errors))
-    slopes: dict[str, list[tuple[np.ndarray, float]]] = {
-        name: [(next(scores), size) for _, size in steps] for name, (_, steps) in uncertainties.items()
-    }
+    scores = _scores(fit, fit.draws().flat_z[chosen], [step for _, steps in uncertainties for step in steps])
     rows = []
     for name, (unit, draws) in quantities.items():
-        some = draws[chosen] - draws[chosen].mean()
+        deviation = draws[chosen] - draws[chosen].mean()
         shifts = {
-            source: max(abs(float(np.mean(some * score))) * size for score, size in parts)
-            for source, parts in slopes.items()
+            source.name: max(abs(float(np.mean(deviation * scores[step]))) * size for step, size in steps.items())
+            for source, steps in uncertainties
         }
         readings = Interval.of(draws)
         rows.append(BudgetRow(name, unit, readings, _widened(readings, list(shifts.values())), shifts))
-    return ErrorBudget(tuple(ErrorSource(name, words) for name, (words, _) in uncertainties.items()), tuple(rows))
+    return ErrorBudget(tuple(source for source, _ in uncertainties), tuple(rows))
 
 
-def _standard_errors(fit: Record) -> Iterator[tuple[str, tuple[str, list[tuple[BenchError, float]]]]]:
-    """Yield each source of error: its words, and each step that stands for it with its standard uncertainty in steps.
+def _standard_errors(fit: Record) -> Iterator[tuple[ErrorSource, dict[BenchError, float]]]:
+    """Yield each source of error with the small steps that stand for it, and its standard uncertainty in such steps.
 
     Between limits of +-a every value is as likely (GUM 4.3.7), which makes a standard uncertainty of a/sqrt(3); two load cells
     have errors of their own. Of an error in proportion and one in degrees, the one that matters more to an answer counts.
     """
     stated, sensors = fit.dataset.description.errors, fit.dataset.description.sensors
-    angle = stated.angle.to("angle")
-    steps = [
-        (BenchError(angle_scale=_STEP), stated.angle_scale / sqrt(3) / _STEP),
-        (BenchError(angle_offset=_STEP), angle / sqrt(3) / _STEP),
-    ]
-    if angle or stated.angle_scale:
-        words = f"wrap angles known to {stated.angle.value:g} {stated.angle.unit} or {100 * stated.angle_scale:g} %"
-        yield "wrap angles", (words, steps)
-    of_cells = sqrt(2 / 3) / _STEP
+    angles = {
+        f"{stated.angle.value:g} {stated.angle.unit}": (BenchError(angle_offset=_STEP), stated.angle.to("angle")),
+        f"{100 * stated.angle_scale:g} %": (BenchError(angle_scale=_STEP), stated.angle_scale),
+    }
+    limits = {words: (step, limit) for words, (step, limit) in angles.items() if limit}
+    if limits:
+        steps = {step: limit / sqrt(3) / _STEP for step, limit in limits.values()}
+        yield ErrorSource("wrap angles", f"wrap angles known to {' or '.join(limits)}"), steps
+    of_both_cells = sqrt(2 / 3) / _STEP
     if stated.gain and sensors.gain_sd is None:
-        gain = [(BenchError(gain=_STEP), stated.gain * of_cells)]
-        yield "gain", (f"a gain of each load cell known to {100 * stated.gain:g} %", gain)
+        words = f"a gain of each load cell known to {100 * stated.gain:g} %"
+        yield ErrorSource("gain", words), {BenchError(gain=_STEP): stated.gain * of_both_cells}
     if stated.hysteresis:
-        hysteresis = [(BenchError(hysteresis=_STEP), stated.hysteresis * of_cells)]
-        yield "hysteresis", (f"a hysteresis of each load cell of up to {100 * stated.hysteresis:g} %", hysteresis)
+        words = f"a hysteresis of each load cell of up to {100 * stated.hysteresis:g} %"
+        yield ErrorSource("hysteresis", words), {BenchError(hysteresis=_STEP): stated.hysteresis * of_both_cells}
 
 
 def _answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     """Return unit and draws of every coefficient, the best length and the efficiency there."""
     draws, free = fit.draws(), fit.model.space.free
-    quantities = {p.name: (p.unit, draws.values[p.name].ravel()) for p in free if p.role in _KEY_ROLES}
+    quantities = {p.name: (p.unit, draws.values[p.name].ravel()) for p in free if p.role in KEY_ROLES}
     route = fit.dataset.description.route
     for name, unit in ((OPTIMAL_LENGTH, route.unit if route else ""), (OPTIMAL_EFFICIENCY, "1")):
         if name in draws.optimum:
@@ -189,7 +185,7 @@ def _answers(fit: Record) -> dict[str, tuple[str, np.ndarray]]:
     return quantities
 
 
-def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> list[np.ndarray]:
+def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> dict[BenchError, np.ndarray]:
     """Return the change of the log likelihood of each draw by each small error of the data."""
     with jax.enable_x64(True):
         posterior = LogDensity(fit.model)
@@ -200,20 +196,20 @@ def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> list[np.nda
 
         rows = jax.ShapeDtypeStruct((BATCH, z.shape[1]), float)
         program = compile_program(jax.vmap(log_likelihood, in_axes=(0, None)), rows, data)
+        changes = {}
         before = run_in_batches(lambda part: program(part, data), BATCH, z)
-        changes = []
         for error in errors:
             changed = _data_with(fit, error)
             after = run_in_batches(lambda part, changed=changed: program(part, changed), BATCH, z)
-            changes.append(after - before)
-    return [np.where(np.isfinite(change), change, 0.0) for change in changes]
+            changes[error] = np.where(np.isfinite(after - before), after - before, 0.0)
+    return changes
 
 
 def _data_with(fit: Record, error: BenchError) -> tuple[dict[str, Any], ...]:
     """Return the data of all terms as a bench with a systematic error would have given them."""
     measurements, cable = fit.dataset.measurements, fit.model.cable
-    tables = {kind.name: KINDS[kind.name].with_bench_error(table, error) for kind, table in iterate_tables(measurements)}
-    angles = next((table for table in tables.values() if isinstance(table, AngleTable)), None)
+    tables = {kind.name: kind.with_bench_error(table, error) for kind, table in iterate_tables(measurements)}
+    angles = Measurements(tuple(tables.values())).table(AngleTable)
     terms = [term for name, table in tables.items() for term in TERMS[name].terms(cable, table, angles)]
     return tuple(_with_constant_angles(dict(term.data), cable, error) for term in terms)
 
@@ -251,13 +247,8 @@ def budget_rows(budget: ErrorBudget) -> list[tuple[str, ...]]:
         digits = row.readings.digits
         name = row.quantity if row.unit in ("", "1") else f"{row.quantity} ({row.unit})"
         shifts = [f"{row.shifts[source]:.1g}" if source in row.shifts else "-" for source in _SOURCES]
-        rows.append((name, interval_text(row.readings, digits), interval_text(row.bench, digits), *shifts))
+        rows.append((name, row.readings.range_text(digits), row.bench.range_text(digits), *shifts))
     return rows
-
-
-def interval_text(interval: Interval, digits: int) -> str:
-    """'0.166 to 0.186'."""
-    return f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
 
 
 def budget_text(fit: Record) -> str:
@@ -291,7 +282,7 @@ def widening_sentence(fit: Record) -> str:
     unit = "" if row.unit == "1" else f" {row.unit}"
     others = counted(len(notable) - 1, "other answer")
     also = f" ({others} also widen{'s' if len(notable) == 2 else ''})" if len(notable) > 1 else ""
-    interval = interval_text(row.bench, row.readings.digits)
+    interval = row.bench.range_text(row.readings.digits)
     return (
         f"With errors of the bench that no reading shows, {name} is {interval}{unit}{also}, mostly by {source}; state "
         "yours under [errors] in cable.toml."

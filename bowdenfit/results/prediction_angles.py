@@ -15,14 +15,13 @@ from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.kind import FrictionKind
-from bowdenfit.kinds.row_angles import RowAngles, collect_row_angles, resolve_angles
+from bowdenfit.kinds.row_angles import ROUNDING, RowAngles, collect_row_angles, find_measured_angle, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.words import listed
 
 NO_ANGLES: Mapping[int, float] = MappingProxyType({})
-_ROUNDING = 1e-9  # share of a route value by which another may differ and be the same, above rounding of units
 _STREAM = 11  # of random numbers, beside the fit's own
 
 
@@ -109,17 +108,14 @@ def _measured_angles(dataset: Dataset, column: str, at: float) -> Iterator[tuple
     """Yield wrap angles [rad] that were measured at a route value, and their sd (NaN for that of the angle table's noise)."""
     table = dataset.measurements.table(AngleTable)
     if table is not None and column in table.names:
-        measured, limit = table.column(column)
-        here = np.isclose(table.route, at, rtol=_ROUNDING, atol=0.0)
-        readings = np.where(np.isnan(measured[here]), limit[here] / 2, measured[here])
-        if len(readings) and np.all(np.isfinite(readings)):
-            undetected = limit[here][np.isnan(measured[here])]
-            yield float(readings.mean()), float(undetected.max() / np.sqrt(12)) if len(undetected) else np.nan
+        at_row = find_measured_angle(table, column, at)
+        if at_row is not None and np.isfinite(at_row[0]):
+            yield at_row
     for kind, rows in iterate_tables(dataset.measurements):
         if isinstance(kind, FrictionKind):
             conditions = kind.conditions(rows)
             angle, sd = conditions.own.column(column)
-            here = np.isclose(conditions.route, at, rtol=_ROUNDING, atol=0.0) & ~np.isnan(angle)
+            here = np.isclose(conditions.route, at, rtol=ROUNDING, atol=0.0) & ~np.isnan(angle)
             if here.any():
                 known = sd[here][~np.isnan(sd[here])]
                 yield float(angle[here].mean()), float(known.mean()) if len(known) else np.nan

@@ -41,16 +41,16 @@ TRUE_MU = 0.118  # 20 N become 13.8 N
     ],
 )
 def test_readings_of_the_same_that_are_alike_tell_their_last_digit(read, last_digit):
-    found = find_coarse_readings("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
-    assert (found and found.last_digit) == last_digit
+    coarse = find_coarse_readings("forces.csv", np.full((len(read), 1), 20.0), np.array(read), "N")
+    assert (coarse and coarse.last_digit) == last_digit
 
 
 def test_readings_at_different_settings_need_not_be_alike():
     """Three of the six were read before; the logarithm of 10 is open by more than that of 20."""
     settings, read = np.array([[20.0, np.nan]] * 3 + [[40.0, np.nan]] * 3), np.array([10.0] * 3 + [20.0] * 3)
-    found = find_coarse_readings("forces.csv", settings, read)
-    assert found.different == 2
-    assert found.log_sd == pytest.approx(np.sqrt((1 / 1 + 1 / 4) / 2 / 12))  # the last digit is that of tens
+    coarse = find_coarse_readings("forces.csv", settings, read)
+    assert coarse.different == 2
+    assert coarse.log_sd == pytest.approx(np.sqrt((1 / 1 + 1 / 4) / 2 / 12))  # the last digit is that of tens
     settings[1] = 30.0
     assert find_coarse_readings("forces.csv", settings[:4], read[:4]) is None
 

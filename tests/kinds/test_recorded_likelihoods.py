@@ -187,8 +187,8 @@ def test_a_reading_worth_three_is_three_readings():
         ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "n_effective")),
         {name: array[copied] for name, array in rows.angles.items()})  # fmt: skip
     at = _cable(sensors=GAIN)
-    found = _of_term(_runs_term(at, replace(rows, n_effective=worth)), "log_likelihood", values)
-    np.testing.assert_allclose(found, _of_term(_runs_term(at, several), "log_likelihood", values), rtol=0, atol=1e-8)
+    weighted = _of_term(_runs_term(at, replace(rows, n_effective=worth)), "log_likelihood", values)
+    np.testing.assert_allclose(weighted, _of_term(_runs_term(at, several), "log_likelihood", values), rtol=0, atol=1e-8)
 
 
 def test_up_to_a_constant_of_the_data_a_reading_s_worth_is_its_power_in_the_likelihood():

@@ -166,8 +166,8 @@ def test_held_readings_slip_as_often_as_their_likelihood_says():
     assert 0.05 < probability[1] < 0.95
     for count, p in zip(held, probability, strict=True):
         assert stats.binomtest(int(count), 2000, float(p)).pvalue > 1e-4
-    drawn = draw_readings(model.cable, dataset.measurements, named, jax.random.key(1))
-    forces = replace_readings(dataset, drawn).measurements.table(ForceTable)
+    readings = draw_readings(model.cable, dataset.measurements, named, jax.random.key(1))
+    forces = replace_readings(dataset, readings).measurements.table(ForceTable)
     np.testing.assert_array_equal(forces.input_force, dataset.measurements.table(ForceTable).input_force)
 
 

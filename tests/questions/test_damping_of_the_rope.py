@@ -58,20 +58,20 @@ def named(monkeypatch):
 
 def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_path, named):
     asked = named(Fitted())
-    found = read_device_with_ring_down(Fitted(rings=False), device(tmp_path))
+    device_read = read_device_with_ring_down(Fitted(rings=False), device(tmp_path))
     assert asked == [tmp_path / "../bar"], "as seen from device.toml"
     keys = "rope.damping", "joint.damping"
-    rope, joint = draw_device(found.needed("an answer", *keys), 40_000, 7).values()
+    rope, joint = draw_device(device_read.needed("an answer", *keys), 40_000, 7).values()
     assert rope.mean() == pytest.approx(0.014, rel=0.01)
     assert np.std(rope + joint) == pytest.approx(0.001, rel=0.03), "what is known is the sum"
     assert np.corrcoef(rope, joint)[0, 1] < -0.2
-    assert found.needed("an answer", "rope.damping")["rope.damping"].value == pytest.approx(0.014, rel=0.01)
+    assert device_read.needed("an answer", "rope.damping")["rope.damping"].value == pytest.approx(0.014, rel=0.01)
 
 
 def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(tmp_path):
     path = device(tmp_path, "mounting", ('inertia = { value = 1e-3, unit = "kg*m^2", sd = 0.1e-3 }\n', ""))
-    found = read_device_with_ring_down(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
-    draws = draw_device(found, 5000, 1)
+    needed = read_device_with_ring_down(Fitted(), path).needed("an answer", "rope.damping", "joint.inertia", "joint.damping")
+    draws = draw_device(needed, 5000, 1)
     np.testing.assert_allclose(draws["joint.inertia"], 1e-3 + 0.02 * (draws["rope.damping"] + draws["joint.damping"]))
     assert read_device_with_ring_down(Fitted(rings=False), DEVICE) == read_device(DEVICE)
 

@@ -75,9 +75,9 @@ def test_a_rope_whose_friction_falls_with_speed_says_so(tmp_path):
     path = tmp_path / "bench.csv"
     path.write_text("\n".join(lines) + "\n")
     fit = bf.fit(path, seed=1, settings=QUICK, friction="rate-dependent")
-    found = predict_stick_slip(fit)
-    assert found is not None
-    assert found.unit == "mm/s" and max(found.probabilities) > 0.9
+    prediction = predict_stick_slip(fit)
+    assert prediction is not None
+    assert prediction.unit == "mm/s" and max(prediction.probabilities) > 0.9
     values = {name: fit.posterior.values[name].ravel() for name in ("stribeck", "stribeck_speed", "viscous")}
     by_hand = (
         -2 * values["stribeck"] * 5 / values["stribeck_speed"] ** 2 * np.exp(-((5 / values["stribeck_speed"]) ** 2))

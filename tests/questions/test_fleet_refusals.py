@@ -191,8 +191,8 @@ def test_a_fleet_begun_with_other_versions_is_not_gone_on_with(run, fleet, tmp_p
     folder, results = fleet(ROWS[0]), tmp_path / "results"
     FleetStore(results, {"seed": 7, "versions": installed_versions() | {"jax": "0.0.1"}}).open(False, False)
     code, _, error = run("fleet", folder, "-o", results, "--resume")
-    said = f"a version of bowdenfit or of a library changed since (jax from '0.0.1' to {installed_versions()['jax']!r})"
-    assert code == 2 and said in " ".join(error.split())
+    refusal = f"a version of bowdenfit or of a library changed since (jax from '0.0.1' to {installed_versions()['jax']!r})"
+    assert code == 2 and refusal in " ".join(error.split())
     FleetStore(results, {"seed": 7, "versions": installed_versions()}).open(False, True)
     code, _, error = run("fleet", folder, "-o", results, "--resume", "--seed", 8)
     assert code == 2 and "because the seed changed since from 7 to 8; undo the change" in " ".join(error.split())

@@ -41,14 +41,14 @@ def drag(tmp_path_factory):
 
 @pytest.mark.slow
 def test_drag_is_said_as_the_hidden_tension_and_as_the_force_that_it_costs(drag):
-    found = compute_lost_force(drag[0])
-    assert abs(found.hidden_tension.median - HIDDEN) < 4 * found.hidden_tension.sd < 0.8
-    assert abs(found.lost.median - HIDDEN * 0.25) < 4 * found.lost.sd < 0.2
+    lost_force = compute_lost_force(drag[0])
+    assert abs(lost_force.hidden_tension.median - HIDDEN) < 4 * lost_force.hidden_tension.sd < 0.8
+    assert abs(lost_force.lost.median - HIDDEN * 0.25) < 4 * lost_force.lost.sd < 0.2
     said = " ".join((drag[1] / "details.txt").read_text().split())
     assert "of the force is lost at any load, as if 2." in said and "of tension did not show at the cells" in said
     page = json.loads((drag[1] / "summary.json").read_text())
-    assert page["drag"]["lost_force_N"]["median"] == pytest.approx(found.lost.median)
-    assert page["drag"]["hidden_tension_N"]["median"] == pytest.approx(found.hidden_tension.median)
+    assert page["drag"]["lost_force_N"]["median"] == pytest.approx(lost_force.lost.median)
+    assert page["drag"]["hidden_tension_N"]["median"] == pytest.approx(lost_force.hidden_tension.median)
     assert "hidden tension" in page["parameters"]["drag"]["meaning"]
 
 

@@ -67,8 +67,8 @@ def test_more_than_two_hundred_rows_do_not_make_a_recording(tmp_path):
 def test_an_index_is_no_clock(tmp_path):
     time, force, output = recorded()
     path = write(tmp_path, ("Index", "Fin (N)", "Fout (N)"), (range(len(time)), force, output))
-    found = guess_file_kind(path)
-    assert (found.kind, found.other) == ("forces", "recordings")
+    guess = guess_file_kind(path)
+    assert (guess.kind, guess.other) == ("forces", "recordings")
     with pytest.raises(bf.DatasetError, match=r"could be a table of readings or a recording.*--channel time=RATE"):
         bf.read(path, wrap_angle=(180, "deg"))
 
@@ -107,9 +107,9 @@ def test_few_rows_with_a_slow_clock_could_be_either_and_each_command_works(run, 
 
 def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
     path = write(tmp_path, ("time (s)", "run", "F_in (N)", "F_out (N)"), (20.0 * np.arange(60), range(60), *trials()))
-    found = guess_file_kind(path)
-    assert (found.kind, found.other) == ("forces", "")
-    assert "run" in found.why
+    guess = guess_file_kind(path)
+    assert (guess.kind, guess.other) == ("forces", "")
+    assert "run" in guess.why
 
 
 @pytest.mark.parametrize("beside", ["direction", "run", "Efficiency (%)"])
@@ -127,8 +127,8 @@ def test_samples_without_a_clock_are_not_readings_because_they_have_a_direction_
     assert guess_file_kind(path).other == "recordings"
     force, load = trials(300)
     order = np.argsort(load)
-    found = guess_file_kind(write(tmp_path, ("F_in (N)", "F_out (N)"), (force[order], load[order])))
-    assert (found.kind, found.other) == ("forces", "")
+    guess = guess_file_kind(write(tmp_path, ("F_in (N)", "F_out (N)"), (force[order], load[order])))
+    assert (guess.kind, guess.other) == ("forces", "")
 
 
 def test_a_stated_rate_makes_a_recording(tmp_path):

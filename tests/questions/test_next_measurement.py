@@ -602,14 +602,14 @@ def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
     fit = bf.fit(tmp_path / "table.csv", wrap_angle="180deg", seed=1)
     ranking = bf.next_measurement(fit)
     second = ranking.second_mounting
-    said = " ".join(next_measurement_text(ranking).split())
+    text = " ".join(next_measurement_text(ranking).split())
     if runs == 1:
         assert second is not None
         assert second.low < second.sd < second.high
         assert second.sd < ranking.answer.sd
-        assert said.startswith("Mount the cable anew and measure a force run next: all readings come from one mounting")
-        assert "uncertainty lower by" not in said
+        assert text.startswith("Mount the cable anew and measure a force run next: all readings come from one mounting")
+        assert "uncertainty lower by" not in text
         assert "Next: mount the cable anew" in " ".join(str(fit).split())
     else:
         assert second is None
-        assert "Mount the cable anew" not in said
+        assert "Mount the cable anew" not in text

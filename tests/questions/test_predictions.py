@@ -225,9 +225,9 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
     model = build_model(measured(cable(2, tables), seed=1)[0])
     posterior = LogDensity(model)
     z = np.repeat(0.3 * np.ones((1, model.space.size)), 4000, axis=0)
-    drawn = compile_replicator(posterior, seed=3)(z)
-    values = {name: v[0] for name, v in drawn["values"].items()}
-    assert not np.any(drawn["replicated"]["efficiency"][0] == drawn["replicated"]["efficiency"][1])
+    draws = compile_replicator(posterior, seed=3)(z)
+    values = {name: v[0] for name, v in draws["values"].items()}
+    assert not np.any(draws["replicated"]["efficiency"][0] == draws["replicated"]["efficiency"][1])
     runs = model.terms[2]
     run_sd = np.sqrt(values["tau"] ** 2 + values["sigma_F"] ** 2 / runs.data["run_weight"])
     p = []
@@ -236,7 +236,7 @@ def test_readings_drawn_anew_are_distributed_as_the_likelihood_says():
         ("efficiency", np.log, values["tau"]),
         ("run_efficiency", np.log, run_sd),
     ):
-        expected, replicated = drawn["expected"][name][0], drawn["replicated"][name]
+        expected, replicated = draws["expected"][name][0], draws["replicated"][name]
         standardized = (scale(replicated) - scale(expected)) / sd
         p += [stats.kstest(column, "norm").pvalue for column in standardized.T]
     assert min(p) * len(p) > 0.001
@@ -252,6 +252,6 @@ def test_readings_by_another_seed_need_no_other_program(on_body_model, monkeypat
 
     monkeypatch.setattr(draws, "compile_program", program)
     posterior, z = LogDensity(on_body_model), _draws(on_body_model, 2, 1)
-    drawn = [compile_replicator(posterior, seed)(z)["replicated"]["efficiency"] for seed in (3, 4)]
+    replicated = [compile_replicator(posterior, seed)(z)["replicated"]["efficiency"] for seed in (3, 4)]
     assert compiled[0].as_text() == compiled[1].as_text()
-    assert not np.any(drawn[0] == drawn[1])
+    assert not np.any(replicated[0] == replicated[1])

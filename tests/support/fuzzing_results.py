@@ -206,8 +206,8 @@ def begun_fleet(place: Path) -> Path:
 def resume_fleet(folder: Path) -> None:
     """What `fleet --resume` reads."""
     before = read_start(folder)
-    found = FleetStore(folder, {"seed": int(before["seed"]), "versions": installed_versions()}).open(resume=True, force=False)
-    assert all(isinstance(fit, PieceFit) and fit.values.ndim == 2 for fit in found.values())
+    store = FleetStore(folder, {"seed": int(before["seed"]), "versions": installed_versions()}).open(resume=True, force=False)
+    assert all(isinstance(fit, PieceFit) and fit.values.ndim == 2 for fit in store.values())
 
 
 def ask_fit(folder: Path) -> None:

@@ -255,8 +255,7 @@ def _format_share(share: Interval, digits: int = 1) -> str:
 
 
 def _format_bounds(interval: Interval) -> str:
-    digits = decimals(interval.sd)
-    return f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
+    return interval.range_text(decimals(interval.sd))
 
 
 def _format_life(life: Life) -> str:

@@ -242,7 +242,7 @@ def compute_lost_force(fit: Record) -> LostForce | None:
 def _format_interval(known: Interval) -> str:
     """Format a median with its 90 % interval [N]."""
     digits = decimals(known.sd)
-    return f"{known.median:z.{digits}f} N (90 % interval {known.q05:z.{digits}f} to {known.q95:z.{digits}f} N)"
+    return f"{known.median:z.{digits}f} N (90 % interval {known.range_text(digits)} N)"
 
 
 def collect_dependences(fit: Record) -> tuple[Dependence, ...] | None:

@@ -12,7 +12,7 @@ from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.bends.words import elastic_overview
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import value_with_unit
-from bowdenfit.questions.error_budget import error_budget, interval_text, widening_sentence
+from bowdenfit.questions.error_budget import KEY_ROLES, error_budget, widening_sentence
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
@@ -38,7 +38,6 @@ WITH_BENCH = "with bench errors"
 _LEAST_ROOM = 12  # characters of a line in which words can be wrapped; a judgement
 READING_HEADS = ("measured", "expected", "90 % interval")
 _MORE = "Everything else: bowdenfit summary --full"
-_KEY_ROLES = ("friction", "friction_model", "angle", "elastic")
 _FEW = 3  # coefficients and contrasts that the answer names
 _COEFFICIENT = "friction coefficient"
 
@@ -114,7 +113,7 @@ def _widened_intervals(fit: Record, names: Sequence[str]) -> list[str]:
     rows = [budget.row(name) if budget is not None else None for name in names]
     if not any(row is not None and row.is_notable for row in rows):
         return []
-    return [interval_text(row.bench, row.readings.digits) if row is not None else "" for row in rows]
+    return [row.bench.range_text(row.readings.digits) if row is not None else "" for row in rows]
 
 
 def _meaning_lines(meaning: str, room: int, spare: int) -> list[str]:
@@ -176,7 +175,7 @@ class KeyQuantity:
 
 def key_quantities(fit: Record) -> list[KeyQuantity]:
     """Return the coefficients of friction, of the rope, and the scatter of mountings; curves and noise are details."""
-    selected = [p for p in fit.model.space.parameters if p.role in _KEY_ROLES or (p.name == RUN_SCATTER and p.fixed is None)]
+    selected = [p for p in fit.model.space.parameters if p.role in KEY_ROLES or (p.name == RUN_SCATTER and p.fixed is None)]
     rows = [_key_quantity(fit, p) for p in sorted(selected, key=lambda p: p.name == RUN_SCATTER)]
     return [row for row in rows if row is not None]
 
@@ -211,7 +210,7 @@ def _describe(parameter: Parameter) -> str:
 def _format_posterior(interval: Interval) -> tuple[str, str]:
     """Format a median and its 90 % interval."""
     digits = interval.digits
-    return f"{interval.median:z.{digits}f}", f"{interval.q05:z.{digits}f} to {interval.q95:z.{digits}f}"
+    return f"{interval.median:z.{digits}f}", interval.range_text(digits)
 
 
 def _format_estimate(estimate: Estimate) -> tuple[str, str]:

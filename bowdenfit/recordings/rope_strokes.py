@@ -78,6 +78,11 @@ def fit_loop(force_in: Vector, force_out: Vector) -> Hysteresis:
     return Hysteresis(force_in, force_out, exponent, middle, drag, deviation, followed, state, cost / len(few_in))
 
 
+def _has_loop(loop: Hysteresis) -> bool:
+    """Return whether the rope slides both ways, so that there are two branches."""
+    return {PULL, RETURN} <= set(loop.state)
+
+
 def _plain_loop(ratio: Vector, state: Labels) -> tuple[float, float]:
     """Return half the width of the loop and its middle, as log ratios, from the medians of its two branches."""
     pull, back = ratio[state == PULL], ratio[state == RETURN]
@@ -193,7 +198,12 @@ class RopeStrokes:
         """Refuse a recording whose channels are swapped or read at another ratio, or that holds nothing but the return."""
         if by_hand:
             return
-        self._refuse_other_ratio(loop, file, name)
+        follows = loop.cost < _COST_OF_NOISE  # to within its noise, which swapped channels could not
+        another_ratio = self._is_about_another_ratio(loop)
+        swapped = None if follows and not another_ratio else fit_loop(loop.force_out, loop.force_in)
+        is_swapped = swapped is not None and swapped.cost < _CLEARLY * loop.cost and _has_loop(swapped)
+        if another_ratio and not is_swapped:
+            raise _explain_other_ratio(loop, file, name)
         refuse_dead(loop.force_in, loop.force_out, file, name, loop)
         swap = (
             "if they are swapped, map them the other way round, such as --channel input_force=OUTPUT_CHANNEL --channel "
@@ -211,36 +221,20 @@ class RopeStrokes:
                 f"alone; {swap}. If it really is a return without its pull, set its phase by hand in cable.toml, under its "
                 '[[recording]]: strokes = [{ start = ..., end = ..., stroke = "return" }].'
             )
-        if loop.cost < _COST_OF_NOISE:  # it follows to within its noise, which a swapped one could not
-            return
-        other = fit_loop(loop.force_out, loop.force_in)
-        if other.cost < _CLEARLY * loop.cost and {PULL, RETURN} <= set(other.state):
+        if is_swapped and not follows:
             raise DatasetError(
                 f"{file}: at the reversals of {name!r} the input force stands still while the output force moves, which is the "
                 f"wrong way round; {swap}."
             )
 
-    def _refuse_other_ratio(self, loop: Hysteresis, file: str, name: str) -> None:
-        """Refuse a hysteresis loop about another ratio of the forces than 1, which no friction makes.
+    def _is_about_another_ratio(self, loop: Hysteresis) -> bool:
+        """Return whether a hysteresis loop lies about another ratio of the forces than 1, which no friction makes.
 
         Friction takes force on the pull and adds force on the return, so that a ratio of 1 lies between the two branches:
         the middle of the loop is no farther from 1 than half its width, save for errors of the gains.
-
-        Raises:
-            DatasetError: Says the ratio, and how to state it.
         """
         error = max(_LARGEST_GAIN_ERROR, 4 * self.gain_sd)
-        if self.fits_offsets or not {PULL, RETURN} <= set(loop.state) or abs(loop.center) <= loop.exponent + error:
-            return
-        ratio, below = float(np.exp(-loop.center)), loop.center > 0
-        what = "below the input force on the return too" if below else "above the input force on the pull too"
-        raise DatasetError(
-            f"{file}: in {name!r} the output force follows a reversing input in a loop about {ratio:.2g} times the input "
-            f"force, and is {what}, which friction cannot do. The usual causes are a lever, a pulley or a drum between rope "
-            "and load cell, a unit that is not the one stated, and a load cell of another range. Correct the unit, or state "
-            f"the force on the rope over the reading of its cell: [sensors] output_ratio = {1 / ratio:.2g} in cable.toml, or "
-            f"--set sensors.output_ratio={1 / ratio:.2g} (input_ratio for the input's)."
-        )
+        return not self.fits_offsets and _has_loop(loop) and abs(loop.center) > loop.exponent + error
 
     def estimate(
         self, loop: Hysteresis, state: Labels, strokes: set[int], correlation: float, name: str
@@ -249,6 +243,19 @@ class RopeStrokes:
         del correlation
         ratio = np.log(loop.force_in / loop.force_out)
         return *_plain_loop(ratio, state), loop.lost, _remarks(name, strokes, loop)
+
+
+def _explain_other_ratio(loop: Hysteresis, file: str, name: str) -> DatasetError:
+    """Return the refusal of a loop about another ratio than 1: it says the ratio, and how to state it."""
+    ratio, below = float(np.exp(-loop.center)), loop.center > 0
+    what = "below the input force on the return too" if below else "above the input force on the pull too"
+    return DatasetError(
+        f"{file}: in {name!r} the output force follows a reversing input in a loop about {ratio:.2g} times the input "
+        f"force, and is {what}, which friction cannot do. The usual causes are a lever, a pulley or a drum between rope "
+        "and load cell, a unit that is not the one stated, and a load cell of another range. Correct the unit, or state "
+        f"the force on the rope over the reading of its cell: [sensors] output_ratio = {1 / ratio:.2g} in cable.toml, or "
+        f"--set sensors.output_ratio={1 / ratio:.2g} (input_ratio for the input's)."
+    )
 
 
 def _remarks(name: str, strokes: set[int], loop: Hysteresis) -> tuple[str, ...]:

@@ -201,10 +201,10 @@ def test_files_read_at_the_same_time_and_in_a_copy_of_the_process_get_their_own_
 def test_limits_grow_with_the_file_and_with_what_is_asked(tmp_path):
     (tmp_path / "a.mat").write_bytes(b"x" * 1000)
     (tmp_path / "b.mat").write_bytes(b"x" * 1_000_000)
-    small, large = Limits.of(tmp_path / "a.mat"), Limits.of(tmp_path / "b.mat")
+    small, large = Limits.for_file(tmp_path / "a.mat"), Limits.for_file(tmp_path / "b.mat")
     assert large.memory > small.memory and large.seconds > small.seconds
     with limits_times(4):
-        assert Limits.of(tmp_path / "a.mat").seconds == pytest.approx(4 * small.seconds)
+        assert Limits.for_file(tmp_path / "a.mat").seconds == pytest.approx(4 * small.seconds)
 
 
 def test_a_file_under_too_small_a_limit_names_the_option(tmp_path):

@@ -73,7 +73,7 @@ def test_draws_of_another_fit_are_refused(whole, loop_results, tmp_path):
 
 @pytest.mark.parametrize("length", [float("nan"), float("inf"), (float("nan"), "mm")])
 def test_what_is_no_length_is_refused(whole, length):
-    with pytest.raises(bf.UsageError, match="is no length"):
+    with pytest.raises(bf.UsageError, match="is not a length"):
         bf.predict(bf.load(whole), [length])
     assert len(bf.predict(bf.load(whole), [(455, "mm"), 460])) == 2
 

@@ -23,7 +23,19 @@ from rosbags.typesys import Stores, get_typestore
 N = 80
 TIME = np.arange(N) * 0.01
 LOAD = 40.0 + 20.0 * np.sin(TIME * 12)
-FORCES = {"time_s": TIME, "input_force_N": LOAD, "output_force_N": 0.8 * LOAD}
+
+
+def _follow_with_friction(force_in: np.ndarray, loss: float = 0.8) -> np.ndarray:
+    """Return the output force of a rope that loses a fifth of its force on the pull, and on the return the other way round."""
+    output = np.empty_like(force_in)
+    rope = loss * force_in[0]
+    for i, force in enumerate(force_in):
+        rope = float(np.clip(rope, loss * force, force / loss))
+        output[i] = rope
+    return output
+
+
+FORCES = {"time_s": TIME, "input_force_N": LOAD, "output_force_N": _follow_with_friction(LOAD)}
 
 
 def matlab(path: Path) -> None:

@@ -2,12 +2,15 @@
 
 import difflib
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
 from typing import TypeVar
 
+import numpy as np
+
 from bowdenfit.errors import DatasetError, Faults
-from bowdenfit.files.cells import Cell
+from bowdenfit.files.cells import Cell, is_plain_number
 from bowdenfit.files.headings import MatchedColumn, find_candidates, meanings, option_naming, plain_name, split_brackets
 from bowdenfit.files.headings import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.spellings import parse_heading
@@ -159,6 +162,22 @@ def _ambiguous_column_error(table: RawTable, quantity: str, columns: Sequence[Ma
         f'{option_naming(quantity, names[0])}, or in cable.toml columns = {{ {quantity} = {{ name = "{names[0]}" }} }}; or '
         "rename the others."
     )
+
+
+def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[str, np.ndarray]:
+    """Return the numbers of the columns that are not used, by heading; columns with anything else in them are left out.
+
+    Args:
+        table: The file.
+        columns: The columns that are used.
+    """
+    used = {column.heading for column in columns.values()}
+    unused = dict[str, np.ndarray]()
+    for heading, unit, cells in zip(table.header, table.units, zip(*table.rows, strict=True), strict=False):
+        if heading and heading not in used and all(is_plain_number(cell.text) for cell in cells):
+            with suppress(DatasetError):  # numbers that can be read in two ways
+                unused[f"{heading} ({unit})" if unit else heading] = np.array([cell.number() for cell in cells])
+    return unused
 
 
 def require_column(table: RawTable, columns: Mapping[str, Column], name: str, example: str) -> Column:

@@ -189,10 +189,11 @@ def _labelled_block(
     sign = np.sign(np.nansum((read - predicted) * residuals))
     reading = np.where(used, read, 0.0)
     numbers = {label: x[:n] for label, x in covariates.numbers.items() if label != RUN}  # which is their order
+    unused = {heading: x[:n] for heading, x in covariates.unused.items()}
     back = {STROKE: covariates.back[:n].astype(float)}
     return replace(
         bare, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=covariates.group[:n],
-        at=numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()), labels=tuple(term.labels[:n]),
+        at=unused | numbers | back | {ORDER: np.arange(float(n))}, count=float(used.sum()), labels=tuple(term.labels[:n]),
     )  # fmt: skip
 
 

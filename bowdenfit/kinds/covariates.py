@@ -1,7 +1,7 @@
 """Covariates of readings, which residuals are plotted and tested against: lengths, loads, wrap angles, strokes and runs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,14 @@ class Covariates(Part):
         group: Contact or the like that each reading belongs to; empty where all are of one kind.
         back: Whether a reading was taken on the way back, or while unloading.
         inside: Whether it lies inside the range in which the curves hold.
+        unused: Numbers of the columns that the fit does not use, by heading.
     """
 
     numbers: Mapping[str, np.ndarray]
     group: tuple[str, ...]
     back: np.ndarray
     inside: np.ndarray
+    unused: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def collect_covariates(description: Description, measurements: Measurements, term: Term) -> Covariates:
@@ -44,7 +46,7 @@ def collect_covariates(description: Description, measurements: Measurements, ter
         term: One table of its model.
     """
     n, route = len(term.labels), description.route
-    numbers, back = _covariates_of_kind(measurements, term)
+    numbers, unused, back = _covariates_of_kind(measurements, term)
     bends = _mean_wrap_angles(term)
     if bends is not None:
         numbers = {WRAP_ANGLE: bends, **numbers}
@@ -54,18 +56,21 @@ def collect_covariates(description: Description, measurements: Measurements, ter
         numbers = {route.label: at, **numbers}
         inside = (at >= route.range[0]) & (at <= route.range[1])
     varying = {label: values for label, values in numbers.items() if len(np.unique(values)) > 1}
-    return Covariates(varying or {RUN: np.arange(1.0, n + 1)}, _columns_of_angles(term), back, inside)
+    return Covariates(varying or {RUN: np.arange(1.0, n + 1)}, _columns_of_angles(term), back, inside, unused)
 
 
-def _covariates_of_kind(measurements: Measurements, term: Term) -> tuple[Mapping[str, np.ndarray], np.ndarray]:
-    """Return loads, wrap angles and the like that the kind knows, and which readings are of the return stroke."""
+def _covariates_of_kind(
+    measurements: Measurements, term: Term
+) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray], np.ndarray]:
+    """Return what the kind knows: loads, wrap angles and the like, unused columns, and which readings are of the return."""
     kind = find_kind(term.name)
     table = measurements.table(kind.table) if kind is not None else None
     if table is None:
-        return {}, np.zeros(len(term.labels), dtype=bool)
+        return {}, {}, np.zeros(len(term.labels), dtype=bool)
     terms = find_term_kind(term.name)
     back = terms.on_way_back(table)
-    return terms.covariates(table, term), np.zeros(len(term.labels), dtype=bool) if back is None else back
+    none_back = np.zeros(len(term.labels), dtype=bool)
+    return terms.covariates(table, term), terms.unused_columns(table, term), none_back if back is None else back
 
 
 def _mean_wrap_angles(term: Term) -> np.ndarray | None:

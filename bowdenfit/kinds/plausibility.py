@@ -37,6 +37,7 @@ FALSE_ALARM = 1e-6
 _LEAST_FREEDOM = 3  # degrees of freedom of the scatter that is compared with the last digit
 _FINE = 3.0  # least scatter in last digits: below it readings agree because they are rounded alike
 NO_NOISE = 1e-5  # least scatter over the readings of a bench; with less they were computed. A judgement
+_CALCULATED = 3e-3  # largest deviation, over the range of a column, that rounding leaves in what was calculated. A judgement
 _DEGREE = 3  # degree of the smooth curve that readings follow; a judgement
 _MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
 _LEAST_AGAIN = 3  # repeated readings, all alike, from which a display is called coarse; a judgement
@@ -46,6 +47,28 @@ _FEWEST_IN_BLOCK = 6  # rows in a row that repeat others, from which they may be
 _MOST_COMPARED = 4000  # rows that are compared with each other in a second
 _FEWEST_VALUES, _MOST_VALUES = 8, 24  # different values that show the steps of a converter, and those that are enough
 _STEPS_AT_ONCE = 20_000
+
+
+def drop_calculated_columns(unused: Mapping[str, Vector], *readings: Vector) -> dict[str, Vector]:
+    """Return the columns that were not calculated from the readings of the same rows, such as an efficiency or a loss.
+
+    Args:
+        unused: Numbers of columns that nothing reads, by heading.
+        readings: What was read in the rows, and what people calculate from it.
+    """
+
+    def is_calculated(numbers: Vector) -> bool:
+        half_a_digit = 0.51 * _last_digit(np.abs(numbers[numbers != 0]))
+        for reading in readings:
+            columns = np.column_stack([np.ones(len(numbers)), reading])
+            left = numbers - columns @ np.linalg.lstsq(columns, numbers, rcond=None)[0]
+            rounded = min(float(np.max(np.abs(numbers - scale * reading))) for scale in (1.0, 100.0))
+            if np.max(np.abs(left)) <= _CALCULATED * np.ptp(numbers) or rounded <= half_a_digit:
+                return True
+        return False
+
+    varying = {heading: numbers for heading, numbers in unused.items() if np.ptp(numbers) > 0}
+    return {heading: numbers for heading, numbers in varying.items() if not is_calculated(numbers)}
 
 
 def explain_impossible_loss(loss: np.ndarray, what: str) -> str:

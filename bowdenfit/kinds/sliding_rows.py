@@ -13,7 +13,7 @@ is estimated too, with sigma from the distances.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
@@ -49,6 +49,7 @@ class SlidingRows:
         angles: `ROW_ARRAYS` of every row.
         information: Information of one such reading on its log ratio at unit noise of the output cell [N^2]; computed from
             the forces if omitted.
+        unused: Numbers of columns that the fit does not use, by heading.
     """
 
     input_force: Vector
@@ -61,6 +62,7 @@ class SlidingRows:
     n_effective: Vector
     angles: Mapping[str, np.ndarray]
     information: Vector | None = None
+    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
     def weight(self, noise_ratio: float) -> Vector:
         """Information on the log ratio at unit noise of the output cell [N^2].
@@ -227,8 +229,10 @@ def list_readings_inside_runs(cell: Labels, run: Labels, rows: SlidingRows, nois
 
 
 def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
-    """Load, stroke, speed, order inside the run and wrap angle of every reading; with a clock, what a zero of the output that
-    drifts by a newton from the middle of the run to its end adds to the log ratio.
+    """Return load, stroke, speed, order inside the run, wrap angle and unused columns of every reading.
+
+    With a clock also what a zero of the output that drifts by a newton from the middle of the run to its end adds to the log
+    ratio.
     """
     first, last = np.full(int(run.max()) + 1, len(run)), np.zeros(int(run.max()) + 1, dtype=int)
     np.minimum.at(first, run, np.arange(len(run)))
@@ -237,7 +241,7 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     order = (np.arange(len(run)) - first[run]).astype(float)
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
     drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
-    return drifting | {
+    return dict(rows.unused) | drifting | {
         LOAD: rows.input_force,
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),

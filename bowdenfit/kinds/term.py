@@ -231,6 +231,10 @@ class TermKind(ABC, Generic[AnyTable]):
         """Return loads, wrap angles and the like of a term's readings, by axis label."""
         return {}
 
+    def unused_columns(self, table: AnyTable, term: Term) -> Mapping[str, np.ndarray]:
+        """Return what columns that the fit does not use say of a term's readings, by heading."""
+        return {}
+
     def on_way_back(self, table: AnyTable) -> np.ndarray | None:
         """Return which readings were taken on the way back, or while unloading; None where none was."""
         return None

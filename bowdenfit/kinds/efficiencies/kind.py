@@ -1,6 +1,7 @@
 """Transmission efficiencies, output force over input force while pulling: how they are read, checked and described."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from typing_extensions import override
@@ -8,7 +9,7 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
+from bowdenfit.files.columns import Column, Quantity, find_columns, read_unused_columns, require_column
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
@@ -50,6 +51,7 @@ class EfficiencyTable(Part):
         sd: Standard deviation where given [1], else 0.
         own: Wrap angles measured with the row.
         origin: Where each row was read.
+        unused: Numbers of columns that nothing reads, by heading.
     """
 
     route: Vector
@@ -57,6 +59,7 @@ class EfficiencyTable(Part):
     sd: Vector
     own: OwnAngles
     origin: RowOrigin
+    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
 
 class EfficiencyDesign(Design):
@@ -105,6 +108,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             np.array(sd),
             read_own_angles(table, columns, contacts),
             origin_of_rows(table),
+            read_unused_columns(table, columns),
         )
         return TableFromFiles(rows, {path.name: path}, _remark_fractions(column, rows), (table.account,))
 

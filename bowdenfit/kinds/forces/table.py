@@ -1,7 +1,7 @@
 """Pairs of forces read at both ends of a cable, in runs: one run is one mounting."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from bowdenfit.description import Description
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, find_columns
+from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, find_columns, read_unused_columns
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.forces.mountings import (
@@ -62,6 +62,7 @@ class ForceTable(Part):
         velocity: Velocity of the rope [mm/s] or of the motor [rad/s]; NaN where it is not known.
         velocity_unit: Which of the two; empty without velocities.
         group: Group of each row, such as "new rope"; empty without groups.
+        unused: Numbers of columns that nothing reads, by heading; NaN in files that lack one.
     """
 
     route: Vector
@@ -75,6 +76,7 @@ class ForceTable(Part):
     velocity: Vector
     velocity_unit: str = ""
     group: tuple[str, ...] = ()
+    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
 
 def read_forces(source: Source) -> TableFromFiles[ForceTable]:
@@ -121,6 +123,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         np.concatenate([t.velocity for t in tables]),
         _common_velocity_unit(tables),
         _concatenate_groups(tables),
+        _concatenate_unused(tables),
     )
     remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
     accounts = tuple(account for *_, account in parts)
@@ -132,6 +135,13 @@ def _concatenate_groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
     if not any(t.group for t in tables):
         return ()
     return tuple(name for t in tables for name in (t.group or (NO_GROUP,) * len(t.run)))
+
+
+def _concatenate_unused(tables: Sequence[ForceTable]) -> dict[str, Vector]:
+    headings = dict.fromkeys(heading for t in tables for heading in t.unused)
+    return {
+        heading: np.concatenate([t.unused.get(heading, np.full(len(t.run), np.nan)) for t in tables]) for heading in headings
+    }
 
 
 def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
@@ -171,7 +181,8 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
             "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
         )
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
-    return ForceTable(*parts), remarks, table.account
+    unused = read_unused_columns(table, columns)
+    return ForceTable(*parts, unused), remarks, table.account
 
 
 def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:

@@ -17,6 +17,7 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.next_run import ForceRunCandidates
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.plausibility import drop_calculated_columns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
@@ -154,6 +155,7 @@ def make_sliding_rows(
         np.ones(len(used)),
         {name: rows[name][used] for name in ROW_ARRAYS},
         weight,
+        _unused_columns(table, used),
     )
 
 
@@ -193,6 +195,14 @@ def _expect_forces(
             if not single[rows].any() or name == "log_ratio_error":
                 getattr(expected, name)[rows] = values
     return expected, weight
+
+
+def _unused_columns(table: ForceTable, used: np.ndarray) -> dict[str, Vector]:
+    """Return the columns of some rows that the fit does not use and that were not calculated from their forces."""
+    force_in, force_out = table.input_force[used], table.output_force[used]
+    efficiency, lost = force_out / force_in, force_in - force_out
+    calculated = (force_in, force_out, lost, efficiency, 1 - efficiency, 1 / efficiency, np.log(efficiency))
+    return drop_calculated_columns({heading: x[used] for heading, x in table.unused.items()}, *calculated)
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
@@ -292,3 +302,11 @@ class ForceTerms(TermKind[ForceTable]):
             of_run = [table.group[int(np.argmax((table.run == number) & (table.stroke != 0)))] for number in runs]
             covariates[GROUP] = np.array([1.0 + names.index(name) for name in of_run])
         return covariates
+
+    @override
+    def unused_columns(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
+        """Return the mean of each run."""
+        if not isinstance(term, RunsTerm) or term.rows is None:
+            return {}
+        run = np.unique(term.rows.run, return_inverse=True)[1]
+        return {heading: np.bincount(run, x) / np.bincount(run) for heading, x in term.rows.unused.items()}

@@ -25,7 +25,7 @@ from bowdenfit.model import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.results.record import Record, cached_per_fit
-from bowdenfit.words import few, listed, significant
+from bowdenfit.words import few, listed, shown, significant
 
 _MAX_NAMED = 3  # departures, or readings, that are named
 _INTERVAL = 0.9  # probability of the intervals that readings are counted in
@@ -168,6 +168,12 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "the sheath or between them (a [[contact]] of its own), angles that were read from another zero, and load cells "
             "that differ in gain (state input_gain_error_sd and output_gain_error_sd under [sensors]). A run with the cable "
             "as straight as it gets is the most informative."
+        )
+    if departure.against in fit.model.covariates[departure.table].unused:
+        return (
+            f"The fit does not use the column {shown(departure.against)}. If it is the wrap angle, the length or the mounting, "
+            "say so (--column in the help of fit, or columns in cable.toml); else friction depends on something that this "
+            "model lacks: fit the readings by parts, in each of which it is the same."
         )
     if departure.against == ORDER:
         return (

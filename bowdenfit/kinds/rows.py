@@ -14,23 +14,12 @@ from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require_column
-from bowdenfit.files.spellings import without_accents
 from bowdenfit.files.tables import RawTable
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import shown, significant
 
 LARGEST_ANGLE = float(np.deg2rad(2000.0)) * (1 + 1e-12)  # five and a half turns; more is a mistaken unit. A judgement
 _ALIKE = 0.75  # difflib's likeness from which an unknown heading is taken for a misspelled one; a judgement
-_STROKE_WORDS = {
-    1: "pull pulling pulled +1 1 +1.0 1.0 loading ziehen zug hub belasten belastung tirer traction charge tirar traccion carga "
-    "tirare trazione carico",
-    -1: "return returning release releasing -1 -1.0 unloading zuruck zurueck ruckhub rueckhub nachlassen entlasten entlastung "
-    "retour relacher decharge retorno vuelta soltar descarga ritorno rilascio scarico",
-    0: "hold held holding 0 0.0 halten gehalten maintien tenir mantener tenere",
-}
-_STROKES = {word: stroke for stroke, words in _STROKE_WORDS.items() for word in words.split()}
-
-
 ENDS = tuple(Quantity(f"{end}_{what}", what) for end in ("input", "output") for what in ("force", "torque"))
 FileRows = tuple[list[str], list[list[str]]]
 """Headings and rows."""
@@ -139,30 +128,6 @@ def read_angle(cell: Cell, column: Column) -> float:
             f"{cell.shown} is more than 2000 deg ({np.rad2deg(angle):.5g} deg); check the unit of the column."
         )
     return angle
-
-
-def read_strokes(
-    columns: Mapping[str, Column], n_rows: int, held: str = ", or hold (0, read while nothing slides)"
-) -> Labels:
-    """Return the strokes of a table; all pulling without a column.
-
-    Args:
-        columns: Columns of the table.
-        n_rows: Number of its rows.
-        held: What a refusal says of held readings; empty where the table may have none.
-    """
-    if "stroke" not in columns:
-        return np.ones(n_rows, dtype=int)
-    return np.array(columns["stroke"].read_cells(lambda cell: _stroke(cell, held), 1))
-
-
-def _stroke(cell: Cell, held: str) -> int:
-    text = without_accents(cell.text.strip().lower().replace("\u2212", "-").replace(",", "."))
-    if text not in _STROKES:
-        raise cell.refuse(
-            f"{cell.shown} is not a stroke; write pull (+1) or return (-1){held}; rename a column that holds something else."
-        )
-    return _STROKES[text]
 
 
 def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:

@@ -23,9 +23,9 @@ from bowdenfit.kinds.rows import (
     origin_of_rows,
     read_own_angles,
     read_route,
-    read_strokes,
     shared_columns,
 )
+from bowdenfit.kinds.strokes import read_strokes
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import few, listed

@@ -31,9 +31,9 @@ from bowdenfit.kinds.rows import (
     origin_of_rows,
     read_own_angles,
     read_route,
-    read_strokes,
     shared_columns,
 )
+from bowdenfit.kinds.strokes import read_strokes_by_loss
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Labels, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
@@ -170,7 +170,8 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     remarks += describe_paired_headings(table, columns, source.columns)
     if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
-    strokes, origin = read_strokes(columns, len(table.rows)), origin_of_rows(table)
+    strokes, stroke_remarks = read_strokes_by_loss(columns, np.log(input_force / output_force))
+    remarks, origin = remarks + stroke_remarks, origin_of_rows(table)
     velocity, unit = _read_velocities(columns.get("velocity"), len(table.rows))
     table.faults.refuse()
     run, run_names, run_remarks = _assign_runs(columns.get("run"), source, route_values, own, origin, group)

@@ -33,11 +33,11 @@ from bowdenfit.kinds.rows import (
     origin_of_rows,
     read_own_angles,
     read_route,
-    read_strokes,
     read_tension,
     shared_columns,
     stroke_signs,
 )
+from bowdenfit.kinds.strokes import read_strokes
 from bowdenfit.kinds.table_files import STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import LoopTable, Measurements, PreloadTable, StretchTable
 from bowdenfit.types import Vector

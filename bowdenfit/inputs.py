@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.lib.npyio import NpzFile
 
 _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
+_MOST_ENTRIES = 10_000  # judged: of one list or table; more take minutes to be refused one by one
 _MOST_DOTS = 300  # of a key, or a sentence
 _DEEPEST = 12  # keys below keys; a description has four
 _NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
@@ -125,7 +126,23 @@ def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
         raise DescriptionError(f"{path.name} is not valid TOML: {' '.join(str(error).split())[:200]}.") from None
     if _is_deeper(page, _DEEPEST):
         raise DescriptionError(f"{path.name} is nested too deeply; a description has at most {_DEEPEST} levels.")
+    if crowded := _find_crowded(page):
+        key, count = crowded
+        raise DescriptionError(
+            f"{path.name}{f', {shown(key)}' if key else ''}: one list or table has {count:,} entries, and at most "
+            f"{_MOST_ENTRIES:,} are read; the usual cause is a list that a program wrote out: keep the entries that matter."
+        )
     return text, page
+
+
+def _find_crowded(page: Any, key: str = "") -> tuple[str, int] | None:
+    """Return the key and the number of entries of the first list or table that has too many; None if none has."""
+    if not isinstance(page, dict | list):
+        return None
+    if len(page) > _MOST_ENTRIES:
+        return key, len(page)
+    parts = page.items() if isinstance(page, dict) else ((key, part) for part in page)
+    return next((crowded for name, part in parts if (crowded := _find_crowded(part, name))), None)
 
 
 def _is_deeper(page: dict[str, Any], levels: int) -> bool:

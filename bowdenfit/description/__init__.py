@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from bowdenfit.description.cable_parts import CableSettings, Contact, Route, WrapAngle
 from bowdenfit.description.defaults import BenchErrors, PriorDefaults, Sampler, SamplerSettings, Sensors
 from bowdenfit.description.measurements import (
+    MOST_FILES,
     ForceLimits,
     Phase,
     Preparation,
@@ -18,6 +19,7 @@ from bowdenfit.description.measurements import (
 )
 from bowdenfit.description.stated_parameters import PreloadSettings, StretchSettings
 from bowdenfit.description.values import (
+    Choice,
     Finite,
     FrictionSetting,
     Frozen,
@@ -32,6 +34,7 @@ from bowdenfit.description.values import (
     Positive,
     PriorChoice,
     QuantityValue,
+    Text,
     UniformPrior,
 )
 from bowdenfit.display import Display, Rows
@@ -40,6 +43,7 @@ from bowdenfit.words import counted, listed
 
 __all__ = [
     "BY_GROUP",
+    "MOST_FILES",
     "RESERVED_NAMES",
     "SCHEMA",
     "BenchErrors",
@@ -85,6 +89,8 @@ Noise = Literal["normal", "student"]
 RESERVED_NAMES = ("chain", "draw", "optimal_length", "optimal_efficiency")
 """Columns that a file of draws has beside the coefficients, so that no coefficient can be called that."""
 
+_MOST_CONTACTS = 100  # judged: on-body cables have three; equal ones can be joined, because their wrap angles add up
+_MOST_SETTINGS = 1000  # judged: more than one for each coefficient of each group
 AnySettings = TypeVar("AnySettings")
 
 
@@ -93,24 +99,24 @@ class Description(Display, Frozen):
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=SCHEMA)] = SCHEMA
     name: Name
-    source: str = ""
-    license: str = ""
+    source: Text = ""
+    license: Text = ""
     geometry: Geometry = "continuous"
-    friction_model: str = "capstan"
-    group: str | None = None
+    friction_model: Choice = "capstan"
+    group: Name | None = None
     noise: Noise = "normal"
     student_degrees_of_freedom: Annotated[int, Field(ge=2, le=100, multiple_of=2)] = 4
     reference_force: QuantityValue | None = None
     reference_velocity: QuantityValue | None = None
     cable: CableSettings = CableSettings()
     route: Route | None = None
-    contact: Annotated[tuple[Contact, ...], Field(min_length=1)]
-    friction: dict[str, FrictionSetting] = Field(default_factory=dict)
-    prior: dict[str, ParameterSetting] = Field(default_factory=dict)
+    contact: Annotated[tuple[Contact, ...], Field(min_length=1, max_length=_MOST_CONTACTS)]
+    friction: dict[str, FrictionSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
+    prior: dict[str, ParameterSetting] = Field(default_factory=dict, max_length=_MOST_SETTINGS)
     stretch: StretchSettings = StretchSettings()
     preload: PreloadSettings = PreloadSettings()
     tables: Tables
-    recording: tuple[RecordingFile, ...] = ()
+    recording: Annotated[tuple[RecordingFile, ...], Field(max_length=MOST_FILES)] = ()
     sensors: Sensors = Sensors()
     errors: BenchErrors = BenchErrors()
     sampler: SamplerSettings = SamplerSettings()

@@ -1,15 +1,16 @@
 """What a description says of the cable: its route, the contacts along it, its sizes and pulleys."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from bowdenfit.description.values import Finite, Frozen, Name, NonNegative, Positive, QuantityValue
+from bowdenfit.description.values import Choice, Finite, Frozen, Name, NonNegative, Positive, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.words import capitalized
 
+MOST_CHOICES = 1000  # judged: a metre of cable by millimetres; every draw has an efficiency and two forces at each
 LEAST_BEND_RATIO = 20.0  # rope diameters; haptic paper, equation 2
 
 
@@ -19,7 +20,7 @@ class Route(Frozen):
     variable: Name = "cable_length"
     unit: str = "mm"
     range: tuple[Finite, Finite]
-    choices: tuple[Finite, ...] = ()
+    choices: Annotated[tuple[Finite, ...], Field(max_length=MOST_CHOICES)] = ()
 
     @model_validator(mode="after")
     def _ordered(self) -> "Route":
@@ -54,7 +55,7 @@ class Route(Frozen):
 class WrapAngle(Frozen):
     """Where a contact's wrap angle comes from: a curve through the angle table, each row, or a constant."""
 
-    curve: str | None = None
+    curve: Choice | None = None
     column: Name | None = None
     published_range: tuple[Finite, Finite] | None = None
     nominal: QuantityValue | None = None
@@ -91,7 +92,7 @@ class Contact(Frozen):
 
     name: Name
     friction: Name
-    law: str = "capstan"
+    law: Choice = "capstan"
     by_group: bool = True
     wrap_angle: WrapAngle
 

@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from bowdenfit.description.values import Finite, Frozen, Name, QuantityValue
 from bowdenfit.units import ChannelSource, ColumnSource, conversion_factor
 
+MOST_FILES = 1000  # judged: of a table, or recordings of a cable; each takes some 20 ms or more to read
+
 
 class TableSettings(Frozen):
     """What all that stands under [tables] has in common."""

@@ -26,6 +26,10 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Name = Annotated[str, AfterValidator(_nameable)]
+Choice = Annotated[str, Field(max_length=200)]
+"""A word of ours, or several with signs between them, such as those of a model of friction."""
+Text = Annotated[str, Field(max_length=10_000)]
+"""Free text, which every report repeats; a page has some 3,000 characters."""
 
 
 class Frozen(BaseModel):

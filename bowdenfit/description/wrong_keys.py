@@ -13,6 +13,11 @@ from bowdenfit.words import shown
 
 _INIT = "`bowdenfit init` writes a template that has it"
 _MOST_UNKNOWN = 100  # unknown keys of a file for which a known one is looked for that is meant; no message names more
+_FEWER = {
+    "contact": "join contacts of the same coefficient, because their wrap angles add up",
+    "choices": "name the lengths that can be bought, or leave them out and take the best length of all",
+    "recording": "fit the recordings of each cable by themselves",
+}
 _ALIKE = 0.5  # judged: difflib's likeness from which an unknown key is taken for a misspelled one
 _LONGEST_KEY = 80  # letters that are said of one
 _LARGE = 1e15  # a number that nobody measures
@@ -84,6 +89,10 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
         return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
     if error["type"] == "model_type":
         return f"{place}: {_written_as(error, where)}"
+    if error["type"] == "too_long":
+        most = error["ctx"]["max_length"]
+        remedy = _FEWER.get(where[-1], "keep the entries that matter")
+        return f"{place}: there are {len(error['input']):,} entries, and at most {most:,} are read; {remedy}."
     message = error["msg"]
     if where == ["schema"] and isinstance(error["input"], int) and error["input"] > SCHEMA:
         message = f"schema {shown(error['input'])} is newer than this program, which reads up to {SCHEMA}; update bowdenfit"

@@ -7,8 +7,8 @@ from math import inf
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from bowdenfit.description import Description
-from bowdenfit.errors import DatasetError
+from bowdenfit.description import MOST_FILES, Description
+from bowdenfit.errors import DatasetError, DescriptionError
 from bowdenfit.files.headings import Quantity
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import match_files
@@ -41,6 +41,7 @@ class Source:
 
         Raises:
             DatasetError: A pattern matches none.
+            DescriptionError: They are too many.
         """
         stated = (getattr(self.settings, "file", None), self.settings.files)
         named = [name for part in stated if part for name in ([part] if isinstance(part, str) else part)]
@@ -53,6 +54,11 @@ class Source:
                     f"no file in {self.folder} matches {name!r}, which cable.toml names for the table {self.kind}."
                 )
             paths += matches
+            if len(paths) > MOST_FILES:
+                raise DescriptionError(
+                    f"cable.toml, tables.{self.kind}: it names {len(paths):,} files or more, and at most {MOST_FILES:,} are "
+                    "read; name those of one cable, or fit them in parts."
+                )
         return paths
 
     @property

@@ -70,14 +70,48 @@ def test_a_recording_that_is_a_pipe_is_refused(tmp_path, ending):
         ("x = 1\n" * 3, "is not valid TOML"),
         ("#" * 5_000_000, "larger than 4 MB"),
         ('x = "\x00"', "is not valid TOML"),
+        ("[route]\nchoices = [" + "1, " * 10_001 + "]", "'choices': one list or table has 10,001 entries"),
+        ("[friction]\n" + "".join(f"m{i}.fixed = 1\n" for i in range(10_001)), "'friction': one list or table"),
     ],
-    ids=["list", "dots", "tables", "digits", "twice", "large", "nul"],
+    ids=["list", "dots", "tables", "digits", "twice", "large", "nul", "long list", "long table"],
 )
 def test_toml_that_nobody_would_write_is_a_sentence(cable, text, says):
     (cable / "cable.toml").write_text(text)
     with pytest.raises(bf.DescriptionError, match=says) as refused:
         bf.check(cable)
     assert len(str(refused.value)) < 400
+
+
+CONTACT = '[[contact]]\nname = "c{0}"\nfriction = "mu{0}"\nwrap_angle = {{ value = 45, unit = "deg" }}\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("choices = [430,", "choices = [" + "430, " * 1000, "route.choices: there are 1,010 entries, and at most 1,000"),
+        ("[tables]", "".join(map(CONTACT.format, range(100))) + "[tables]", "contact: .* at most 100 are read; join"),
+        ("[tables]", '[[recording]]\nfile = "r.csv"\n' * 1001 + "[tables]", "recording: .* at most 1,000 are read; fit"),
+        ("[tables]", "".join(f"[friction.m{i}]\nfixed = 1\n" for i in range(1001)) + "[tables]", "friction: .* at most 1,000"),
+        ('file = "efficiencies.csv"', "files = [" + '"efficiencies.csv", ' * 1001 + "]", "names 1,001 files or more"),
+        ("[route]", 'friction_model = "' + "drag+" * 41 + '"\n[route]', "friction_model: string should have at most 200"),
+        ('source = "', 'source = "' + "a" * 10_001, "source: string should have at most 10000"),
+    ],
+    ids=["choices", "contacts", "recordings", "coefficients", "files", "words", "text"],
+)
+def test_every_count_in_a_description_has_a_limit(cable, old, new, says):
+    replace_in(cable / "cable.toml", old, new)
+    with pytest.raises(bf.DescriptionError, match=says):
+        bf.read(cable)
+
+
+def test_recordings_whose_links_lead_round_in_a_circle_are_a_sentence(tmp_path):
+    (tmp_path / "a.csv").symlink_to("b.csv")
+    (tmp_path / "b.csv").symlink_to("a.csv")
+    one = 'recordings = {}\n[[recording]]\nfile = '
+    for named in ('recordings = { files = "*.csv" }', f'{one}"a.csv"', f'{one}"a\\u0000"'):
+        (tmp_path / "cable.toml").write_text(f'name = "x"\n{CONTACT.format(1)}[tables]\n{named}\n')
+        with pytest.raises(bf.DatasetError, match="cannot be the name of a file"):
+            bf.read(tmp_path)
 
 
 def test_a_description_that_is_no_utf_8_is_a_sentence(cable):

@@ -15,6 +15,7 @@ from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.headings import Quantity
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.forces import to_recording
@@ -268,8 +269,11 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     """List every file with its entry; a file named in a [[recording]] is not read twice."""
     description = source.description
     entries = [(source.folder / entry.file, entry) for entry in description.recording]
+    for path, _ in entries:
+        refuse_special(path)  # before links are followed, which may lead round in a circle
     named = {path.resolve() for path, _ in entries}
     for path in source.files:
+        refuse_special(path)
         if path.resolve() not in named:
             entries.append((path, parse_file_name(description, source.settings.pattern, path, source.name_of(path))))
     runs = Counter(entry.run for _, entry in entries if not entry.name)

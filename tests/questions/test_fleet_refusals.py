@@ -160,7 +160,7 @@ def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
 def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
     """The work says with which versions it was made."""
     here = installed_versions()
-    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.versions", lambda: here | {"jax": "0.0.1"})
+    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.installed_versions", lambda: here | {"jax": "0.0.1"})
     with pytest.raises(bf.UsageError, match=r"a worker has other versions: jax .* \(here 0\.0\.1\)"):
         bf.fleet(fleet(ROWS[0]), seed=1)
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import damage_as, refuse_packed, refuse_special
+from bowdenfit.outputs import open_in_place
 
 _MARK = b"bowdenfit checkpoint 1\n"
 _RECORD_HEADER = struct.Struct("<QI")  # length and checksum of a record
@@ -58,7 +59,7 @@ def read_records(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[Reco
     refuse_special(path, StoreError)
     damaged = damaged_checkpoint_error(path)
     try:
-        with damage_as(damaged), path.open("r+b") as file:
+        with damage_as(damaged), open_in_place(path, "r+b") as file:
             _parse_fingerprint(file)
             complete, end = list[Record](), file.tell()
             for record in _complete_records(file):
@@ -96,7 +97,7 @@ def append_record(path: Path, record: Mapping[str, np.ndarray]) -> None:
     save(buffer, **record)
     content = buffer.getvalue()
     try:
-        with path.open("ab") as file:
+        with open_in_place(path, "ab") as file:
             file.write(_RECORD_HEADER.pack(len(content), crc32(content)) + content)
     except OSError as error:
         raise disk_error(path, error) from None

@@ -25,11 +25,13 @@ from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.inference.resources import available_cores, start_worker
 from bowdenfit.inputs import refuse_special
+from bowdenfit.outputs import refuse_link
 from bowdenfit.words import listed, shown
 
 Work = TypeVar("Work")
@@ -306,8 +308,10 @@ def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Exec
     except ImportError:
         raise _library_missing_error("submitit") from None
     refuse_special(folder)
-    try:
-        inner = submitit.AutoExecutor(folder.resolve(), cluster=cluster)
+    refuse_link(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    try:  # in a folder that is new: answers come back as pickles, and nobody else's may be taken for one
+        inner = submitit.AutoExecutor(mkdtemp(dir=folder.resolve()), cluster=cluster)
     except RuntimeError:
         raise _slurm_missing_error() from None
     inner.update_parameters(timeout_min=_JOB_MINUTES, name="bowdenfit")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from bowdenfit import plots
+from bowdenfit.outputs import replace_atomically
 from bowdenfit.plots.style import DOTS_PER_INCH, in_paper_style
 
 if TYPE_CHECKING:
@@ -32,12 +32,8 @@ def write(figure: Figure, path: Path) -> Path:
 
     Whoever reads the folder meanwhile sees the old file or the new one, never half of one.
     """
-    temporary = path.with_name(f".{path.name}.part")
-    try:
+    with replace_atomically(path) as temporary:
         save(figure, temporary, path.suffix.removeprefix("."))
-        os.replace(temporary, path)  # noqa: PTH105
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

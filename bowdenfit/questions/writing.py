@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import StoreError
+from bowdenfit.outputs import write_text
 from bowdenfit.plots.write import FORMATS
 from bowdenfit.results.answer_cache import copy_captions
-from bowdenfit.results.folder import fill_folder_atomically, is_empty, write_text
+from bowdenfit.results.folder import fill_folder_atomically, is_empty
 
 if TYPE_CHECKING:
     from bowdenfit.pages.section import HtmlPage

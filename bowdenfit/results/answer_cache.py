@@ -14,7 +14,8 @@ from zlib import crc32
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
-from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIGURES, FIT, POSTERIOR, read_page, read_text, write_text
+from bowdenfit.outputs import write_text
+from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIGURES, FIT, POSTERIOR, read_page, read_text
 from bowdenfit.words import filled, printable
 
 SCHEMA = 7  # counted up with every change of what one of the questions answers, and of how figures look
@@ -96,8 +97,8 @@ def copy_captions(source: Path, target: Path) -> None:
         source: The folder.
         target: Where others are being written.
     """
-    if (source / CAPTIONS).is_file():
-        write_text(target / CAPTIONS, read_text(source / CAPTIONS))
+    if texts := _read_captions(source):
+        write_text(target / CAPTIONS, texts)
 
 
 def write_captions(captions: Mapping[str, str], folder: Path, order: Iterable[str] = ()) -> Path:
@@ -109,12 +110,18 @@ def write_captions(captions: Mapping[str, str], folder: Path, order: Iterable[st
         order: Of figures; others follow.
     """
     path = folder / CAPTIONS
-    existing = read_text(path).split("\n\n") if path.exists() else []
+    existing = _read_captions(folder).split("\n\n")
     texts = {text.partition(":")[0]: text.strip() for text in existing if text.strip()}
     texts |= {name: printable(filled(" ".join(f"{name}: {text}".split()))) for name, text in captions.items()}
     names = [*(name for name in order if name in texts), *(name for name in texts if name not in set(order))]
     write_text(path, "\n\n".join(texts[name] for name in names) + "\n")
     return path
+
+
+def _read_captions(folder: Path) -> str:
+    """Return the captions that lie in a folder; empty where there are none, or a link to some other text."""
+    path = folder / CAPTIONS
+    return read_text(path) if path.is_file() and not path.is_symlink() else ""
 
 
 def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:

@@ -13,8 +13,9 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import damage_as, refuse_special
+from bowdenfit.outputs import replace_atomically
 from bowdenfit.results.answer_cache import file_checksum
-from bowdenfit.results.folder import read_page, replace_atomically
+from bowdenfit.results.folder import read_page
 from bowdenfit.results.netcdf import own_member
 from bowdenfit.types import Vector
 

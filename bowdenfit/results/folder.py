@@ -18,6 +18,7 @@ from filelock import FileLock, Timeout
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import refuse_special
+from bowdenfit.outputs import PARTIAL, refuse_link, refuse_links_inside, replace_atomically
 
 FIT, SUMMARY = "fit.json", "summary.json"
 SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything
@@ -26,26 +27,8 @@ POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
 _LOCK = ".lock"  # there while something is being written
-_PARTIAL = ".partial"  # ends the names of what is being written
 _LARGEST = 400e6  # bytes of a text; a judgement: far more than a fit writes
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
-
-
-@contextmanager
-def replace_atomically(path: Path) -> Iterator[Path]:
-    """Yield a temporary name beside `path` to write to; it becomes `path` only if nothing went wrong.
-
-    Raises:
-        StoreError: A device, a pipe or a folder would be replaced by a file.
-    """
-    if path.exists() and not path.is_file():
-        raise StoreError(f"{path} is not a file and stays as it is; name a new file, or one that may be replaced.")
-    temporary = path.with_name(f".{path.name}{_PARTIAL}")
-    try:
-        yield temporary
-        os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -57,13 +40,14 @@ def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
         last: File that says that the others are there: it is gone while they move, and comes last.
 
     Raises:
-        StoreError: It cannot be written.
+        StoreError: It cannot be written, or is a link, as one in the folder of a fit may be.
     """
+    refuse_link(folder)
     exists = folder.is_dir()  # perhaps a disk of its own, or one in a folder that may not be written
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         name = f".{folder.resolve().name[:40]}."
-        temporary = Path(tempfile.mkdtemp(prefix=name, suffix=_PARTIAL, dir=folder if exists else folder.parent))
+        temporary = Path(tempfile.mkdtemp(prefix=name, suffix=PARTIAL, dir=folder if exists else folder.parent))
     except OSError as error:
         raise disk_error(folder, error) from None
     try:
@@ -108,16 +92,28 @@ def remove_run_files(folder: Path, files: Iterable[str], folders: Iterable[str])
     """
     for name in files:
         (folder / name).unlink(missing_ok=True)
-    partial = [path for path in folder.iterdir() if _is_partial(path)] if folder.is_dir() else []
-    for path in (*(folder / name for name in folders), *partial):
+    for name in folders:
+        refuse_link(folder / name)
+        if (folder / name).is_dir():
+            shutil.rmtree(folder / name)
+    remove_partial(folder)
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what a run that was ended had not finished writing.
+
+    Args:
+        folder: The folder, which nobody writes into meanwhile; it may be missing.
+    """
+    for path in [path for path in folder.iterdir() if _is_partial(path)] if folder.is_dir() else ():
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
-        elif _is_partial(path):
+        else:
             path.unlink()
 
 
 def _is_partial(path: Path) -> bool:
-    return path.name.startswith(".") and path.name.endswith(_PARTIAL)
+    return path.name.startswith(".") and path.name.endswith(PARTIAL)
 
 
 def _umask() -> int:
@@ -160,12 +156,6 @@ def file_to_write(path: Path) -> Iterator[Path]:
             yield temporary
     except OSError as error:
         raise disk_error(path, error) from None
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole."""
-    with replace_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def read_text(path: Path) -> str:
@@ -256,11 +246,13 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
         folder: The folder, made if missing; None for none, and nothing is reserved where a file lies in its place.
 
     Raises:
-        StoreError: Another process does, or the folder cannot be made.
+        StoreError: Another process does, or the folder cannot be made, or links lie in it.
     """
     if folder is None or (folder.exists() and not folder.is_dir()):
         yield
         return
+    refuse_links_inside(folder)
+    refuse_link(folder / _LOCK)  # which is emptied
     new = not folder.exists()
     lock = FileLock(folder / _LOCK, timeout=0)
     with folder_to_write(folder):

@@ -12,7 +12,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
-from bowdenfit.results.folder import replace_atomically
+from bowdenfit.outputs import replace_atomically
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_packed, refuse_special
-from bowdenfit.results.folder import replace_atomically
+from bowdenfit.outputs import replace_atomically
 from bowdenfit.types import Flags, Labels, Matrix
 
 

@@ -18,8 +18,9 @@ from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import Measurements
+from bowdenfit.outputs import write_text
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
-from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page, write_text
+from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page
 from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 from bowdenfit.results.serialization import deserialize, serialize, write_arrays

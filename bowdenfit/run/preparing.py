@@ -12,13 +12,14 @@ from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import DescriptionError, StoreError, UsageError
 from bowdenfit.inference.checkpoint import checkpoint_header, damaged_checkpoint_error, read_fingerprint
 from bowdenfit.kinds.descriptions import parse_description
+from bowdenfit.outputs import replace_atomically
 from bowdenfit.results.folder import (
     CHAIN,
     folder_to_write,
     refuse_invalid_seed,
     refuse_to_overwrite,
     remove_earlier_fit,
-    replace_atomically,
+    remove_partial,
 )
 
 
@@ -94,7 +95,9 @@ def start_checkpointing(folder: Path | None, data: Dataset, seed: int, resume: b
     """Return the checkpoint to sample into, in a folder cleared of an earlier fit; nothing is touched before this."""
     if folder is None:
         return None
-    if not resume:
+    if resume:
+        remove_partial(folder)
+    else:
         remove_earlier_fit(folder)
         start_checkpoint(folder / CHAIN, _fingerprint(data, seed))
     return folder / CHAIN

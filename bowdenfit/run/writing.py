@@ -9,6 +9,7 @@ import jax
 
 from bowdenfit.errors import DiskError, system_error
 from bowdenfit.finished_fit import Fit, collect_answers
+from bowdenfit.outputs import write_text
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES as FIGURE_NAMES
 from bowdenfit.questions.figures import collect_figure_data, titles_and_captions, warning_mark, write_figure_files
@@ -18,7 +19,7 @@ from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.answer_cache import record_drawn_figures, write_captions
-from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit, write_text
+from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit
 from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable
 

@@ -40,7 +40,7 @@ class Job:
     def phase(self, folder: Path) -> int:
         """What it does, by what lies in its folder."""
         try:
-            others = {path.name for path in folder.iterdir()} - {self.kept, f".{self.kept}.partial", ".lock"}
+            others = {path.name for path in folder.iterdir() if not path.match(".*.partial")} - {self.kept, ".lock"}
             return WRITE if others else SAMPLE if self.samples(folder / self.kept) else COMPILE
         except FileNotFoundError:
             return START

@@ -10,7 +10,7 @@ from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint
-from bowdenfit.results.folder import replace_atomically
+from bowdenfit.outputs import replace_atomically
 
 QUICK = (
     "sampler.n_ensembles=2",

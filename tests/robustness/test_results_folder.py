@@ -11,10 +11,11 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_fingerprint, read_records
+from bowdenfit.outputs import write_text
 from bowdenfit.questions.calibrate.replications import open_replications
 from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
-from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserve_folder, write_text
+from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserve_folder
 
 pytestmark = pytest.mark.extended
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bowdenfit.inference.engines import JOBS_FOLDER, installed_versions, open_engine, refuse_other_versions
+from bowdenfit.outputs import write_text
 from bowdenfit.questions.calibrate.answer import Calibration, QuantityLabel
 from bowdenfit.questions.calibrate.plan import CalibrationPlan
 from bowdenfit.questions.calibrate.rank_tests import summarize_replications
@@ -20,15 +21,7 @@ from bowdenfit.questions.calibrate.replications import CALIBRATION, Replication,
 from bowdenfit.questions.calibrate.replicator import BATCH_SIZE, RANK_SETTINGS, BatchFitter, Replicator
 from bowdenfit.questions.calibrate.words import calibration_page, calibration_text, details_text, draw_calibration
 from bowdenfit.questions.writing import write_page
-from bowdenfit.results.folder import (
-    DETAILS_TEXT,
-    FIGURES,
-    REPORT,
-    SUMMARY_TEXT,
-    folder_to_write,
-    reserve_folder,
-    write_text,
-)
+from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, reserve_folder
 from bowdenfit.results.serialization import plain_data
 
 Report = Callable[[int, int], None]

@@ -11,6 +11,7 @@ import numpy as np
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import damage_as
+from bowdenfit.outputs import open_in_place, write_text
 from bowdenfit.results.folder import (
     DETAILS_TEXT,
     FIGURES,
@@ -21,8 +22,8 @@ from bowdenfit.results.folder import (
     holds_only_run_files,
     read_text,
     refuse_invalid_seed,
+    remove_partial,
     remove_run_files,
-    write_text,
 )
 from bowdenfit.results.serialization import deserialize, serialize
 
@@ -143,7 +144,7 @@ def read_seed(folder: Path) -> int:
 
 def append_replication(folder: Path, replication: Replication) -> None:
     """Add a finished replication to the file of a folder."""
-    with folder_to_write(folder), (folder / REPLICATIONS).open("a", encoding="utf-8") as file:
+    with folder_to_write(folder), open_in_place(folder / REPLICATIONS, "a", encoding="utf-8") as file:
         file.write(json.dumps(serialize(replication)) + "\n")
 
 
@@ -158,6 +159,7 @@ def _read_replications(path: Path, fingerprint: Mapping[str, Any]) -> dict[int, 
         )
     # A line that was being written when the program was stopped is made again.
     with folder_to_write(path.parent):
+        remove_partial(path.parent)
         write_text(path, "".join(json.dumps(line) + "\n" for line in (earlier, *pages)))
     with damage_as(_damaged_error(path)):
         replications = [deserialize(Replication, page) for page in pages]

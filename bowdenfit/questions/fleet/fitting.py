@@ -23,13 +23,14 @@ from bowdenfit.inference.engines import JOBS_FOLDER, Engine, installed_versions,
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.resources import keep_compiled_programs
 from bowdenfit.model import Model, build_model
+from bowdenfit.outputs import write_text
 from bowdenfit.questions.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
 from bowdenfit.questions.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
 from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
-from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically, write_text
+from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically
 from bowdenfit.results.serialization import plain_data
 from bowdenfit.words import counted, printable
 

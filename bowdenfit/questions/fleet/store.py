@@ -14,6 +14,7 @@ from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import damage_as
+from bowdenfit.outputs import write_text
 from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.results.folder import (
     SUMMARY_TEXT,
@@ -21,8 +22,8 @@ from bowdenfit.results.folder import (
     holds_only_run_files,
     read_page,
     refuse_invalid_seed,
+    remove_partial,
     remove_run_files,
-    write_text,
 )
 from bowdenfit.results.serialization import read_arrays, write_arrays
 from bowdenfit.words import few, shown
@@ -89,6 +90,8 @@ class FleetStore:
                 "over with --force."
             )
         with folder_to_write(self.folder):
+            for folder in (self.folder, self.folder / PIECES_FOLDER):
+                remove_partial(folder)
             self._write_start()
 
     def _read_finished(self) -> dict[str, PieceFit]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.outputs import write_text
 from bowdenfit.plots.layout import (
     LEFT,
     RIGHT,
@@ -35,7 +36,7 @@ from bowdenfit.plots.style import (
 from bowdenfit.plots.write import write_all
 from bowdenfit.questions.pool.words import HEADINGS, pool_page, pool_text
 from bowdenfit.questions.writing import write_page
-from bowdenfit.results.folder import fill_folder_atomically, write_text
+from bowdenfit.results.folder import fill_folder_atomically
 from bowdenfit.results.serialization import plain_data
 from bowdenfit.words import printable
 

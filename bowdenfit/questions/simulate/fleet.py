@@ -23,6 +23,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.terms import draw_readings, replace_table_readings
 from bowdenfit.model import build_model
+from bowdenfit.outputs import write_text
 from bowdenfit.questions.simulate.tables import (
     TRUTH_FILE,
     BenchPlan,
@@ -34,7 +35,7 @@ from bowdenfit.questions.simulate.tables import (
     table_texts,
 )
 from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
-from bowdenfit.results.folder import fill_folder_atomically, write_text
+from bowdenfit.results.folder import fill_folder_atomically
 
 READINGS = "readings"
 

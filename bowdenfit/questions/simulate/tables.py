@@ -28,7 +28,8 @@ from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Truth
 from bowdenfit.kinds.terms import Readings, draw_readings, replace_table_readings
 from bowdenfit.model import build_model
-from bowdenfit.results.folder import fill_folder_atomically, write_text
+from bowdenfit.outputs import write_text
+from bowdenfit.results.folder import fill_folder_atomically
 from bowdenfit.words import shown
 
 TRUTH_FILE = "truth.json"

@@ -7,6 +7,7 @@ from functools import singledispatch
 from html import escape
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from bowdenfit.csv_tables import csv_table
 from bowdenfit.words import few, filled, table
 
 if TYPE_CHECKING:
@@ -18,8 +19,6 @@ _LINES, _WIDTH = 10, 90  # of what a console shows
 _FEW = 3  # of what a tuple may hold to be shown as Python does
 _LONGEST = 60  # characters of a cell
 _SHOWN = 12  # rows of a table that is not laid out by its verb
-_WORD = re.compile(r"\w[\w./%°-]*")
-_FORMULA = re.compile(r"(?![+-]?[\d.]*\Z)[=+@\t\r-]")  # how one begins, and no number does
 
 
 class Display:
@@ -149,27 +148,7 @@ def _with_unit(name: str, units: Mapping[str, str]) -> str:
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return rows as CSV with a heading."""
-    lines = [",".join(_csv_cell(value) for value in row.values()) for row in rows]
-    return "\n".join([",".join(map(csv_heading, next(iter(rows), {}))), *lines]) + "\n"
-
-
-def csv_heading(name: str) -> str:
-    """Return a column heading, quoted if it is more than one word."""
-    return name if _WORD.fullmatch(name) else csv_quoted(name)
-
-
-def csv_quoted(text: str) -> str:
-    """Return a text in quotes, guarded so that no spreadsheet takes it for a formula."""
-    guard = "'" if _FORMULA.match(text) else ""
-    return '"{}{}"'.format(guard, text.replace('"', '""'))
-
-
-def _csv_cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, str):
-        return csv_quoted(value)
-    return "" if value is None else str(value).lower()
+    return csv_table(next(iter(rows), {}), (row.values() for row in rows), quote_all_texts=True)
 
 
 @singledispatch

@@ -137,6 +137,7 @@ def test_hostile_names_are_harmless_in_csv():
     columns = read_back(text)
     assert list(columns) == ["draw", "wrap_angle_rad", "friction_exponent_pull", "friction_exponent_return"]
     assert text.isascii()
+    assert "a,'=1+1" in draws_table(cable("rope", name="a,=1+1"))  # which a spreadsheet would compute
 
 
 def test_plain_text_holds_nothing_that_steers():

@@ -11,6 +11,7 @@ from matplotlib.mathtext import MathTextParser
 
 import bowdenfit as bf
 from bowdenfit.cli import bowdenfit
+from bowdenfit.csv_tables import csv_comment, csv_table
 from bowdenfit.display import csv_text
 from bowdenfit.errors import DiskError
 from bowdenfit.parameters.symbols import make_symbol
@@ -176,3 +177,19 @@ def test_csv_has_names_as_text_that_no_spreadsheet_computes(name):
 
 def test_numbers_and_plain_words_stay_as_they_are_in_csv():
     assert csv_text([{"low_W/kg": -0.5, "n": "-12.5"}]) == 'low_W/kg,n\n-0.5,"-12.5"\n'
+    cells = ["run 1", "-1e-05", "+.5", "", "475/1", None, True, 3]
+    assert csv_table(["a"], [cells]) == "a\nrun 1,-1e-05,+.5,,475/1,,true,3\n"
+
+
+FORMULAS = ["=1+1", " =1+1", "\t=1+1", "@SUM(1)", "-2+3", "+x", "-5+cmd|' /C calc'!A0", "\uff1d1+1", '=HYPERLINK("http://x")']
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_no_cell_of_a_table_or_of_the_comment_above_it_is_a_formula(name):
+    ((head,), cells) = csv.reader(csv_table([name], [[name, ["a", name]]]).splitlines())
+    assert head == cells[0] == f"'{name}" and len(cells) == 2
+    for before, after in (("", ""), ("cable a,", ",b"), ("cable a;", ";b"), ('cable a,"', '"')):
+        (line,) = csv_comment([f"{before}{name}{after}"]).splitlines()
+        assert line.startswith("# ")
+        for cell in (cell for separator in ",;\t" for cell in next(csv.reader([line], delimiter=separator))):
+            assert not cell.strip().startswith(tuple("=+@-\uff1d")), line

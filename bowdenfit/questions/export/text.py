@@ -15,8 +15,12 @@ def format_comment(sentences: Iterable[str], before: str) -> str:
         sentences: A line or more each.
         before: What begins a line, such as " * ".
     """
-    lines = [line for text in sentences for line in textwrap.wrap(ascii_text(text), _WIDTH) or [""]]
-    return "\n".join(before + line for line in lines)
+    return "\n".join(before + line for line in wrap_comment(sentences))
+
+
+def wrap_comment(sentences: Iterable[str]) -> list[str]:
+    """Return sentences as lines of ASCII for a comment, a line or more each."""
+    return [line for text in sentences for line in textwrap.wrap(ascii_text(text), _WIDTH) or [""]]
 
 
 def ascii_text(text: str) -> str:

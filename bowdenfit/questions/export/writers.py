@@ -1,12 +1,13 @@
 """Export of a fit: check what a format can express, and write it; CSV tables are built here."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from bowdenfit.display import Display, Rows, csv_heading
+from bowdenfit.csv_tables import csv_comment, csv_table
+from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DatasetError, StoreError, UsageError
 from bowdenfit.questions.bends.device_loop import read_device_with_ring_down
 from bowdenfit.questions.compensate.limits import estimate_compensation, parse_risk
@@ -21,7 +22,7 @@ from bowdenfit.questions.export.tables import (
     TransmissionTables,
     tabulate_transmission,
 )
-from bowdenfit.questions.export.text import format_comment, make_identifier
+from bowdenfit.questions.export.text import make_identifier, wrap_comment
 from bowdenfit.questions.export.yaml import compensation_parameters, yaml_parameters
 from bowdenfit.questions.predict.verb import predict
 from bowdenfit.questions.summary.verdict import assess_fit
@@ -44,11 +45,8 @@ def lookup_table(fit: Record, tables: TransmissionTables) -> str:
     else:
         rows = predict(fit, [float(x) for x in points] if tables.points.unit else None, quantity="efficiency")
     heads = [*(name for name in rows[0] if name != "note"), *(f"friction_exponent_{x.name}" for x in tables.levels)]
-    lines = [",".join(map(csv_heading, heads))]
-    for i, row in enumerate(rows):
-        cells = [value for name, value in row.items() if name != "note"]
-        lines.append(",".join(_format_cell(value) for value in (*cells, *(x.exponent[0, i] for x in tables.levels))))
-    return "\n".join([format_comment(tables.sentences, "# "), *lines]) + "\n"
+    answers = [[value for name, value in row.items() if name != "note"] for row in rows]
+    return _table_text(tables, heads, [[*row, *(x.exponent[0, i] for x in tables.levels)] for i, row in enumerate(answers)])
 
 
 def draws_table(tables: TransmissionTables) -> str:
@@ -67,22 +65,21 @@ def draws_table(tables: TransmissionTables) -> str:
         if tables.depends_on_rate
         else []
     )
-    lines = [",".join(map(csv_heading, heads))]
+    rows: list[list[object]] = []
     for level in (level for level in tables.levels if level.name.startswith(DRAW)):
         for i, point in enumerate(points.values):
-            cells = [level.name.removeprefix(DRAW), *([float(point)] if point_heading else []), *level.exponent[:, i]]
+            place = [float(point)] if point_heading else []
+            cells: list[object] = [level.name.removeprefix(DRAW), *place, *level.exponent[:, i]]
             cells += [level.taut_loss[i]] if tables.is_loop else []
             cells += [level.load_exponent, level.drag] if tables.depends_on_load else []
             cells += level.rate if tables.depends_on_rate else ()
-            lines.append(",".join(_format_cell(value) for value in cells))
-    return "\n".join([format_comment(tables.sentences, "# "), *lines]) + "\n"
+            rows.append(cells)
+    return _table_text(tables, heads, rows)
 
 
-def _format_cell(value: object) -> str:
-    """Format numbers with all their digits, and quote words where necessary."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(float(value)) if isinstance(value, float) else csv_heading(str(value))
+def _table_text(tables: TransmissionTables, heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return a table under what the tables say, with all digits of numbers."""
+    return csv_comment(wrap_comment(tables.sentences)) + csv_table(heads, rows, number=lambda value: repr(float(value)))
 
 
 _ENDINGS: Mapping[str, str] = {

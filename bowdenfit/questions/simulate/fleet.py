@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from pydantic import Field, ValidationError
 
+from bowdenfit.csv_tables import csv_table
 from bowdenfit.dataset import Dataset
 from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
 from bowdenfit.description.wrong_keys import explain_validation_error
@@ -172,15 +173,16 @@ def write_fleet(plan: FleetPlan, inspections: list[SimulatedInspection], truth: 
         DescriptionError: The bench fills several tables an inspection.
     """
     text = "\n".join(description_lines(plan.bench.text, "bowdenfit simulate --fleet", "design", "fleet")) + "\n"
-    rows, files = [",".join(COLUMNS)], dict[str, str]()
+    rows, files = list[tuple[str, ...]](), dict[str, str]()
     for inspection in inspections:
         texts = list(table_texts(inspection.dataset.description, inspection.dataset.measurements).values())
         if len(texts) != 1:
             raise DescriptionError("a simulated fleet has one table an inspection; leave one under [tables] of the plan.")
         files[inspection.file] = texts[0]
         lubricated = "yes" if inspection.lubricated else "no"
-        rows.append(f"{inspection.cable},{inspection.cycles:.0f},{inspection.temperature:g},{lubricated},{inspection.file}")
-    files |= {FLEET_DESCRIPTION: text, FLEET_TABLE: "\n".join(rows) + "\n", TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
+        numbers = f"{inspection.cycles:.0f}", f"{inspection.temperature:g}"
+        rows.append((inspection.cable, *numbers, lubricated, inspection.file))
+    files |= {FLEET_DESCRIPTION: text, FLEET_TABLE: csv_table(COLUMNS, rows), TRUTH_FILE: json.dumps(truth, indent=1) + "\n"}
     with fill_folder_atomically(folder) as new_folder:
         (new_folder / READINGS).mkdir()
         for name, content in files.items():

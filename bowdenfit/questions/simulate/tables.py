@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from bowdenfit.csv_tables import csv_table
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError, UsageError
@@ -283,13 +284,8 @@ def table_texts(description: Description, measured: Measurements) -> dict[str, s
         settings = description.tables.stated.get(kind.name)
         if settings and (page := kind.file_rows(table, description)):
             heads, rows = page
-            texts[kind.file_name(settings)] = "\n".join(",".join(map(_format_cell, row)) for row in [heads, *rows]) + "\n"
+            texts[kind.file_name(settings)] = csv_table(heads, rows)
     return texts
-
-
-def _format_cell(text: str) -> str:
-    """Return a cell as CSV has it; a heading that holds a comma is one all the same."""
-    return '"{}"'.format(text.replace('"', '""')) if set(text) & set(',"\r\n') else text
 
 
 def description_lines(text: str, command: str, *designs: str) -> list[str]:

@@ -70,6 +70,7 @@ _COMMON_UNITS = {
     "N*m/rad": ("angular_stiffness", 1.0),
     "N/mm": ("stiffness", 1.0),
 }
+_WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "oz": "ozf"}
 _PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
@@ -137,6 +138,11 @@ def dimension_of(unit: str) -> str:
     return "other"
 
 
+def weight_of(unit: str) -> str:
+    """Return the unit of force that the weight of a unit of mass is; empty for any other unit."""
+    return _WEIGHTS.get(unit.strip(), "")
+
+
 def speed_dimension(unit: str) -> str:
     """Return whether a unit of speed is one of the motor ("angular_velocity") or of the rope ("velocity").
 
@@ -160,7 +166,7 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     if of_usual == dimension and to in (None, INTERNAL_UNITS[dimension]):
         return factor
     if (of_usual and of_usual != dimension) or not _same_kind(_parsed(unit), _parsed(to or INTERNAL_UNITS[dimension])):
-        hint = " (kg is a mass: for the weight of that mass write kgf)" if unit.strip() in {"kg", "g", "lb"} else ""
+        hint = f" ({unit} is a mass: for the weight of that mass write {weight_of(unit)})" if weight_of(unit) else ""
         raise DatasetError(
             f"the unit {shown(unit)} does not measure {'an' if dimension[0] in 'aeiou' else 'a'} "
             f"{dimension.replace('_', ' ')}{hint}; "

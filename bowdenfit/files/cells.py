@@ -77,13 +77,23 @@ class Decimals:
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell with its place, for errors that can be found again in the file."""
+    """One cell with its place, for errors that can be found again in the file.
+
+    Args:
+        file, row, column: Where it stands.
+        text: What stands there.
+        decimals: How its column writes decimals.
+        measured: The number without its unit and error where these stand in the cell too; else None.
+        unit: The unit that stands in the cell; empty without one.
+    """
 
     file: str
     row: int
     column: str
     text: str
     decimals: Decimals = Decimals()
+    measured: str | None = None
+    unit: str = ""
 
     def refuse(self, what: str) -> DatasetError:
         """Return an error that names this cell."""
@@ -109,16 +119,20 @@ class Cell:
         """
         if self.blank:
             raise self.refuse("the cell is blank; fill in the value or delete the row.")
-        return self._parse(self.text)
+        return self._parse(self._number)
+
+    @property
+    def _number(self) -> str:
+        return self.text if self.measured is None else self.measured
 
     def percentage(self) -> float | None:
         """Return the number where the cell itself carries a percent sign ("78.5 %"), else None."""
-        text = self.text.strip()
+        text = self._number.strip()
         return self._parse(text[:-1]) / 100 if text.endswith("%") else None
 
     def limit(self) -> float | None:
         """Return the number behind a less-than sign ("<10"), else None."""
-        match = _UNDETECTED.fullmatch(self.text.strip())
+        match = _UNDETECTED.fullmatch(self._number.strip())
         return self._parse(match["limit"]) if match else None
 
     def no_sample(self, decimal: str) -> DatasetError:

@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import TypeVar
 
@@ -13,6 +13,7 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell, is_plain_number
 from bowdenfit.files.headings import MatchedColumn, find_candidates, meanings, option_naming, plain_name, split_brackets
 from bowdenfit.files.headings import Quantity as Quantity  # readers of tables take both from here
+from bowdenfit.files.measured_cells import split_measured
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.tables import RawTable
 from bowdenfit.units import (
@@ -20,8 +21,10 @@ from bowdenfit.units import (
     ColumnSource,
     contradiction,
     conversion_factor,
+    dimension_of,
     route_conversion_factor,
     speed_dimension,
+    weight_of,
 )
 from bowdenfit.words import listed, quoted, shown
 
@@ -40,6 +43,7 @@ class Column:
         unit: As written; None without one.
         faults: Where cells that cannot be read are noted.
         known: Whether it is a column of the table; otherwise what is wrong with that is noted already.
+        unit_in_cells: Whether only its cells say the unit, so that each must.
     """
 
     heading: str
@@ -48,6 +52,7 @@ class Column:
     unit: str | None
     faults: Faults
     known: bool = True
+    unit_in_cells: bool = False
 
     def read_cells(self, read: Callable[[Cell], Value], otherwise: Value) -> list[Value]:
         """Return every cell as read, with `otherwise` in place of those that cannot be; these are noted."""
@@ -59,12 +64,21 @@ class Column:
         Raises:
             DatasetError: The cell is blank, is text, or is not finite.
         """
+        self._check_unit(cell)
         value = cell.number() * self.factor
         if not abs(value) <= LARGEST:
             raise cell.refuse(f"{cell.shown} is too large for a measurement; correct the value or the unit.")
         if 0 < abs(value) < 1 / LARGEST**6:
             raise cell.refuse(f"{cell.shown} is closer to 0 than any measurement; correct the value, or write 0.")
         return value
+
+    def _check_unit(self, cell: Cell) -> None:
+        """Refuse a cell in another unit than its column, and one without a unit where only cells have it."""
+        if cell.unit and self.unit and cell.unit != self.unit and weight_of(cell.unit) != self.unit:
+            if contradiction(self.unit, cell.unit) or dimension_of(cell.unit) != dimension_of(self.unit):
+                raise cell.refuse(f"{cell.shown} is in another unit than its column, which is in {self.unit}; use one unit.")
+        elif not cell.unit and self.unit_in_cells and not cell.blank and cell.number() != 0:
+            raise cell.refuse(f"{cell.shown} has no unit, and others of the column are in {self.unit}; write it there too.")
 
     def numbers(self) -> list[float]:
         """Return all values in the internal unit; every cell must hold one, and those that hold none are noted."""
@@ -107,7 +121,43 @@ def find_columns(
                 by_quantity[quantity.name] = _named_column(table, quantity, sources[quantity.name])
             elif columns:
                 by_quantity[quantity.name] = _column(table, table.header[columns[0].position], quantity, columns[0].unit)
+    return by_quantity | _find_errors_in_cells(table, by_quantity, wanted)
+
+
+def _find_errors_in_cells(
+    table: RawTable, columns: Mapping[str, Column], wanted: tuple[Quantity, ...]
+) -> dict[str, Column]:
+    """Return the standard deviations that stand behind ± in the cells of the wanted quantities, as columns of their own.
+
+    That a quantity cannot have any, or has a column of them too, is noted among the table's faults.
+    """
+    can_be = {quantity.name for quantity in wanted}
+    by_quantity = dict[str, Column]()
+    for quantity in wanted:
+        column, name = columns.get(quantity.name), f"{quantity.name}_sd"
+        if quantity.dimension == "text" or column is None or column.heading not in table.errors:
+            continue
+        cell = next(cell for cell in column.cells if (parts := split_measured(cell.text)) and parts.error)
+        with table.faults.collect():
+            if name not in can_be:
+                raise cell.refuse(
+                    f"{cell.shown} has an error behind the number, which nothing reads there; write the numbers alone."
+                )
+            if name in columns:
+                raise cell.refuse(
+                    f"{cell.shown} has an error behind the number, and the column {shown(columns[name].heading)} has it too; "
+                    "leave one of them out."
+                )
+            by_quantity[name] = replace(column, heading=f"{column.heading} ±", cells=table.errors[column.heading])
     return by_quantity
+
+
+def remark_on_errors_in_cells(table: RawTable, columns: Mapping[str, Column]) -> list[str]:
+    """Return a remark on what stands behind ± in cells, where a column of standard deviations was read from it."""
+    with_errors = [column for name, column in columns.items() if f"{name}_sd" in columns and column.heading in table.errors]
+    read = [shown(column.heading) for column in with_errors]
+    where = f"{table.file}: what stands behind ± in {listed(read)} is taken for one standard deviation."
+    return [where] if read else []
 
 
 def _missing_column(table: RawTable, name: str) -> Column:
@@ -235,8 +285,11 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
         else:
             factor = 1.0 if quantity.dimension == "text" else conversion_factor(unit, quantity.dimension, quantity.to)
     except DatasetError as error:
-        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(heading)}: {error}.") from None
-    return Column(heading, cells, factor, unit, table.faults)
+        weight = weight_of(unit) if quantity.dimension == "force" else ""
+        option = f": {option_naming(quantity.name, heading, weight)}" if weight else ""
+        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(heading)}: {error}{option}.") from None
+    in_cells = unit == table.units[table.header.index(heading)] and any(cell.unit == unit for cell in cells)
+    return Column(heading, cells, factor, unit, table.faults, unit_in_cells=in_cells)
 
 
 def _usual_unit(dimension: str) -> str:

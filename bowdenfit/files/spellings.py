@@ -5,7 +5,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from bowdenfit.units import dimension_of, is_unit
+from bowdenfit.units import dimension_of, is_unit, weight_of
 
 _WORDS = {
     "input": "input in inlet eingang ein einlauf entree entrada ingresso entrata motor antrieb actuator actuation actuating "
@@ -21,7 +21,6 @@ _WORDS = {
     "readings value wert messwert mesuree medida gemessen mean average mittelwert moyenne media",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_WEIGHTS = {"kg", "g", "lb"}  # refused with a hint where they are converted
 _NAMES = {
     "stroke": "direction|richtung|hub|hubrichtung|bewegungsrichtung|stroke direction|sens|sens de deplacement|sentido|"
     "direccion|carrera|direzione|corsa",
@@ -165,7 +164,7 @@ def _end_of(words: Iterable[str], unit: str) -> tuple[str, str] | None:
 
 
 def _may_be_force(unit: str) -> bool:
-    return not unit or unit in _WEIGHTS or dimension_of(unit) == "force"
+    return not unit or bool(weight_of(unit)) or dimension_of(unit) == "force"
 
 
 def without_accents(text: str) -> str:

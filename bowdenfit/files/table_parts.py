@@ -5,7 +5,7 @@ The table ends where rows stop to agree with its columns; a block of text below 
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -13,6 +13,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK, is_plain_number
 from bowdenfit.files.headings import is_units_row, strip_brackets
 from bowdenfit.files.layout import is_summary
+from bowdenfit.files.measured_cells import is_reading
 from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
 from bowdenfit.files.text_file import SEPARATORS, CsvRecord, split_cells
 from bowdenfit.words import shown
@@ -99,7 +100,7 @@ def _header_position(filled: Sequence[CsvRecord]) -> int:
     best, most, current = 0, 0, -1
     score = 0
     for i, row in enumerate(filled):
-        words = i < _NEAR_TOP and is_words(row, least)
+        words = i < _NEAR_TOP and is_words(row, least) and not _has_units_as_neighbors(filled, i)
         if words and not (i == current + 1 and current >= 0 and is_units(row)) and not _repeats_headings(row, filled, current):
             current, score = i, 0
         elif current >= 0:
@@ -107,6 +108,16 @@ def _header_position(filled: Sequence[CsvRecord]) -> int:
             if score > most:
                 best, most = current, score
     return best
+
+
+def _has_units_as_neighbors(filled: Sequence[CsvRecord], i: int) -> bool:
+    """Return whether a row has numbers with units or errors where a row beside it has them, as rows of readings do.
+
+    A row of headings may have them too, such as 45° and 90° over forces.
+    """
+    here = {k for k, cell in enumerate(filled[i].cells) if is_reading(cell)}
+    beside = [filled[k] for k in (i - 1, i + 1) if 0 <= k < len(filled)] if here else []
+    return any(is_reading(row.cells[k]) for row in beside for k in here if k < len(row.cells))
 
 
 def _repeats_headings(row: CsvRecord, filled: Sequence[CsvRecord], current: int) -> bool:
@@ -142,7 +153,7 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
         DatasetError: There is such a row.
     """
     for row in above:
-        words, numbers = count_words_and_numbers(row)
+        words, numbers = count_words_and_numbers(row, _is_bare_number)
         if numbers >= max(columns, 2) and not words:
             raise DatasetError(
                 f"{file}, row {row.row}: numbers stand there ({shown(row.cells[0])}, ...) above the headings in row "
@@ -212,7 +223,7 @@ def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) ->
     """
     seen = False
     for i, row in enumerate(rows):
-        if seen and rows[i - 1].blank and is_words(row) and row.cells != header.cells:
+        if seen and rows[i - 1].blank and is_words(row) and not count_words_and_numbers(row)[1] and row.cells != header.cells:
             numeric = _numeric_columns(rows[:i])
             filled = sorted(_filled(above, numeric) for above in rows[:i] if _agrees(above, numeric))
             usual = filled[len(filled) // 2] if filled else 1
@@ -283,8 +294,13 @@ _TOGETHER = re.compile(r"\d\s*[,;|\t ]\s*[-+]?\d")
 
 @lru_cache(1 << 14)  # it is asked of every cell again and again, and many cells hold the same
 def is_measured(text: str) -> bool:
-    """Return whether a cell holds what a table measures: a number, a percentage, or a limit such as <10."""
-    return is_plain_number(text.strip().rstrip("%").lstrip("<≤="))
+    """Return whether a cell holds what a table measures: a number with or without a unit, a percentage, a limit such as <10."""
+    return is_plain_number(text.strip().rstrip("%").lstrip("<≤=")) or is_reading(text)
+
+
+def _is_bare_number(text: str) -> bool:
+    """Return whether a cell holds a number without a unit or an error, as no heading does."""
+    return is_measured(text) and not is_reading(text)
 
 
 def count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
@@ -301,16 +317,16 @@ def count_numbers(rows: Sequence[CsvRecord], separator: str) -> int:
     return total
 
 
-def count_words_and_numbers(row: CsvRecord) -> tuple[int, int]:
+def count_words_and_numbers(row: CsvRecord, is_number: Callable[[str], bool] = is_measured) -> tuple[int, int]:
     """Return how many cells hold words, and how many numbers; marks for nothing are neither."""
     filled = [cell for cell in row.cells if cell.strip()]
-    numbers = sum(map(is_measured, filled))
+    numbers = sum(map(is_number, filled))
     return sum(cell.strip().lower() not in BLANK for cell in filled) - numbers, numbers
 
 
 def is_words(row: CsvRecord, least: int = 2) -> bool:
-    """Return whether a row can be one of headings: nothing but words."""
-    words, numbers = count_words_and_numbers(row)
+    """Return whether a row can be one of headings: nothing but words, or numbers with a unit."""
+    words, numbers = count_words_and_numbers(row, _is_bare_number)
     return not numbers and words >= least
 
 

@@ -1,13 +1,15 @@
 """Tables of readings in CSV files and workbooks: headings, and rows of cells that know where they stood."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
+from bowdenfit.files.headings import heading_of
+from bowdenfit.files.measured_cells import split_measured
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
 from bowdenfit.files.table_parts import TableParts, count_numbers, is_measured, split_table
 from bowdenfit.files.text_file import (
@@ -42,8 +44,9 @@ class RawTable:
         header: What stands over each column.
         header_row: The row of the headings, of which the last stands over the units or the data.
         rows: Rows of readings.
-        units: The unit that stands below each heading; empty without one.
+        units: The unit that stands below each heading, or behind its numbers; empty without one.
         lines: Where the rows of the file went.
+        errors: What stands behind ± in the cells of a column, by its heading.
         faults: What is found wrong while it is read.
     """
 
@@ -53,6 +56,7 @@ class RawTable:
     rows: tuple[tuple[Cell, ...], ...]
     units: tuple[str, ...]
     lines: RowAccount
+    errors: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
     faults: Faults = field(default_factory=Faults, compare=False)
 
     @property
@@ -156,15 +160,20 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
         raise DatasetError(
             f"{name} has a header row but no measurements; add the rows, or remove the table from cable.toml."
         )
-    decimals = Decimals.of((cell for row in parts.body for cell in row.cells), separator != ",")
-    units = (*parts.units, *[""] * len(header))[: len(header)]
-    in_column = decimals.of_columns([_column(parts.body, i) for i in range(len(header))])
+    decimals = Decimals.of((_number_in(cell) for row in parts.body for cell in row.cells), separator != ",")
+    in_column = decimals.of_columns([[_number_in(cell) for cell in _column(parts.body, i)] for i in range(len(header))])
     wrong_width = Faults()
     nothing = tuple[Cell, ...]()
     fewest = _fewest_cells(parts.body, len(header))
     cells = tuple(wrong_width.read_all(lambda row: _cells(name, header, row, in_column, fewest), parts.body, nothing))
     wrong_width.refuse()
-    return RawTable(name, header, parts.headings[0].row, cells, units, _account(name, lines, rows, parts, len(header)))
+    below = (*parts.units, *[""] * len(header))[: len(header)]
+    units = tuple(
+        unit if heading_of(heading, unit).unit else _unit_in_cells([row[i] for row in cells])
+        for i, (heading, unit) in enumerate(zip(header, below, strict=True))
+    )
+    account = _account(name, lines, rows, parts, len(header))
+    return RawTable(name, header, parts.headings[0].row, cells, units, account, _errors_in_cells(header, cells))
 
 
 def _score_separator(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:
@@ -217,10 +226,36 @@ def _cells(
     if len(row.cells) < fewest:
         raise short_row_error(file, row.row, row.cells, header)
     padded = row.cells + [""] * (len(header) - len(row.cells))
-    return tuple(
-        Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals[i])
-        for i, (column, text) in enumerate(zip(header, padded, strict=False))
-    )
+    cells = []
+    for i, (column, text) in enumerate(zip(header, padded, strict=False)):
+        parts = split_measured(text)
+        measured, unit = (parts.number, parts.unit) if parts else (None, "")
+        cells.append(Cell(file, row.row, column or f"(column {i + 1}, without heading)", text, decimals[i], measured, unit))
+    return tuple(cells)
+
+
+def _number_in(text: str) -> str:
+    """Return a cell without the unit and the error behind its number."""
+    parts = split_measured(text)
+    return parts.number if parts else text
+
+
+def _unit_in_cells(cells: Sequence[Cell]) -> str:
+    """Return the first unit that stands in cells of which most hold numbers; empty where none does."""
+    unit = next((cell.unit for cell in cells if cell.unit), "")
+    numbers = sum(is_measured(cell.text) for cell in cells) if unit else 0
+    return unit if 2 * numbers > sum(not cell.blank for cell in cells) else ""
+
+
+def _errors_in_cells(header: Sequence[str], rows: Sequence[tuple[Cell, ...]]) -> dict[str, tuple[Cell, ...]]:
+    """Return what stands behind ± in columns that have it, by their headings; empty cells where a row has none."""
+    errors = dict[str, tuple[Cell, ...]]()
+    for i, heading in enumerate(header):
+        parts = [split_measured(row[i].text) for row in rows]
+        if heading and any(part and part.error for part in parts):
+            texts = [part.error if part else "" for part in parts]
+            errors[heading] = tuple(replace(row[i], text=text, measured=None) for row, text in zip(rows, texts, strict=True))
+    return errors
 
 
 def _behind(row: CsvRecord, width: int) -> list[str]:

@@ -9,7 +9,14 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.display import Part
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, read_unused_columns, require_column
+from bowdenfit.files.columns import (
+    Column,
+    Quantity,
+    find_columns,
+    read_unused_columns,
+    remark_on_errors_in_cells,
+    require_column,
+)
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
@@ -110,7 +117,8 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             origin_of_rows(table),
             read_unused_columns(table, columns),
         )
-        return TableFromFiles(rows, {path.name: path}, _remark_fractions(column, rows), (table.account,))
+        remarks = (*_remark_fractions(column, rows), *remark_on_errors_in_cells(table, columns))
+        return TableFromFiles(rows, {path.name: path}, remarks, (table.account,))
 
     @override
     def describe(self, table: EfficiencyTable, description: Description) -> list[str]:

@@ -11,7 +11,14 @@ from bowdenfit.description import Description
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, describe_paired_headings, find_columns, read_unused_columns
+from bowdenfit.files.columns import (
+    Column,
+    Quantity,
+    describe_paired_headings,
+    find_columns,
+    read_unused_columns,
+    remark_on_errors_in_cells,
+)
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.forces.mountings import (
@@ -37,12 +44,14 @@ from bowdenfit.kinds.strokes import read_strokes_by_loss
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Labels, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
+from bowdenfit.words import listed, shown
 
 # How readings fall together at loads: judgements, which a sentence and the guess of a file's kind rest on, and no fit.
 _MOST_LOADS = 25  # loads that are counted
 _APART = 3.0  # smallest gap between loads over the largest within one
 _SAME = 0.002  # relative difference of equal readings, the last digit of a display
 _ONE_LOAD = 0.03  # relative width of readings at one load
+_SDS = (Quantity("input_force_sd", "force"), Quantity("output_force_sd", "force"))  # a remark says that these are not used
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
@@ -157,7 +166,7 @@ def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
-    columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    columns = find_columns(table, (*ENDS, *_SDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
     nothing = np.full(len(table.rows), np.nan)
     read = partial(_read_tensions, table, columns, source.description)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
@@ -167,7 +176,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     group, remarks = tuple[str, ...](), list[str]()
     with table.faults.collect():
         group, remarks = read_groups(columns, table.file, *groups)
-    remarks += describe_paired_headings(table, columns, source.columns)
+    remarks += describe_paired_headings(table, columns, source.columns) + _remark_on_errors(table, columns)
     if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, stroke_remarks = read_strokes_by_loss(columns, np.log(input_force / output_force))
@@ -184,6 +193,20 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
     unused = read_unused_columns(table, columns)
     return ForceTable(*parts, unused), remarks, table.account
+
+
+def _remark_on_errors(table: RawTable, columns: Mapping[str, Column]) -> list[str]:
+    """Return remarks on stated errors of readings: those of wrap angles are used, those of forces are not."""
+    unused = {name: columns[name] for name in (quantity.name for quantity in _SDS) if name in columns}
+    used = {name: column for name, column in columns.items() if name not in unused}
+    remarks = remark_on_errors_in_cells(table, used)
+    if unused:
+        names = listed([shown(column.heading) for column in unused.values()])
+        remarks.append(
+            f"{table.file}: the errors of single readings in {names} are not used. The noise of the load cells is estimated "
+            "from how readings scatter; where it is known, state it in cable.toml: [sensors] force_noise."
+        )
+    return remarks
 
 
 def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:

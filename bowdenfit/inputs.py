@@ -22,6 +22,7 @@ _LARGEST_TOML = 4_000_000  # bytes; a description has some thousand
 _MOST_ENTRIES = 10_000  # judged: of one list or table; more take minutes to be refused one by one
 _MOST_DOTS = 300  # of a key, or a sentence
 _DEEPEST = 12  # keys below keys; a description has four
+_LONGEST_PATTERN = 1000  # characters; names of files have 255 at most
 _NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
 _SYSTEM_FOLDERS = ("/proc/", "/sys/")  # some of these wait for ever, some never end
 _SPECIAL = {
@@ -168,11 +169,12 @@ def match_files(folder: Path, pattern: str) -> list[Path]:
     """
     if pattern.startswith(("/", "~", "\\")) or "\0" in pattern or ":" in pattern[:3]:
         raise DescriptionError(
-            f"cable.toml: the pattern {pattern!r} does not start in the folder of cable.toml; write it as seen from there, "
-            'such as "recordings/*.csv".'
+            f"cable.toml: the pattern {shown(pattern)} does not start in the folder of cable.toml; write it as seen from "
+            'there, such as "recordings/*.csv".'
         )
-    if pattern.count("**") > 1 or pattern.count("*") > 12:
+    if pattern.count("**") > 1 or pattern.count("*") > 12 or len(pattern) > _LONGEST_PATTERN:
+        what = "is too long" if len(pattern) > _LONGEST_PATTERN else "has too many stars"
         raise DescriptionError(
-            f'cable.toml: the pattern {pattern[:60]!r} has too many stars; name the files, or write "recordings/*.csv".'
+            f'cable.toml: the pattern {pattern[:60]!r} {what}; name the files, or write "recordings/*.csv".'
         )
     return sorted(folder.glob(pattern))

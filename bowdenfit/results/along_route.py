@@ -143,7 +143,6 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFun
     route, grid = model.description.route, route_grid(model)
     assert route is not None  # callers ask only where there is a route
     at, force = np.asarray(route.choices, dtype=float), model.cable.friction.conditions.reference_force
-    along = np.concatenate([grid, at])
 
     def pulled(values: dict[str, Array], effect: Array) -> Array:
         return model.cable.output_force_at(values, jnp.asarray(at), jnp.asarray(float(force)), jnp.ones(()), effect)
@@ -152,7 +151,9 @@ def compile_along_route(model: Model, beside: Executor | None = None) -> DrawFun
         values = model.space.constrain(z_and_mounting[:-1])
         effects = {"mean": jnp.zeros(()), "mounted": z_and_mounting[-1]}
         of_choices = {name: pulled(values, effect) for name, effect in effects.items()} if len(at) else {}
-        return {"curves": curves_at(model, values, along), **of_choices}
+        if len(at):
+            of_choices["choices"] = model.cable.efficiency_at(values, jnp.asarray(at))
+        return {"curves": curves_at(model, values, grid), **of_choices}
 
     with jax.enable_x64(True):
         return for_each_draw(implied, model.space.size + 1, run_once=True, beside=beside)
@@ -172,8 +173,8 @@ def compute_along_route(model: Model, program: DrawFunction, z: np.ndarray, moun
     none = np.zeros((len(z), 0))
     return RouteDraws(
         route_grid(model),
-        {name: draws[:, :GRID_POINTS] for name, draws in outputs["curves"].items()},
-        outputs["curves"]["efficiency"][:, GRID_POINTS:],
+        outputs["curves"],
+        outputs.get("choices", none),
         outputs.get("mean", none),
         outputs.get("mounted", none),
     )

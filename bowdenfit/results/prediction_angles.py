@@ -21,6 +21,8 @@ from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.model import Model
 from bowdenfit.words import listed
 
+MOST_LENGTHS = 10_000  # judged: a metre of cable by tenths of a millimetre; takes minutes
+_AT_ONCE = 500  # judged: lengths of which 10,000 draws of a force take 40 MB
 NO_ANGLES: Mapping[int, float] = MappingProxyType({})
 _STREAM = 11  # of random numbers, beside the fit's own
 
@@ -59,6 +61,20 @@ class PredictionAngles:
         if not errors.size:
             return angles
         return jnp.maximum(angles + errors.reshape(angles.shape) * jnp.sqrt(variance), 0.0)
+
+
+def split_lengths(lengths: np.ndarray) -> list[np.ndarray]:
+    """Return route values in parts that are predicted one after the other, so that the memory taken does not grow with them.
+
+    Raises:
+        UsageError: They are too many.
+    """
+    if len(lengths) > MOST_LENGTHS:
+        raise UsageError(
+            f"{len(lengths):,} lengths are asked for, and at most {MOST_LENGTHS:,} are predicted at a time; ask for fewer, "
+            "because curves hardly change from one of so many to the next."
+        )
+    return [lengths[start : start + _AT_ONCE] for start in range(0, max(len(lengths), 1), _AT_ONCE)]
 
 
 def choose_angles(

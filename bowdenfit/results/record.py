@@ -29,7 +29,7 @@ from bowdenfit.results.along_route import (
     summarize_optimum,
 )
 from bowdenfit.results.optimal_length import OptimalLength
-from bowdenfit.results.prediction_angles import NO_ANGLES, choose_angles, predict_forces
+from bowdenfit.results.prediction_angles import NO_ANGLES, choose_angles, predict_forces, split_lengths
 from bowdenfit.words import few, shown
 
 OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY = "optimal_length", "optimal_efficiency"
@@ -214,8 +214,9 @@ class Record(Display):
                 angle was measured at it.
         """
         at = self._lengths(lengths)
+        parts = split_lengths(at)
         outside = choose_angles(self.dataset, at, NO_ANGLES, self.provenance.seed).outside
-        intervals = map(Interval.of, self.efficiency_draws(at).T)
+        intervals = [Interval.of(draws) for part in parts for draws in self.efficiency_draws(part).T]
         return Efficiencies(intervals, self.dataset.description.route, at, outside)
 
     def efficiency_draws(self, lengths: float | Iterable[float] | None = None) -> np.ndarray:

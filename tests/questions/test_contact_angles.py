@@ -9,6 +9,7 @@ import bowdenfit as bf
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import curve_function, for_each_draw
 from bowdenfit.questions.predict.predictions import predictions_text
+from bowdenfit.results import prediction_angles
 
 EDGE, FREE = "bracket edge", "free sheath"
 
@@ -155,3 +156,18 @@ def test_another_seed_leaves_the_posterior_and_draws_other_mountings(fit):
     assert not np.array_equal(other.mounting(), fit.mounting())
     for verb in (bf.compensate, bf.teleoperate):
         assert signature(verb).parameters["seed"].default is None
+
+
+def test_many_lengths_are_predicted_in_parts_and_too_many_are_refused(fit, monkeypatch):
+    lengths = np.linspace(440.0, 520.0, 7)
+    in_one, means = bf.predict(fit, lengths), [one.mean for one in fit.efficiency(lengths)]
+    bent = bf.predict(fit, lengths[:3], contact=EDGE, wrap_angles=["0deg", "60deg"])
+    monkeypatch.setattr(prediction_angles, "_AT_ONCE", 2)
+    assert [len(part) for part in prediction_angles.split_lengths(lengths)] == [2, 2, 2, 1]
+    assert [row["mean"] for row in bf.predict(fit, lengths)] == pytest.approx([row["mean"] for row in in_one], rel=1e-12)
+    assert [one.mean for one in fit.efficiency(lengths)] == pytest.approx(means, rel=1e-12)
+    again = bf.predict(fit, lengths[:3], contact=EDGE, wrap_angles=["0deg", "60deg"])
+    assert [row["mean"] for row in again] == pytest.approx([row["mean"] for row in bent], rel=1e-12)
+    for ask in (fit.efficiency, lambda many: bf.predict(fit, many)):
+        with pytest.raises(UsageError, match="10,001 lengths are asked for, and at most 10,000"):
+            ask(np.linspace(440.0, 520.0, 10_001))

@@ -123,7 +123,8 @@ def test_a_description_that_is_no_utf_8_is_a_sentence(cable):
 @pytest.mark.parametrize(
     ("pattern", "says"),
     [("/etc/*", "does not start in the folder"), ("a*\\u0000", "does not start in the folder"),
-     ("**/**/**/*.csv", "too many stars"), ("*a" * 30, "too many stars"), ("nothing*.csv", "no file in")],
+     ("**/**/**/*.csv", "too many stars"), ("*a" * 30, "too many stars"), ("nothing*.csv", "no file in"),
+     ("[a-z]" * 300, "is too long")],
 )  # fmt: skip
 def test_patterns_end(cable, pattern, says):
     replace_in(cable / "cable.toml", '"efficiencies.csv"', f'"{pattern}"')

@@ -21,6 +21,7 @@ StatedNumber = tuple[float, str] | None  # a number and its unit
 _STROKES = {"pull": 1, "return": -1}
 _FORCE, _STROKE, _PRELOAD = "--input-force", "--stroke return", "--preload"
 _LIMIT, _SPRING = "--friction-limit", "--spring"
+_MOST_BENDS = 1000  # judged: of a quarter degree each over a turn
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,13 @@ def make_query(
     """Return a question at wrap angles from numbers with units; the measured angles if none is named.
 
     Raises:
-        UsageError: A number is negative, or has a unit of another kind.
+        UsageError: A number is negative, or has a unit of another kind, or there are too many wrap angles.
     """
+    if len(wrap_angles) > _MOST_BENDS:
+        raise UsageError(
+            f"{len(wrap_angles):,} wrap angles are asked for, and at most {_MOST_BENDS:,} are predicted at a time; ask "
+            "for fewer."
+        )
     angles = [_to_internal(angle, "angle", "--wrap-angle", 0.0) for angle in wrap_angles]
     limit = None
     if friction_limit is not None:

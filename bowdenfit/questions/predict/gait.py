@@ -20,7 +20,7 @@ from bowdenfit.kinds.rows import read_angle
 from bowdenfit.questions.bends.bent_cable import find_bent_contact
 from bowdenfit.questions.predict.lengths import to_newtons
 from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
-from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles
+from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles, split_lengths
 from bowdenfit.results.record import Record
 from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import counted, quoted
@@ -206,6 +206,23 @@ def predict_over_gait(
         output_force: Force and unit that is wanted, of which the input force is predicted.
         stated: Wrap angles of other contacts [rad], by number; without one a contact keeps its own.
     """
+    return [
+        row
+        for part in split_lengths(lengths)
+        for row in _predict_part(fit, part, gait, input_force, stroke, output_force, stated)
+    ]
+
+
+def _predict_part(
+    fit: Record,
+    lengths: np.ndarray,
+    gait: Gait,
+    input_force: tuple[float, str] | None,
+    stroke: str,
+    output_force: tuple[float, str] | None,
+    stated: Mapping[int, float],
+) -> list[dict[str, Any]]:
+    """Return the predictions at a part of the route values; see `predict_over_gait`."""
     route, limits = fit.dataset.description.route, find_measured_range(fit)
     friction = fit.model.cable.friction
     force, divisor, name, slack_word = friction.conditions.reference_force, 1.0, "efficiency", "slack"

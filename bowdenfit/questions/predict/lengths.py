@@ -11,7 +11,13 @@ from bowdenfit.description import Route
 from bowdenfit.errors import DatasetError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.predict.measured_range import clip_to_tension, find_measured_range
-from bowdenfit.results.prediction_angles import NO_ANGLES, PredictionAngles, choose_angles, predict_forces
+from bowdenfit.results.prediction_angles import (
+    NO_ANGLES,
+    PredictionAngles,
+    choose_angles,
+    predict_forces,
+    split_lengths,
+)
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
 
@@ -37,8 +43,25 @@ def predict_at_lengths(
         stated: Stated wrap angles [rad], by number of the contact; the others keep their own.
 
     Raises:
-        UsageError: A force is not a positive force, or there is no posterior, or no wrap angle is known outside the curves.
+        UsageError: A force is not a positive force, or there is no posterior, or no wrap angle is known outside the curves, or
+            there are too many route values.
     """
+    return [
+        row
+        for part in split_lengths(lengths)
+        for row in _predict_part(fit, part, input_force, stroke, output_force, stated)
+    ]
+
+
+def _predict_part(
+    fit: Record,
+    lengths: np.ndarray,
+    input_force: tuple[float, str] | None,
+    stroke: str,
+    output_force: tuple[float, str] | None,
+    stated: Mapping[int, float],
+) -> list[dict[str, Any]]:
+    """Return the predictions at a part of the route values; see `predict_at_lengths`."""
     route, sign, limits = fit.dataset.description.route, _STROKES[stroke], find_measured_range(fit)
     name, force, divisor, stated_force = "efficiency", fit.model.cable.friction.conditions.reference_force, 1.0, None
     if input_force is not None:

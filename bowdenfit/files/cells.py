@@ -17,6 +17,7 @@ _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<separator>[ '.,])\d{3}(?:(?P=separa
 _AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _FRACTION = re.compile(r"(?:(?P<whole>\d{1,4}) )?(?P<over>\d{1,2})/(?P<under>2|3|4|5|6|8|10|12|16|32|64)")  # 2 1/4 turns
 _WHOLE = re.compile(r"[+-]?[1-9]\d{2,}")
+_MISSING_CODE = re.compile(r"-(?:9{2,}(?:[.,](?:9+|0+))?|32768)")
 _SPACES = "\t\v\f\x85\xa0\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000"
 _TYPOGRAPHY = str.maketrans({"\u2212": "-", "’": "'", **dict.fromkeys(_SPACES, " ")})
 _EXCEL_MARKS = "#n/a #na #div/0! #value! #num! #ref!"
@@ -124,6 +125,11 @@ class Cell:
     @property
     def _number(self) -> str:
         return self.text if self.measured is None else self.measured
+
+    @property
+    def is_missing_code(self) -> bool:
+        """Whether it holds a number that programs write where a reading is missing, such as -9999."""
+        return bool(_MISSING_CODE.fullmatch(_normalize(self._number)))
 
     def percentage(self) -> float | None:
         """Return the number where the cell itself carries a percent sign ("78.5 %"), else None."""

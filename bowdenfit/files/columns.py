@@ -234,15 +234,17 @@ def require_column(table: RawTable, columns: Mapping[str, Column], name: str, ex
     """Return the column called `name`; that there is none is noted among the table's faults."""
     if name in columns:
         return columns[name]
-    table.faults.faults.append(_missing_column_error(table, name, example))
+    read = {column.heading for column in columns.values()}
+    table.faults.faults.append(_missing_column_error(table, name, example, read))
     return _missing_column(table, name)
 
 
-def _missing_column_error(table: RawTable, name: str, example: str) -> DatasetError:
+def _missing_column_error(table: RawTable, name: str, example: str, read: Collection[str]) -> DatasetError:
+    others = [heading for heading in table.header if heading not in read]
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
     option = option_naming(name, "NAME", unit.replace("_", "*"))
     return DatasetError(
-        f"{table.file} has no column {name}{_suggest_heading(name, table.header)}; it has {quoted(table.header)}. Name the "
+        f"{table.file} has no column {name}{_suggest_heading(name, others)}; it has {quoted(table.header)}. Name the "
         f"column {example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
 
@@ -260,7 +262,7 @@ def describe_paired_headings(table: RawTable, columns: Mapping[str, Column], sta
     ]
 
 
-def _suggest_heading(name: str, header: tuple[str, ...]) -> str:
+def _suggest_heading(name: str, header: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, [plain_name(h) for h in header], n=1, cutoff=0.7)
     match = next((h for h in header if near and plain_name(h) == near[0]), None)
     return f" (is it {shown(match)}?)" if match else ""
@@ -337,7 +339,7 @@ def _check_source(
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
-    written = written or split_brackets(source.name)[1] or None
+    written = written or split_brackets(source.name)[1] or table.units[table.header.index(source.name)] or None
     if why := contradiction(source.unit, written):
         raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(source.name)}: {why}.")
     return _column(table, source.name, quantity, source.unit or written)

@@ -23,6 +23,7 @@ _SUFFIXES = (
     "N kN mN lbf kgf gf ozf newton Nm Nmm mNm N*m N*mm V mV uV mV/V V/V mA Pa kPa MPa bar psi kg mm cm m um inch mm/s m/s "
     "cm/s rad deg degree degrees rad/s deg/s rpm s ms us ns min h sec seconds Hz"
 )
+_REPEATED = re.compile(r"(?P<first>.+)\.\d{1,2}")
 _FORCES = {"N", "kN", "mN", "lbf", "kgf"}
 _LONGEST_HEADING = 200  # characters; judged: a longer text is a sentence, and patterns would take long over it
 
@@ -114,6 +115,12 @@ def is_number(text: str) -> bool:
     return bool(_NUMBER.fullmatch(text.strip()))
 
 
+def repeated_heading(heading: str, headings: Collection[str]) -> str:
+    """Return the heading of which another is a repeat, as pandas names "Force (N).1" after "Force (N)"; empty for others."""
+    match = _REPEATED.fullmatch(heading)
+    return match["first"] if match and match["first"] in headings else ""
+
+
 def find_candidates(
     headings: Sequence[tuple[str, str]], wanted: tuple[Quantity, ...], stated: Collection[str] = ()
 ) -> dict[str, list[MatchedColumn]]:
@@ -129,7 +136,9 @@ def find_candidates(
     """
     by_quantity: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
     loose: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}
-    for i, (heading, unit) in enumerate(headings):
+    written_out = {heading for heading, _ in headings}
+    for i, (repeat, unit) in enumerate(headings):
+        heading = repeated_heading(repeat, written_out) or repeat
         named = meanings(heading, wanted)
         for quantity, written in named:
             by_quantity[quantity.name].append(MatchedColumn(i, written or unit or None))

@@ -30,7 +30,10 @@ _NAMES = {
     "wrap_angle": "wrapping angle|angle of wrap|total wrap angle|umschlingungswinkel|umschlingung|angle d enroulement|"
     "angle d embrassement|angulo de abrazamiento|angulo de abrazo|angolo di avvolgimento",
     "efficiency": "wirkungsgrad|ubertragungswirkungsgrad|rendement|rendimiento|eficiencia|rendimento|efficienza|eta|eff|"
-    "transmission efficiency|force efficiency|efficiency of transmission",
+    "transmission efficiency|force efficiency|efficiency of transmission|output input|out in|fout fin|f out f in|"
+    "output force input force|force ratio|tension ratio",
+    "loss": "force loss|friction loss|loss of force|verlust|kraftverlust|reibungsverlust|perte|perte de force|perdida|"
+    "perdida de fuerza|perdita|perdita di forza",
 }
 _QUANTITIES = {name: quantity for quantity, names in _NAMES.items() for name in names.split("|")}
 _AMBIGUOUS_NAMES = {  # what only the user can say
@@ -54,7 +57,8 @@ _WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a 
 _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
             "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
 _GUESSES = {name: quantity for quantity, names in _AMBIGUOUS_NAMES.items() for name in names.split("|")}
-_DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": ("ratio",)}
+_RATIO = ("ratio",)
+_DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": _RATIO, "loss": _RATIO}
 _SYMBOL = re.compile(r"([ft])(in|out|ein|aus|input|output|motor|mot|act|load|prox|dist|ent|sal|i|o)")
 _ENDS = {"mot": "motor", "act": "actuator", "ent": "entrada", "sal": "salida", "i": "in", "o": "out"}
 _COMPOUND = re.compile(r"(?P<end>\w{3,}?)s?(?P<of>kraft|spannung|seite|seitig)")

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK, is_plain_number
-from bowdenfit.files.headings import is_units_row, strip_brackets
+from bowdenfit.files.headings import is_units_row, plain_name, strip_brackets
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.measured_cells import is_reading
 from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
@@ -101,7 +101,8 @@ def _header_position(filled: Sequence[CsvRecord]) -> int:
     score = 0
     for i, row in enumerate(filled):
         words = i < _NEAR_TOP and is_words(row, least) and not _has_units_as_neighbors(filled, i)
-        if words and not (i == current + 1 and current >= 0 and is_units(row)) and not _repeats_headings(row, filled, current):
+        below = current >= 0 and (_is_same(row, filled[current]) or (i == current + 1 and is_units(row)))
+        if words and not below:
             current, score = i, 0
         elif current >= 0:
             score += count_words_and_numbers(row)[1]
@@ -118,10 +119,6 @@ def _has_units_as_neighbors(filled: Sequence[CsvRecord], i: int) -> bool:
     here = {k for k, cell in enumerate(filled[i].cells) if is_reading(cell)}
     beside = [filled[k] for k in (i - 1, i + 1) if 0 <= k < len(filled)] if here else []
     return any(is_reading(row.cells[k]) for row in beside for k in here if k < len(row.cells))
-
-
-def _repeats_headings(row: CsvRecord, filled: Sequence[CsvRecord], current: int) -> bool:
-    return current >= 0 and row.cells == filled[current].cells
 
 
 def _is_over(above: CsvRecord, names: Sequence[str]) -> bool:
@@ -152,12 +149,18 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
     Raises:
         DatasetError: There is such a row.
     """
-    for row in above:
+    for i, row in enumerate(above):
         words, numbers = count_words_and_numbers(row, _is_bare_number)
         if numbers >= max(columns, 2) and not words:
             raise DatasetError(
                 f"{file}, row {row.row}: numbers stand there ({shown(row.cells[0])}, ...) above the headings in row "
                 f"{header.row}; put the headings over all rows of the table, or delete the rows above them."
+            )
+        if words + numbers == columns and numbers > 1 and any(is_words(other, columns) for other in above[:i]):
+            raise DatasetError(
+                f"{file}, row {row.row}: a row of a table ({shown(' '.join(row.cells))}) stands above the headings in row "
+                f"{header.row}; put what is above these into a file of its own, or delete it, and row {header.row} too if its "
+                "columns are the same."
             )
 
 
@@ -173,6 +176,7 @@ def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> 
         DatasetError: A row that would be left out looks like a reading.
     """
     stop = _find_next_table(rows, header, file)
+    _refuse_other_headings(rows[:stop], header, file)
     numeric = _numeric_columns(rows[:stop])
     agree = [_agrees(row, numeric) for row in rows[:stop]]
     if not any(agree):
@@ -213,6 +217,29 @@ def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: 
                 "those of the rows above; the usual causes are rows that were pasted from another file, and quotation marks "
                 "around a whole row. Separate its columns as in the other rows, or begin the row with # if it is a remark."
             )
+
+
+def _refuse_other_headings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> None:
+    """Refuse a row of words in every column among rows of numbers, unless it is the headings again.
+
+    Raises:
+        DatasetError: There is such a row.
+    """
+    width = max(sum(bool(cell.strip()) for cell in header.cells), 2)
+    last = max((i for i, row in enumerate(rows) if count_words_and_numbers(row)[1]), default=0)
+    for row in rows[1:last]:
+        words, numbers = count_words_and_numbers(row)
+        if words >= width > numbers == 0 and len({*row.cells}) > 1 and not is_units(row) and not _is_same(row, header):
+            raise DatasetError(
+                f"{file}, row {row.row}: words stand in every column ({shown(' '.join(row.cells))}) above further rows of "
+                f"numbers, as headings do, but not those of row {header.row}; put what is below into a file of its own, or "
+                "delete the row if its columns are the same."
+            )
+
+
+def _is_same(row: CsvRecord, header: CsvRecord) -> bool:
+    """Return whether a row has the headings again, in whatever spelling of letters and spaces."""
+    return [plain_name(cell) for cell in row.cells] == [plain_name(cell) for cell in header.cells]
 
 
 def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> int:
@@ -281,7 +308,7 @@ def _statistics_start(rows: Sequence[CsvRecord], end: int, numeric: set[int]) ->
 def _explain_row_inside(row: CsvRecord, header: CsvRecord, numeric: set[int]) -> str:
     """Return why a row among the readings is none; empty where it is one."""
     words, numbers = count_words_and_numbers(row)
-    if not numbers and (row.cells == header.cells or is_units(row)):
+    if not numbers and (_is_same(row, header) or is_units(row)):
         return AGAIN
     if not numbers and words == 1 and len(numeric) > 1:
         return BETWEEN

@@ -8,7 +8,7 @@ from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.files.apart import LIMITS, call_isolated
 from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
-from bowdenfit.files.headings import heading_of
+from bowdenfit.files.headings import heading_of, repeated_heading
 from bowdenfit.files.measured_cells import split_measured
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
 from bowdenfit.files.table_parts import TableParts, count_numbers, is_measured, split_table
@@ -169,7 +169,7 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     wrong_width.refuse()
     below = (*parts.units, *[""] * len(header))[: len(header)]
     units = tuple(
-        unit if heading_of(heading, unit).unit else _unit_in_cells([row[i] for row in cells])
+        _unit_of(heading, unit, header, [row[i] for row in cells])
         for i, (heading, unit) in enumerate(zip(header, below, strict=True))
     )
     account = _account(name, lines, rows, parts, len(header))
@@ -240,8 +240,14 @@ def _number_in(text: str) -> str:
     return parts.number if parts else text
 
 
-def _unit_in_cells(cells: Sequence[Cell]) -> str:
-    """Return the first unit that stands in cells of which most hold numbers; empty where none does."""
+def _unit_of(heading: str, below: str, header: Sequence[str], cells: Sequence[Cell]) -> str:
+    """Return the unit of a column where its own heading has none: that below it, or of the heading that it repeats, or of the
+    first of its cells that has one, if most hold numbers; else empty.
+    """
+    if heading_of(heading, below).unit:
+        return below
+    if unit := heading_of(repeated_heading(heading, header)).unit:
+        return unit
     unit = next((cell.unit for cell in cells if cell.unit), "")
     numbers = sum(is_measured(cell.text) for cell in cells) if unit else 0
     return unit if 2 * numbers > sum(not cell.blank for cell in cells) else ""

@@ -43,6 +43,7 @@ FORCES = (Quantity("input_force", "force"), Quantity("output_force", "force"))
 BESIDE_FORCES = (
     *(Quantity(name, "text") for name in ("run", "stroke", "group")),
     Quantity("efficiency", "ratio"),
+    Quantity("loss", "ratio"),
     Quantity("velocity", "speed"),
     Quantity("wrap_angle", "angle"),
     Quantity("wrap_angle_sd", "angle"),
@@ -117,7 +118,8 @@ def guess_file_kind(path: Path, has_channels: bool = False, named: Sequence[str]
         DatasetError: The file is missing or empty, or no text although its ending says so.
     """
     if named:
-        kind = "efficiencies" if "efficiency" in named else "displacement" if "displacement" in named else "forces"
+        is_ratio = "efficiency" in named or "loss" in named
+        kind = "efficiencies" if is_ratio else "displacement" if "displacement" in named else "forces"
         return FileKind(kind, "its columns are named with --column")
     if has_channels:
         return FileKind("recordings", "its channels are named with --channel")
@@ -150,7 +152,7 @@ def _guess_by_columns(path: Path, table: RawTable) -> FileKind:
     clock = next((i for i, _ in enumerate(table.header) if _is_time(table, i)), None)
     quantities = {name for name, columns in find_candidates(_headings(table), COLUMNS).items() if columns}
     forces = {quantity.name for quantity in FORCES}
-    kind = "efficiencies" if "efficiency" in quantities and not forces <= quantities else "forces"
+    kind = "efficiencies" if quantities & {"efficiency", "loss"} and not forces <= quantities else "forces"
     rows_alone = next((name for name in ("run", "stroke", "group") if name in quantities), "")
     if _has_one_force_and_a_position(table):
         return FileKind("displacement", "it has one force and a displacement")
@@ -242,13 +244,20 @@ def _steps(table: RawTable, column: int) -> list[float]:
 
 def _is_smooth(table: RawTable) -> bool:
     """Return whether the first force changes from row to row as a sampled one does, through many values."""
-    for i, (heading, unit) in enumerate(_headings(table)):
-        other = parse_heading(heading, unit)
-        if heading_of(heading, unit).unit not in {"N", "kN", "lbf"} and not (other and "force" in other.quantity):
-            continue
+    for i in _columns_of_forces(table):
         values = np.array(read_numbers(table, i))
         values = values[np.isfinite(values)]
+        if len(values) < 2 or np.ptp(np.diff(values)) == 0:  # an index
+            continue
         spread = float(np.var(values)) if len(values) > _LONG else 0.0
         spreads = len(set(values.tolist())) > len(values) / 4 and (values.min() <= 0 or count_loads(values) is None)
         return spread > 0 and spreads and float(np.mean(np.diff(values) ** 2)) < 2 * _SMOOTH * spread
     return False
+
+
+def _columns_of_forces(table: RawTable) -> list[int]:
+    """Return the columns that are forces by their unit or heading; where none is, those without a unit."""
+    units = [heading_of(heading, unit).unit for heading, unit in _headings(table)]
+    named = [parse_heading(heading, unit) for heading, unit in _headings(table)]
+    forces = [i for i, other in enumerate(named) if units[i] in {"N", "kN", "lbf"} or (other and "force" in other.quantity)]
+    return forces or [i for i, unit in enumerate(units) if not unit]

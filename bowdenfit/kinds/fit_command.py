@@ -11,6 +11,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming
+from bowdenfit.files.layout import is_index
 from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.file_kind import (
@@ -31,6 +32,7 @@ _SPREAD = re.compile(
 
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
+_FEW = 20  # rows up to which 1, 2, 3 may be loads as well as an index; a judgement
 _MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
 
 
@@ -42,6 +44,7 @@ class HeadedColumn:
         name: What it is called.
         unit: Unit that the file gives; empty without one.
         mean, low, high: Of its values.
+        is_index: Whether it only counts the rows.
     """
 
     name: str
@@ -49,6 +52,7 @@ class HeadedColumn:
     mean: float = 0.0
     low: float = 0.0
     high: float = 0.0
+    is_index: bool = False
 
 
 def list_number_columns(table: RawTable) -> list[HeadedColumn]:
@@ -61,12 +65,17 @@ def list_number_columns(table: RawTable) -> list[HeadedColumn]:
             and len(known) > len(table.rows) / 2
             and not (names_time(heading) and not parse_heading(heading, unit))
         ):
-            columns.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known)))
+            counts = len(known) > _FEW and is_index(np.array(known))
+            columns.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known), counts))
     return columns
 
 
 def name_force_columns(
-    columns: Sequence[HeadedColumn], option: str, stated: Mapping[str, ColumnSource], always: bool = False
+    columns: Sequence[HeadedColumn],
+    option: str,
+    stated: Mapping[str, ColumnSource],
+    always: bool = False,
+    in_order: bool = False,
 ) -> tuple[list[str], list[str]]:
     """Return the options that name the forces at both ends, and what they take for granted.
 
@@ -75,6 +84,8 @@ def name_force_columns(
         option: "--column" or "--channel".
         stated: What the user has named already, by quantity.
         always: Whether forces are named that say themselves what they are.
+        in_order: Whether the first of two unnamed forces is taken for the input, rather than the larger: over both strokes the
+            output is the larger one on average.
     """
     columns = [column for column in columns if column.name not in [source.name for source in stated.values()]]
     can_be = find_candidates([(column.name, column.unit) for column in columns], FORCES, tuple(stated))
@@ -85,7 +96,7 @@ def name_force_columns(
     missing = [name for name in unnamed if name not in ends]
     others = _forces_among([column for column in columns if column not in ends.values()])
     if missing and len(others) == len(missing):
-        others = sorted(others, key=lambda column: -column.mean)  # a pulled cable loses force
+        others = others if in_order else sorted(others, key=lambda column: -column.mean)  # a pulled cable loses force
         ends |= dict(zip(missing, others, strict=True))
         provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
     elif missing:
@@ -105,7 +116,7 @@ def name_force_columns(
 
 def _forces_among(columns: Sequence[HeadedColumn]) -> list[HeadedColumn]:
     """Return the columns that can be forces: those in units of force, or else those without any unit."""
-    measured = [column for column in columns if not _SPREAD.search(column.name)]
+    measured = [column for column in columns if not (_SPREAD.search(column.name) or column.is_index)]
     of_force = [column for column in measured if (unit := _unit(column)) and is_unit(unit) and dimension_of(unit) == "force"]
     return of_force or [column for column in measured if not _unit(column)]
 
@@ -147,7 +158,8 @@ def make_table_command(
     if kind == "forces":
         numbers, others = list_number_columns(table), _find_other_columns(headings)
         words, could_be = _find_columns_of_words(headings, numbers), [column for column in numbers if column.name not in others]
-        options, provided = name_force_columns(could_be, "--column", {**words, **stated}, always)
+        in_order = bool(find_candidates(headings, BESIDE_FORCES)["stroke"])
+        options, provided = name_force_columns(could_be, "--column", {**words, **stated}, always, in_order)
     angle, of_angle = ([], []) if WRAP_ANGLE.name in stated else _wrap_angle_options(table, path)
     command = _make_command(path, [*angle, *_column_options(stated, "--column"), *options], [*of_angle, *provided])
     named = [option for option in (*angle, *options) if option.startswith("--column")]
@@ -170,7 +182,7 @@ def make_recording_command(
         stated: What the user has named already, by quantity.
         always: Whether channels are named that say themselves what they are.
     """
-    options, provided = name_force_columns(columns, "--channel", stated, always)
+    options, provided = name_force_columns(columns, "--channel", stated, always, in_order=True)
     if not has_clock and "time" not in stated:
         options.append("--channel time=RATE")
         provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not say")
@@ -182,7 +194,8 @@ def make_both_commands(path: Path, table: RawTable, guess: FileKind) -> list[Fit
     """Make the commands that fit a file as a table and as a recording, in this order."""
     kind = guess.kind if guess.other == "recordings" else guess.other
     clocks = [i for i, heading in enumerate(table.header) if names_time(heading)]
-    channels = [HeadedColumn(*_split_heading(column.name, column.unit), column.mean) for column in list_number_columns(table)]
+    numbers = [column for column in list_number_columns(table) if not column.is_index]
+    channels = [HeadedColumn(*_split_heading(column.name, column.unit), column.mean) for column in numbers]
     return [make_table_command(path, table, kind, {}, True), make_recording_command(path, channels, bool(clocks), {}, True)]
 
 

@@ -50,7 +50,7 @@ def read_strokes(columns: Mapping[str, Column], n_rows: int, held: str = _HELD) 
     """
     if "stroke" not in columns:
         return np.ones(n_rows, dtype=int)
-    return np.array(columns["stroke"].read_cells(lambda cell: _stroke(cell, held, _STROKES), 1))
+    return np.array(columns["stroke"].read_cells(lambda cell: read_stroke(cell, held), 1))
 
 
 def read_strokes_by_loss(columns: Mapping[str, Column], loss: Vector) -> tuple[Labels, list[str]]:
@@ -81,7 +81,7 @@ def read_strokes_by_loss(columns: Mapping[str, Column], loss: Vector) -> tuple[L
             "the force arrives at the output in it."
         ]
     strokes = {**_STROKES, one: stroke, other: -stroke}
-    return np.array(column.read_cells(lambda cell: _stroke(cell, _HELD, strokes), 1)), remark
+    return np.array(column.read_cells(lambda cell: read_stroke(cell, _HELD, strokes), 1)), remark
 
 
 def _opposite_words(cells: Sequence[Cell]) -> tuple[str, str] | None:
@@ -109,7 +109,14 @@ def _plain_word(cell: Cell) -> str:
     return text.replace("stroke", "").strip(" -") or text if text.endswith("stroke") else text
 
 
-def _stroke(cell: Cell, held: str, strokes: Mapping[str, int]) -> int:
+def read_stroke(cell: Cell, held: str = _HELD, strokes: Mapping[str, int] = _STROKES) -> int:
+    """Return the stroke that a cell says: 1 of a pull, -1 of a return, 0 where the rope was held.
+
+    Args:
+        cell: The cell.
+        held: What a refusal says of held readings.
+        strokes: Known words, and the stroke of each.
+    """
     word = _plain_word(cell)
     if word not in strokes:
         raise cell.refuse(

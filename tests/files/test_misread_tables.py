@@ -5,6 +5,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.files.tables import read_csv
+from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 
 HEADING = "input_force_N,output_force_N\n"
 
@@ -305,3 +306,97 @@ def test_a_file_in_utf_16_may_have_remarks_in_any_language(tmp_path, remark):
     text = f"# {remark}\ninput_force_N,output_force_N,{remark.replace(',', '')}\n10,8,{remark}\n20,16,\n30,24,\n"
     (tmp_path / "t.csv").write_text(text, encoding="utf-16")
     assert len(read_csv(tmp_path / "t.csv").rows) == 3
+
+
+RUNS = ["run,stroke,input_force_N,output_force_N", *(f"{i},pull,{10 * i},{7 * i}.5" for i in range(1, 7))]
+OTHER_ORDER = ["stroke,run,output_force_N,input_force_N", *(f"pull,{i},{7 * i}.5,{10 * i}" for i in range(7, 10))]
+
+
+@pytest.mark.parametrize("below", [OTHER_ORDER, ["one,two,three,four", *RUNS[1:3]]])
+def test_readings_below_other_headings_are_refused(tmp_path, below):
+    assert "table.csv, row 8: words stand in every column" in refused(tmp_path, "\n".join([*RUNS, *below]) + "\n")
+
+
+def test_readings_above_the_headings_of_most_rows_are_refused(tmp_path):
+    text = "\n".join([*OTHER_ORDER, *RUNS]) + "\n"
+    assert "table.csv, row 2: a row of a table ('pull 7 49.5 70') stands above the headings in row 5" in refused(tmp_path, text)
+
+
+def test_headings_may_come_again_in_another_spelling(tmp_path):
+    again = ["Run,Stroke,Input force N,Output Force [N]", "8,pull,80,56.5", "9,pull,90,63.5"]
+    (tmp_path / "table.csv").write_text("\n".join([*RUNS, *again]) + "\n")
+    assert len(read_csv(tmp_path / "table.csv").rows) == 8
+
+
+def test_a_column_that_pandas_numbered_is_not_passed_over(tmp_path, run):
+    (tmp_path / "t.csv").write_text("input_force_N,output_force_N,output_force_N.1\n20,15,14\n40,31,30\n60,46,44\n")
+    code, out, _ = run("check", tmp_path / "t.csv")
+    assert code == 2 and "'output_force_N' and 'output_force_N.1' both look like output_force" in " ".join(out.split())
+    code, out, _ = run("check", tmp_path / "t.csv", "--column", "output_force=output_force_N.1")
+    assert code == 0 and "output_force_N 14.000" in out
+
+
+def test_forces_that_pandas_numbered_are_proposed_in_their_order(tmp_path, run):
+    rows = "\n".join(f"{stroke},{f},{factor * f}" for f in (20, 40, 60) for stroke, factor in (("pull", 0.7), ("return", 1.4)))
+    (tmp_path / "t.csv").write_text(f"stroke,Force (N),Force (N).1\n{rows}\n")
+    _, out, _ = run("check", tmp_path / "t.csv")
+    assert "--column input_force='Force (N)' --column output_force='Force (N).1'" in " ".join(out.replace("\\", "").split())
+    named = ["--column", "input_force=Force (N)", "--column", "output_force=Force (N).1"]
+    assert run("check", tmp_path / "t.csv", *named)[0] == 0
+
+
+def test_a_column_that_is_read_already_is_not_proposed_for_another_quantity(tmp_path):
+    assert "is it" not in refused(tmp_path, "Input force (N),Loss (X)\n20,5\n40,9\n")
+
+
+def efficiencies(tmp_path, text):
+    (tmp_path / "t.csv").write_text(text)
+    return bf.read(tmp_path / "t.csv").measurements.table(EfficiencyTable).efficiency.tolist()
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [("Loss (%)", ("20", "35")), ("Verlust", ("0.2", "0.35")), ("loss", ("20 %", "35 %")), ("Output/Input (%)", ("80", "65")),
+     ("F_out/F_in", ("0.8", "0.65")), ("force ratio [%]", ("80", "65"))],
+)  # fmt: skip
+def test_losses_and_ratios_are_read_as_efficiencies(tmp_path, heading, cells):
+    assert np.allclose(efficiencies(tmp_path, f"wrap_angle_deg,{heading}\n90,{cells[0]}\n180,{cells[1]}\n"), [0.8, 0.65])
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("wrap_angle_deg,loss\n90,20\n180,35\n", "if it is in percent, name the column loss_percent"),
+        ("wrap_angle_deg,Loss (N)\n90,2\n180,3\n", "'N' does not measure a ratio"),
+        ("run,wrap_angle_deg,efficiency\nA,90,0.8\nA,90,0.81\nB,180,0.7\n", "run 'A' has an efficiency in row 2 too"),
+        ("stroke,wrap_angle_deg,efficiency\npull,90,0.8\nreturn,90,0.81\n", "'return' is not pulling"),
+    ],
+)
+def test_efficiencies_that_would_be_misread_are_refused(tmp_path, text, what):
+    with pytest.raises(bf.DatasetError, match=what):
+        efficiencies(tmp_path, text)
+
+
+def test_runs_of_efficiencies_may_come_back_at_another_bend(tmp_path):
+    text = "run,stroke,wrap_angle_deg,efficiency\nA,pull,90,0.8\nA,pull,180,0.71\nB,pull,180,0.7\n"
+    assert efficiencies(tmp_path, text) == [0.8, 0.71, 0.7]
+
+
+@pytest.mark.parametrize("code", ["-9999", "-999.9", "-999.0", "-99", "-32768"])
+def test_a_code_for_a_missing_reading_in_a_table_is_named(tmp_path, code):
+    said = refused(tmp_path, f"{HEADING}20,15\n40,{code}\n60,46\n")
+    assert f"row 3, column 'output_force_N': '{code}' is a code that programs write where a reading is missing" in said
+
+
+@pytest.mark.parametrize("heading", ["input_force_N,output_force_N", "cell A,cell B", "Sample,cell A,cell B"])
+def test_a_recording_without_a_clock_is_asked_about(tmp_path, run, heading):
+    force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, 600))
+    noise = np.random.default_rng(1).normal(0, 0.1, (600, 2))
+    output = np.where(np.gradient(force) > 0, 0.7, 1.4) * force
+    index = "{0}," if heading.startswith("Sample") else ""
+    rows = [(index + "{1:.3f},{2:.3f}").format(i, force[i] + noise[i, 0], output[i] + noise[i, 1]) for i in range(600)]
+    (tmp_path / "log.csv").write_text("\n".join([heading, *rows]) + "\n")
+    code, out, _ = run("check", tmp_path / "log.csv")
+    assert code == 2 and "To fit it as a table:" in out and "--channel time=RATE" in out
+    if "cell A" in heading:
+        assert "--channel input_force='cell A:N'" in out

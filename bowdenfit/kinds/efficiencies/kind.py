@@ -1,6 +1,6 @@
 """Transmission efficiencies, output force over input force while pulling: how they are read, checked and described."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -40,10 +40,12 @@ from bowdenfit.kinds.rows import (
     route_heading,
     shared_columns,
 )
+from bowdenfit.kinds.strokes import read_stroke
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.types import Vector
 from bowdenfit.words import counted, listed, percent
 
+LOSS = Quantity("loss", "ratio")
 _FRACTION = 0.01  # efficiency up to which a percentage is as likely a fraction; a judgement
 _SDS = 4.5  # stated standard deviations above 1: one healthy row of 300,000 exceeds it
 
@@ -100,15 +102,22 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         """
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
         table = read_table(path)
-        names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"))
-        columns = find_columns(table, (*names, *shared_columns(route, contacts)), source.columns)
-        column = require_column(table, columns, "efficiency", "efficiency (0 to 1) or efficiency_percent")
-        sd, spread = [0.0] * len(table.rows), columns.get("efficiency_sd")
+        names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"), LOSS, Quantity("loss_sd", "ratio"))
+        labels = (Quantity("run", "text"), Quantity("stroke", "text"))
+        columns = find_columns(table, (*names, *labels, *shared_columns(route, contacts)), source.columns)
+        is_loss = "efficiency" not in columns and LOSS.name in columns
+        name = LOSS.name if is_loss else "efficiency"
+        column = require_column(table, columns, name, "efficiency (0 to 1) or efficiency_percent")
+        sd, spread = [0.0] * len(table.rows), columns.get(f"{name}_sd")
         if spread is not None:
             beside = {cell.row: cell for cell in column.cells}
             sd = spread.read_cells(lambda c: 0.0 if c.blank else _read_efficiency_sd(c, spread, beside[c.row], column), 0.0)
         errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
-        efficiency = column.read_cells(lambda cell: _read_efficiency(cell, column, errors[cell.row]), np.nan)
+        efficiency = column.read_cells(
+            lambda cell: _read_loss(cell, column) if is_loss else _read_efficiency(cell, column, errors[cell.row]), np.nan
+        )
+        if "stroke" in columns:
+            columns["stroke"].read_cells(_check_pulling, 0)
         rows = EfficiencyTable(
             read_route(table, columns, route),
             np.array(efficiency),
@@ -117,6 +126,8 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             origin_of_rows(table),
             read_unused_columns(table, columns),
         )
+        if "run" in columns:
+            _refuse_shared_runs(columns["run"].cells, rows)
         remarks = (*_remark_fractions(column, rows), *remark_on_errors_in_cells(table, columns))
         return TableFromFiles(rows, {path.name: path}, remarks, (table.account,))
 
@@ -184,6 +195,36 @@ def _remark_fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]
     )
 
 
+def _check_pulling(cell: Cell) -> int:
+    """Refuse a row that was not read while pulling."""
+    stroke = read_stroke(cell)
+    if stroke != 1:
+        raise cell.refuse(
+            f"{cell.shown} is not pulling, and an efficiency is output over input force while pulling; leave rows of other "
+            "strokes out, or give the forces at both ends, input_force and output_force, in place of efficiencies."
+        )
+    return stroke
+
+
+def _refuse_shared_runs(labels: Sequence[Cell], table: EfficiencyTable) -> None:
+    """Refuse several efficiencies of one run at one length and bend, which are not independent.
+
+    Raises:
+        DatasetError: There are such.
+    """
+    conditions = np.nan_to_num(np.column_stack([table.route, table.own.angle]))
+    first: dict[tuple[object, ...], Cell] = {}
+    for cell, condition in zip(labels, conditions, strict=True):
+        before = first.setdefault((cell.text.strip(), *condition), cell)
+        if before is not cell:
+            raise cell.refuse(
+                f"run {cell.shown} has an efficiency in row {before.row} too. Efficiencies of one run (one mounting of the "
+                "cable) share its error, and here each row counts as a mounting of its own, so that intervals would be too "
+                "narrow: write the mean of each run in one row, or give the forces at both ends, input_force and output_force, "
+                "in place of efficiencies; rename the column if it is something else than runs."
+            )
+
+
 def _read_ratio(cell: Cell, column: Column) -> float:
     """Return a number, or a percentage where the heading or the cell says so [1]."""
     percentage = cell.percentage()
@@ -208,6 +249,17 @@ def _read_efficiency(cell: Cell, column: Column, sd: float) -> float:
         noise = "" if sd else ", or state its standard deviation in efficiency_sd if noise did that"
         raise cell.refuse(f"an efficiency of {cell.shown} is above 1; {usual}{noise}.")
     return value
+
+
+def _read_loss(cell: Cell, column: Column) -> float:
+    """Return the efficiency that a loss leaves, of the input force [1]; one slightly below 0 may be noise."""
+    value = _read_ratio(cell, column)
+    if not -GAIN_ERROR <= value < 1:
+        usual = "" if _is_in_percent(cell, column) else "; if it is in percent, name the column loss_percent"
+        raise cell.refuse(
+            f"a loss of {cell.shown} is not possible; it is the share of the input force that does not arrive{usual}."
+        )
+    return 1 - value
 
 
 def _read_efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency_column: Column) -> float:

@@ -11,6 +11,8 @@ Sampler = Literal["emcee", "nuts", "both"]
 FEWEST_WALKERS = 128  # of an ensemble, where nothing is said of it; twice as many cost twice as much and settle no sooner
 WALKERS_PER_PARAMETER = 4  # so that a distribution can be fitted to half of them
 THIN = 10  # steps of a walker from one state that is stored to the next; draws are those of the second half
+KEPT_PER_WALKER = 20  # least number of draws kept of each walker, spread over the second half of its path
+KEPT_OF_CHAINS = 20_480  # least number of draws kept of all chains of NUTS, evenly spread; as many as of walkers by default
 _OR_ZERO = BeforeValidator(lambda stated: {"value": 0.0, "unit": "N"} if stated == 0 else stated)  # 0 needs no unit
 
 
@@ -123,6 +125,17 @@ class SamplerSettings(Frozen):
     def walkers(self, size: int) -> int:
         """Walkers of each ensemble for so many parameters."""
         return self.n_walkers or max(FEWEST_WALKERS, WALKERS_PER_PARAMETER * size)
+
+    def numbers_while_sampling(self, size: int) -> int:
+        """Numbers in all states after `max_steps`, for so many parameters; of two samplers the more."""
+        of_walkers = self.n_ensembles * self.walkers(size) * size * self.max_steps // THIN
+        of_chains = self.n_chains * size * self.max_steps
+        return {"emcee": of_walkers, "nuts": of_chains, "both": max(of_walkers, of_chains)}[self.method]
+
+    def kept_draws(self, size: int) -> int:
+        """Draws that a fit of so many parameters keeps."""
+        of_walkers, enough = self.n_ensembles * self.walkers(size) * KEPT_PER_WALKER, 2 * self.target_ess
+        return max(enough, KEPT_OF_CHAINS if self.method == "nuts" else of_walkers)
 
     @property
     def most_draws(self) -> int:

@@ -20,7 +20,7 @@ import jax
 import numpy as np
 
 from bowdenfit.description import SamplerSettings
-from bowdenfit.description.defaults import THIN
+from bowdenfit.description.defaults import KEPT_PER_WALKER, THIN
 from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, describe_stuck_walkers, worst_diagnostics
 from bowdenfit.inference.checkpoint import append_record, damaged_checkpoint_error, read_records
 from bowdenfit.inference.least_squares import MaximumPosterior
@@ -33,7 +33,6 @@ _FIRST_CHECK = 60
 _PATIENCE = 2 * _FIRST_CHECK  # stored states after which walkers that have not converged run `WalkerPrograms.later`
 # shapes of the state of the random generator
 _GENERATOR_SHAPES = {"random_key": (624,), "random_place": (2,), "random_normal": ()}
-_KEPT_PER_WALKER = 20  # least number of draws kept of each walker, spread over the second half of its path
 
 
 class EnsembleMove(emcee.moves.Move):
@@ -178,7 +177,7 @@ class CheckpointedBackend(emcee.backends.Backend):
 def _summarize(request: SamplingRequest, backend: emcee.backends.Backend) -> Chain:
     """Return draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
-    n_kept = max(_KEPT_PER_WALKER, 2 * request.settings.target_ess // backend.shape[0])
+    n_kept = max(KEPT_PER_WALKER, 2 * request.settings.target_ess // backend.shape[0])
     kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, n_kept)).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
     z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))

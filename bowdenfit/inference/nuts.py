@@ -25,6 +25,7 @@ from blackjax.mcmc import nuts
 from jax import Array
 
 from bowdenfit.description import SamplerSettings
+from bowdenfit.description.defaults import KEPT_OF_CHAINS
 from bowdenfit.inference.chain import Chain, Progress, SamplingRequest, describe_stuck_walkers, worst_diagnostics
 from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.compilation import compile_program
@@ -40,7 +41,6 @@ MOST_DOUBLINGS = 10  # largest tree depth of a trajectory, blackjax's and Stan's
 # One trajectory in FINE_EVERY takes steps FINE_FACTOR times finer; FINE_EVERY divides BLOCK.
 FINE_EVERY, FINE_FACTOR = 10, 16
 _FIRST_CHECK = 5  # blocks of draws before convergence is first checked
-_KEPT = 20_480  # least number of draws kept of all chains, evenly spread; as many as emcee keeps by default
 _FIRST_STEP, _STREAM = 0.1, 3
 _STATISTICS = ("diverging", "energy", "acceptance_rate", "tree_depth", "n_steps")
 
@@ -226,7 +226,7 @@ def _summarize(request: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain
     samples = {name: np.concatenate([b[name] for b in blocks[WARM_UP:]]) for name in ("z", *_STATISTICS)}
     steps, chains = samples["energy"].shape
     fine = _is_fine(steps)
-    n_kept = max(_KEPT, 2 * request.settings.target_ess) // chains
+    n_kept = max(KEPT_OF_CHAINS, 2 * request.settings.target_ess) // chains
     kept = np.unique(np.linspace(0, steps - 1, min(steps, n_kept)).round().astype(int))
     z = np.ascontiguousarray(samples["z"][kept].transpose(1, 0, 2))
     trajectories = Trajectories(

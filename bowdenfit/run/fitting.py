@@ -27,6 +27,7 @@ from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.model import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
+from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 
 _SLOW_IMPORTS = ("emcee", "arviz_stats.base", "arviz_stats.ecdf_utils")  # which get their time while XLA compiles
 PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
@@ -83,11 +84,16 @@ def fit_posterior(
         start_checkpoint: Called before the first draw; returns the checkpoint.
         resume: Whether the checkpoint holds draws to go on from.
         report: Called after every block of draws with where sampling stands.
+
+    Raises:
+        BowdenfitError: Coefficients cannot be told apart, or draws would not fit into memory.
     """
     watch, beside = Stopwatch(), Stopwatch()
     density, settings = LogDensity(build_model(data)), data.description.sampler
     with ThreadPoolExecutor(1) as classical, ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as importing:
         maximum = classical.submit(find_maximum, density, beside)
+        refuse_undetermined(density.model, lambda: maximum.result()[1])
+        refuse_large_sampling(density.model)
         squares = classical.submit(lambda: estimate(density, *maximum.result(), beside))  # one thread: after the other
         for library in _SLOW_IMPORTS:
             importing.submit(import_module, library)

@@ -71,7 +71,7 @@ _COMMON_UNITS = {
     "N/mm": ("stiffness", 1.0),
 }
 _WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "oz": "ozf"}
-_PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm"}  # the last is German
+_PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N"}
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
 _DEGREE, _DEGREE_OR_GON = re.compile(r"\bGrad\b"), re.compile(r"\bgrad\b")  # the first is German, and giga-radians to pint

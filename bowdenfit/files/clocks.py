@@ -22,6 +22,12 @@ from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
 
 _TIME_WORDS = {"time", "timestamp", "datetime", "elapsed", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"}
+_UNITS_AS_NAMES = {
+    "ms": "ms millis milliseconds millisekunden",
+    "us": "us µs μs micros microseconds",
+    "s": "sec secs seconds sekunden",
+}
+_UNIT_OF_NAME = {name: unit for unit, names in _UNITS_AS_NAMES.items() for name in names.split()}
 _LABVIEW = "x_value"
 _SECOND_SPELLINGS = {"sek", "sek.", "sec.", "seg", "secs"}
 _RATIO = re.compile(r"[A-Za-z]_?\d?/[A-Za-z]_?\d?")  # of two symbols, such as T/t
@@ -142,6 +148,11 @@ def is_clock(channel: Channel) -> bool:
     return factor is not None and forward
 
 
+def unit_of_time(heading: str) -> str:
+    """Return the unit of time that a heading is itself, such as "millis" of an Arduino; empty for any other."""
+    return _UNIT_OF_NAME.get(heading.strip().lower(), "")
+
+
 def names_time(heading: str) -> bool:
     """Return whether a heading means time: "Time (s)", "t", "Zeit_ms", "45 time", "X_Value" of LabVIEW."""
     if _RATIO.fullmatch(heading.strip()):
@@ -149,7 +160,7 @@ def names_time(heading: str) -> bool:
     plain = heading.rpartition("/")[2].strip().lower()
     words = [word for word in re.split(r"[\W\d_]+", plain) if word]
     if not {*words[:1], *words[-2:]} & {*_TIME_WORDS, "t"}:  # before a last word is looked up among all units
-        return plain == _LABVIEW
+        return plain == _LABVIEW or bool(unit_of_time(plain))
     named = words[:-1] if len(words) > 1 and _time_factor(words[-1]) is not None else words
     ends = {*named[:1], *named[-1:]}
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW

@@ -57,6 +57,7 @@ from bowdenfit.files.text_file import (
     split_cells,
     split_records,
 )
+from bowdenfit.units import is_unit
 
 LARGEST_BYTES = 2 << 30  # judged: some 80 million rows of a time and two forces, a day at 1 kHz
 _FIRST_BYTES = 1 << 18  # judged: far more than the lines over the data and `_FIRST_LINES` rows have
@@ -66,6 +67,7 @@ _FEW_BYTES = 1 << 16  # of data; cell by cell they take 0.03 s, and pandas 0.2 s
 _ROWS_AT_ONCE = 200_000  # some 10 MB of numbers a chunk, little beside what is kept
 _MANY_ROWS = 1 << 22  # from which memory counts: see `read`
 _MARKS = sorted({form for mark in MISSING for form in (mark, mark.upper(), mark.capitalize(), mark.title())})
+_LABVIEW_UNITS = "Y_Unit_Label"  # whose cells stand over the columns of the data
 _CUT = "the file breaks off there"
 _FIRST_LINES = 300  # judged: in which headings and the first data must stand
 _HEADING_LINES = 12  # judged: lines over which a quoted heading may run
@@ -253,7 +255,7 @@ def read_start(path: Path, data: bytes) -> Sheet:
     layout, separator, decimal = max(layouts, key=lambda reading: _score_layout(reading[0]))
     below = rows[separator][layout.start :]
     above = [line for line in lines if line.start < below[0].start]
-    layout = _fit_layout(path, layout, below, separator, above)
+    layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
     over = tuple(rows[separator][i].row for i in layout.over)
     others = {line.row: _explain_row_above(line) for line in every if line.start < below[0].start and line.row not in over}
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
@@ -301,6 +303,17 @@ def _take_headings_from_comment(layout: Layout, separator: str, above: Sequence[
         if len(cells) == width and all(cell.strip() for cell in cells):
             return replace(layout, named=True, headings=tuple(map(heading_of, cells)))
     return replace(layout, named=False, headings=tuple(Heading(f"column{i + 1}") for i in range(width)))
+
+
+def _take_units_of_labview(layout: Layout, separator: str, above: Sequence[Line]) -> Layout:
+    """Return the layout with the units that the header of an LVM file has for columns whose headings have none."""
+    rows = [split_cells(line.text, separator) for line in above if line.text.startswith(_LABVIEW_UNITS)]
+    units = [cell.strip() for cell in rows[-1]] if rows else []
+    headings = [
+        replace(heading, unit=unit) if i and heading.name and not heading.unit and is_unit(unit) else heading
+        for i, (heading, unit) in enumerate(zip(layout.headings, units, strict=False))
+    ]
+    return replace(layout, headings=(*headings, *layout.headings[len(headings) :]))
 
 
 def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[int, int], stop: int) -> RowAccount:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from bowdenfit.errors import DatasetError, suggest_name
-from bowdenfit.files.clocks import names_time
+from bowdenfit.files.clocks import names_time, unit_of_time
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.units import ColumnSource, is_unit
 from bowdenfit.words import shown
@@ -80,7 +80,7 @@ def heading_of(text: str, unit: str = "") -> Heading:
     name, unit = split_brackets(plain)
     if name and unit not in {"", "-", "1"} and is_unit(unit):
         return Heading(name, unit)
-    return Heading(plain, _unit_behind(plain))
+    return Heading(plain, _unit_behind(plain) or unit_of_time(plain))
 
 
 def _unit_behind(heading: str) -> str:

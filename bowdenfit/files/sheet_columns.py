@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, classify_cell, parse_number
 from bowdenfit.files.channels import Channel, make_names_unique
 from bowdenfit.files.clocks import assign_clocks, parse_dates, trim_tails
@@ -136,6 +137,7 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
         if column == len(kinds):
             beside.append((row, _remark_beside(sheet, row, text)))
         elif kinds[column] == "number" or (sheet.of_text and kinds[column] == "blank"):
+            _refuse_other_headings(sheet, row, [cell_text(other) for at, _, other in cells.words if at == position])
             raise Cell(sheet.place, row, sheet.layout.name(column), text).no_sample(sheet.decimal)
     dropped = [REMARKED, SPACE, REMARK] if sheet.of_text else [REMARKED, REMARK]
     kept = ~np.isin(np.array(cells.letters[:stop]), dropped)
@@ -155,6 +157,21 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
     return SheetColumns(
         columns, _describe_left_out(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters)
     )
+
+
+def _refuse_other_headings(sheet: SheetRows, row: int, words: Sequence[str]) -> None:
+    """Refuse a row that has a word in every column, each another one, as headings do that are not those of the sheet.
+
+    Raises:
+        DatasetError: It is such a row.
+    """
+    columns = sum(kind != "blank" for kind in sheet.layout.kinds)
+    if len(words) >= columns > 1 and len({*words}) == len(words):
+        raise DatasetError(
+            f"{sheet.place}, row {row}: words stand in every column ({shown(' '.join(words))}), as headings do, but not those "
+            "at the top; the usual cause is a second recording behind the first. Put what is below into a file of its own, or "
+            "delete the row if its columns are the same."
+        )
 
 
 def _explain_left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[int, tuple[str, str]]:

@@ -78,7 +78,7 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
         DescriptionError: A key is unknown, or a value is missing or impossible.
     """
     kinds = tuple(KINDS.values())
-    description = validate(raw, _description_models(kinds)[0], file)
+    description = validate(_add_recordings(raw), _description_models(kinds)[0], file)
     faults = Faults()
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
@@ -89,6 +89,14 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
                 check_quantities(kind.quantities(settings, description), file)
     faults.refuse()
     return description
+
+
+def _add_recordings(raw: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the description with an empty table of recordings where there is a [[recording]] and nothing is said of all."""
+    tables = raw.get("tables", {})
+    if not raw.get("recording") or not isinstance(tables, Mapping) or "recordings" in tables:
+        return raw
+    return {**raw, "tables": {**tables, "recordings": {}}}
 
 
 def add_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dict[str, Any]:

@@ -196,9 +196,14 @@ def _guess_with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -
         return FileKind("recordings", why, kind)
     has_dates = not steps and any(is_date(row[clock].text.strip()) for row in table.rows[:_FEW])
     even = bool(steps) and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
-    if (steps and (float(np.median(steps)) < _SLOW or (even and many))) or (has_dates and many):
+    sampled = bool(steps) and (float(np.median(steps)) < _SLOW or (many and (even or _is_smooth(table))))
+    if sampled or (has_dates and many):
         return FileKind("recordings", f"it has a column of time, {heading}")
-    few = f"{len(table.rows)} rows" if not steps else f"{len(table.rows)} rows, {float(np.median(steps)):.3g} s apart"
+    apart = f"{float(np.median(steps)):.3g} s apart" if steps else ""
+    if many:
+        uneven = f"whose rows are uneven, about {apart}" if apart else "that holds no times"
+        return FileKind("recordings", f"it has a column of time, {heading}, {uneven}", kind)
+    few = f"{len(table.rows)} rows" + (f", {apart}" if apart else "")
     return FileKind("recordings", f"it has a column of time, {heading}, but only {few}", kind)
 
 

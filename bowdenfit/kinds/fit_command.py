@@ -172,6 +172,7 @@ def make_recording_command(
     has_clock: bool,
     stated: Mapping[str, ColumnSource],
     always: bool = False,
+    doubtful_clock: str = "",
 ) -> FitCommand:
     """Make the command that fits a recording.
 
@@ -181,11 +182,15 @@ def make_recording_command(
         has_clock: Whether the file gives the time of its samples.
         stated: What the user has named already, by quantity.
         always: Whether channels are named that say themselves what they are.
+        doubtful_clock: Name of a clock that says no unit and is unlikely to be in seconds; empty if there is none.
     """
     options, provided = name_force_columns(columns, "--channel", stated, always, in_order=True)
     if not has_clock and "time" not in stated:
         options.append("--channel time=RATE")
         provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not say")
+    elif doubtful_clock and "time" not in stated:
+        options.append(option_naming("time", doubtful_clock, "ms", "--channel"))
+        provided.append(f"{shown(doubtful_clock)} is in milliseconds, as the file does not say")
     angle, of_angle = _stated_angle_options(path)
     return _make_command(path, [*angle, *_column_options(stated, "--channel"), *options], [*of_angle, *provided])
 

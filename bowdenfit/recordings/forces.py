@@ -7,6 +7,7 @@ import numpy as np
 from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.headings import option_naming
 from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import RATE, TORQUES, WANTED, converted, find_channel, stated_unit
 from bowdenfit.recordings.recording import RawRecording
@@ -172,20 +173,27 @@ def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource |
     return converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
 
 
+def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
+    """Return the clock of a channel where it says no unit and would have the samples seconds apart; None for any other."""
+    clock = next((c for c in file.channels if c.name == channel.clock), None)
+    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
+        return None
+    step = float(np.nanmedian(np.diff(channel.time)))
+    return clock if step >= _SLOWEST and np.nanmax(np.abs(clock.values)) < _DATES else None
+
+
 def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
-    """Refuse a clock that says no unit and is unlikely to be in seconds, because its samples would be seconds apart.
+    """Refuse a clock that says no unit and is unlikely to be in seconds.
 
     Raises:
         DatasetError: It is such a clock.
     """
-    clock = next((c for c in file.channels if c.name == channel.clock), None)
-    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
+    if (clock := clock_in_doubt(file, channel)) is None or channel.time is None:
         return
-    step = float(np.nanmedian(np.diff(channel.time)))
-    if step >= _SLOWEST and np.nanmax(np.abs(clock.values)) < _DATES:
-        length = float(np.nanmax(channel.time) - np.nanmin(channel.time))
-        raise DatasetError(
-            f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
-            f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s. Say which it is: "
-            f"--channel time={clock.name}:ms, or --channel time={clock.name}:s."
-        )
+    step, length = float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
+    in_milliseconds, in_seconds = (option_naming("time", clock.name, unit, "--channel") for unit in ("ms", "s"))
+    raise DatasetError(
+        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
+        f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s. Say which it is: "
+        f"{in_milliseconds}, or {in_seconds}."
+    )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.files import read_channels
 from bowdenfit.files.tables import read_csv
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 
@@ -152,8 +153,6 @@ def test_an_index_beside_a_tdms_file_is_not_believed(tmp_path):
         with nptdms.TdmsWriter(path, index_file=True) as writer:
             writer.write_segment(channels)
 
-    from bowdenfit.files import read_channels
-
     write(str(tmp_path / "b.tdms"), "out", "in")
     write(str(tmp_path / "a.tdms"), "in", "out")
     (tmp_path / "b.tdms_index").replace(tmp_path / "a.tdms_index")
@@ -235,8 +234,6 @@ def twelve_hours(second, form="{h:02d}:{m:02d}:{s:02d} {half}"):
 )  # fmt: skip
 @pytest.mark.parametrize("start", [43200 - 100, 46800 - 100])
 def test_a_clock_of_twelve_hours_is_read(tmp_path, form, start):
-    from bowdenfit.files import read_channels
-
     path = clock_recording(tmp_path, [twelve_hours(start + i, form) for i in range(200)])
     channel = next(channel for channel in read_channels(path).channels if channel.name == "input_force_N")
     assert np.array_equal(channel.time, np.arange(200.0))
@@ -400,3 +397,67 @@ def test_a_recording_without_a_clock_is_asked_about(tmp_path, run, heading):
     assert code == 2 and "To fit it as a table:" in out and "--channel time=RATE" in out
     if "cell A" in heading:
         assert "--channel input_force='cell A:N'" in out
+
+
+def loop_forces(n=600):
+    """Forces at both ends over three cycles."""
+    force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, n))
+    noise = np.random.default_rng(1).normal(0, 0.1, (n, 2))
+    return force + noise[:, 0], np.where(np.gradient(force) > 0, 0.7, 1.4) * force + noise[:, 1]
+
+
+def log(tmp_path, heading, times, forces=None, below=()):
+    """Write a recording."""
+    force, output = forces or loop_forces(len(times))
+    rows = [f"{t:g},{a:.3f},{b:.3f}" for t, a, b in zip(times, force, output, strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([heading, *rows, *below]) + "\n", encoding="utf-8")
+    return tmp_path / "log.csv"
+
+
+@pytest.mark.parametrize(("name", "step"), [("millis", 20), ("ms", 20), ("micros", 20000), ("µs", 20000), ("Seconds", 0.02)])
+def test_a_clock_may_be_called_by_its_unit(tmp_path, run, name, step):
+    code, out, _ = run("check", log(tmp_path, f"{name},F_in (N),F_out (N)", step * np.arange(600)))
+    assert code == 0 and "a recording of 12 s" in " ".join(out.split()), out
+
+
+def test_the_command_for_a_clock_in_milliseconds_names_its_unit_and_works(tmp_path, run):
+    times = np.sort(20 * np.arange(600) + np.random.default_rng(2).integers(-10, 11, 600))
+    path = log(tmp_path, "time,F_in (N),F_out (N)", times)
+    code, out, _ = run("check", path)
+    assert code == 2 and "--channel time=time:ms" in out and "only" not in out
+    assert "a recording of 12 s" in " ".join(run("check", path, "--channel", "time=time:ms")[1].split())
+
+
+def test_a_second_heading_in_a_recording_is_named_as_one(tmp_path, run):
+    below = ["time_s,cell A,cell B", "20,30,21", "20.02,31,22"]
+    _, _, err = run("check", log(tmp_path, "time_s,F_in (N),F_out (N)", 0.02 * np.arange(600), below=below))
+    assert "row 602: words stand in every column ('time_s cell A cell B'), as headings do, but not those at the top" in err
+    _, _, err = run("check", log(tmp_path, "time_s,F_in (N),F_out (N)", 0.02 * np.arange(600), below=["20,bad,22", "21,30,22"]))
+    assert "row 602, column 'F_in': 'bad' is not a number" in err
+
+
+def test_tensions_of_a_pull_pull_pair_are_called_so(tmp_path, run):
+    force, _ = loop_forces()
+    path = log(tmp_path, "time_s,F_in (N),F_out (N)", 0.02 * np.arange(600), (force, 61 - force))
+    _, out, _ = run("check", path)
+    assert "the output falls where the input rises" in " ".join(out.split()) and "pull-pull pair" in " ".join(out.split())
+    rows = "".join(f"{f},{80 - f}\n" for f in (20, 30, 40, 50, 60, 25, 35, 45))
+    assert "the two tensions of a pull-pull pair" in refused(tmp_path, HEADING + rows)
+
+
+def test_units_in_the_header_of_an_lvm_file_are_read(tmp_path):
+    head = ["LabVIEW Measurement", "***End_of_Header***", "Channels\t2", "Y_Unit_Label\tNewton\tN", "***End_of_Header***"]
+    force, output = loop_forces()
+    rows = [f"{0.02 * i:.6f}\t{force[i]:.6f}\t{output[i]:.6f}\t" for i in range(600)]
+    (tmp_path / "a.lvm").write_text("\n".join([*head, "X_Value\tF_in\tF_out\tComment", *rows]) + "\n")
+    bf.read(tmp_path / "a.lvm", wrap_angle="180deg")
+    assert [channel.unit for channel in read_channels(tmp_path / "a.lvm").channels] == ["", "Newton", "N"]
+
+
+def test_a_description_of_recordings_alone_needs_no_tables(tmp_path):
+    log(tmp_path, "time_s,F_in (N),F_out (N)", 0.02 * np.arange(600))
+    (tmp_path / "cable.toml").write_text(
+        'schema = 1\nname = "x"\n[[contact]]\nname = "sheath"\nfriction = "mu"\n'
+        'wrap_angle = { value = 180, unit = "deg" }\n[[recording]]\nfile = "log.csv"\n'
+    )
+    assert len(bf.read(tmp_path).measurements.tables) == 1

@@ -368,7 +368,6 @@ DESCRIPTIONS = [
         ["'run'", "'sheath'", "wrap_angles ="],
     ),
     (with_key('[[recording]]\nfile = "run.csv"'), ["both called 'run'", "another name"]),
-    ([(OF_TABLE, "")], ["[[recording]] needs recordings = {}"]),
     (GLOB, ["names no file", 'files = "recordings/*.csv"']),
     ([*GLOB, (OF_TABLE, 'recordings = { files = "r/*.csv" }')], ["no file", "'r/*.csv'", "cable.toml"]),
     (

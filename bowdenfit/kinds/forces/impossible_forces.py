@@ -38,6 +38,7 @@ _LEAST_FOR_LINE = 3  # readings of a cell above which a line with two coefficien
 _WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the slope is looked at
 _SURE = 3.0  # standard errors of the slope
 _SLOPE = 0.5  # share of a rope's least slope
+_OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _EXPLAINED = 0.25  # share of the variance of the output
 _ZERO_ERROR = 0.005  # error of zero over the largest force where none is stated; a judgement
 _SDS = 3.0  # standard deviations of stated errors of the load cells that are allowed: 1 in 370 is beyond
@@ -166,13 +167,16 @@ def check_following(table: ForceTable) -> None:
         rows = np.flatnonzero(table.stroke == stroke)
         if _does_not_follow(table, rows, stroke):
             force_in, force_out = table.input_force[rows], table.output_force[rows]
+            opposed = np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSED
+            how_much = "falls where the input rises" if opposed else "hardly depends on it"
+            cause = "the two tensions of a pull-pull pair" if opposed else "a dead load cell"
             raise DatasetError(
                 f"{table.origin.describe_row(rows[0])} and on: while {how}, output_force does not follow input_force, "
                 f"which goes from {force_in.min():.4g} to {force_in.max():.4g} N while the output is "
-                f"{force_out.mean():.4g} N give or take {force_out.std():.2g} N, "
-                "and the input explains little of that; a rope transmits more force where more goes in. "
-                "The usual causes are a dead load cell, a column that is no force (a position, a time), and rows of one column "
-                "that belong beside others of the other; map the right columns in cable.toml, or leave these rows out."
+                f"{force_out.mean():.4g} N give or take {force_out.std():.2g} N, and {how_much}; a rope transmits more force "
+                f"where more goes in. The usual causes are {cause}, a column that is no force (a position, a time), and rows "
+                "of one column that belong beside others of the other; map the right columns in cable.toml, or leave these "
+                "rows out."
             )
 
 
@@ -190,7 +194,7 @@ def _does_not_follow(table: ForceTable, rows: np.ndarray, stroke: int) -> bool:
     slope, whole = float(x @ y) / spread, float(y @ y)
     unexplained = max(whole - slope**2 * spread, 0.0)
     explained = 1 - unexplained / whole if whole > 0 else 0.0
-    return explained < _EXPLAINED and slope + _SURE * np.sqrt(unexplained / freedom / spread) < _SLOPE
+    return (explained < _EXPLAINED or slope < 0) and slope + _SURE * np.sqrt(unexplained / freedom / spread) < _SLOPE
 
 
 @dataclass(frozen=True)

@@ -208,9 +208,7 @@ class RecordingKind(FrictionKind[Recordings]):
 
     @override
     def contradiction(self, settings: RecordingsTable | None, description: Description) -> str:
-        """Return that there are recordings without a table, a table without any, or a preparation that cannot be."""
-        if settings is None and description.recording:
-            return "[[recording]] needs recordings = {} under [tables], where what they share can be said"
+        """Return that there is a table without any recordings, or a preparation that cannot be."""
         if settings is not None and not (description.recording or settings.files):
             return (
                 'the table recordings names no file: write files = "recordings/*.csv", or a [[recording]] with its file'

@@ -37,6 +37,7 @@ from bowdenfit.questions.check.data_set_words import (
     describe_row_account,
 )
 from bowdenfit.reading import Reading
+from bowdenfit.recordings.forces import clock_in_doubt
 from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
@@ -160,7 +161,9 @@ def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str]) -
         HeadedColumn(signal.name, signal.unit, float(signal.values[signal.values == signal.values].mean()))
         for signal in signals
     ]
-    return make_recording_command(path, headed, any(signal.time is not None for signal in signals), parse_channels(channels))
+    has_clock = any(signal.time is not None for signal in signals)
+    in_doubt = [clock.name for signal in signals if (clock := clock_in_doubt(file, signal)) is not None]
+    return make_recording_command(path, headed, has_clock, parse_channels(channels), doubtful_clock="".join(in_doubt[:1]))
 
 
 def read_recording(path: str | Path, channels: Sequence[str] = ()) -> tuple[ChannelFile, Recordings | None, str]:

@@ -84,7 +84,7 @@ def deserialize(kind: Any, value: Any) -> Any:
     parts, origin = [part for part in get_args(kind) if part is not NoneType], get_origin(kind)
     if isinstance(kind, UnionType):
         return deserialize(parts[0], value)
-    if origin is dict:
+    if origin in (dict, Mapping):
         return {key: deserialize(parts[1], item) for key, item in value.items()}
     if origin is list:
         return [deserialize(parts[0], item) for item in value]
@@ -94,7 +94,8 @@ def deserialize(kind: Any, value: Any) -> Any:
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
         named = [(f, stored_key(f)) for f in fields(kind)]
-        present = [(f.name, key) for f, key in named if key in value or f.default is MISSING]  # others are newer than the data
+        required = [f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
+        present = [(f.name, key) for f, key in named if key in value or f.name in required]  # others are newer than the data
         return kind(**{name: deserialize(hints[name], value[key]) for name, key in present})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)

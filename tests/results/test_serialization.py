@@ -1,7 +1,8 @@
 """Any dataclass as plain data, and stored data back bit for bit."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -61,3 +62,15 @@ def test_stored_data_come_back_bit_for_bit():
         np.testing.assert_equal(other, one, err_msg=name)
         if isinstance(one, np.ndarray):
             assert (one.dtype, one.shape) == (other.dtype, other.shape), name
+
+
+@dataclass(frozen=True)
+class WithColumns:
+    vector: Vector
+    columns: Mapping[str, Vector] = field(default_factory=dict)
+
+
+def test_arrays_by_name_come_back_as_arrays_and_may_be_missing_in_older_data():
+    again = deserialize(WithColumns, serialize(WithColumns(np.array([1.0]), {"Trial": np.array([2.0, 3.0])})))
+    assert isinstance(again.columns["Trial"], np.ndarray) and again.columns["Trial"].tolist() == [2.0, 3.0]
+    assert deserialize(WithColumns, {"vector": [1.0]}).columns == {}

@@ -127,6 +127,7 @@ def is_unit(text: str) -> bool:
     return True
 
 
+@cache
 def dimension_of(unit: str) -> str:
     """Return which of the kinds of quantity in `INTERNAL_UNITS` a unit measures, or "other"."""
     if unit in _COMMON_UNITS:

@@ -8,10 +8,12 @@ import atexit
 import json
 import os
 import pickle
+import shutil
 import signal
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -35,6 +37,7 @@ _MEMORY, _MEMORY_PER_BYTE = 1 << 29, 40  # bytes; what libraries need by themsel
 _SECONDS, _SECONDS_PER_BYTE = 8.0, 4e-6  # of CPU
 _WALL = 8  # times the seconds of CPU, for machines that do much besides
 _IDLE = 20.0  # seconds after which a reader with nothing to do ends
+_KILLED = {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}
 _LENGTH, _NO_MEMORY = struct.Struct("<Q"), "no memory"
 LIMITS: ContextVar[float] = ContextVar("LIMITS", default=1.0)
 
@@ -93,18 +96,34 @@ def call_isolated(path: Path, reader: str, *arguments: Any) -> Any:
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
-    refuse_special(path)
-    limits = Limits.for_file(path)
+    for file in (path, *(path.iterdir() if path.is_dir() else ())):
+        refuse_special(file)
+    limits, key = Limits.for_file(path), _file_key(path)
+    if key in _too_costly:
+        raise DatasetError(_too_costly[key])
     with _request_lock:
         ended, content = _send_request(path, limits, reader, arguments)
+    refused, result = pickle.loads(content) if content else ("", None)  # noqa: S301  (of our own process)
+    excess = "memory" if refused == _NO_MEMORY else "time" if content is None and ended in _KILLED else ""
+    if excess:
+        _too_costly[key] = _describe_excess(path, limits, excess)
+        raise DatasetError(_too_costly[key])
     if content is None:
-        raise DatasetError(_describe_crash(path, limits, ended))
-    refused, result = pickle.loads(content)  # noqa: S301  (of our own process)
-    if refused == _NO_MEMORY:
-        raise DatasetError(_describe_excess(path, limits, "memory"))
+        raise DatasetError(_describe_crash(path))
     if refused:
         raise DatasetError(refused)
     return result
+
+
+_too_costly: dict[Any, str] = {}  # what was said of files that took too much, so that no other reader tries in vain
+
+
+def _file_key(path: Path) -> Any:
+    """Return what tells a file, as it is now, and the limits in force from others."""
+    if not path.exists():
+        return str(path)
+    status = path.stat()
+    return path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino, LIMITS.get()
 
 
 def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, ...]) -> tuple[int | None, bytes | None]:
@@ -129,6 +148,7 @@ def _send_request(path: Path, limits: Limits, name: str, arguments: tuple[Any, .
 _readers: dict[
     int, "subprocess.Popen[bytes]"
 ] = {}  # by process: a copy of this one starts its own, or answers would mix
+_scratch: dict[int, str] = {}  # folders for temporary files of readers, which may be killed, by process
 _request_lock = threading.Lock()
 
 
@@ -138,11 +158,14 @@ def _start_reader() -> "subprocess.Popen[bytes]":
     if own in _readers and _readers[own].poll() is not None:
         _end_reader(_readers[own])
     if own not in _readers:
-        command = [sys.executable, "-c", "from bowdenfit.files.apart import serve; serve()"]
+        _scratch[own] = tempfile.mkdtemp(prefix="bowdenfit-")
+        program = "import sys; from bowdenfit.files.apart import serve; serve(sys.argv[1])"
+        command = [sys.executable, "-c", program, _scratch[own]]
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
         place = str(Path(__file__).resolve().parents[2])
         paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
-        environment = {**os.environ, "PYTHONPATH": paths}
+        temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), _scratch[own])
+        environment = {**os.environ, "PYTHONPATH": paths, **temporary}
         _readers[own] = subprocess.Popen(command, **pipes, env=environment)  # noqa: S603  (our own)
     return _readers[own]
 
@@ -162,7 +185,9 @@ def _end_reader(reader: "subprocess.Popen[bytes]") -> int:
         assert stream is not None  # both are pipes
         with suppress(BrokenPipeError):
             stream.close()
-    return reader.wait()
+    ended = reader.wait()
+    shutil.rmtree(_scratch.pop(os.getpid()), ignore_errors=True)
+    return ended
 
 
 def _read_answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[bytes, bool]:
@@ -180,10 +205,8 @@ def _read_answer(reader: "subprocess.Popen[bytes]", seconds: float) -> tuple[byt
         killer.cancel()
 
 
-def _describe_crash(path: Path, limits: Limits, ended: int | None) -> str:
+def _describe_crash(path: Path) -> str:
     """Return what is said of a file at which the reader ended."""
-    if ended in {-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name)}:
-        return _describe_excess(path, limits, "time")
     return (
         f"{path.name} cannot be read: the library that reads such files crashed on it; copy the file again from the "
         "acquisition computer, or export the recording as CSV."
@@ -199,25 +222,38 @@ def _describe_excess(path: Path, limits: Limits, what: str) -> str:
     )
 
 
-def serve() -> None:
-    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while."""
+def serve(scratch: str) -> None:
+    """Read one file after the other, as asked on standard input, until that ends or nothing is asked for a while.
+
+    Args:
+        scratch: Folder for temporary files, removed at the end; whoever kills this process removes it otherwise.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that asks to handle
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print
-    while True:
-        idle = threading.Timer(_IDLE, os._exit, (0,))
-        idle.daemon = True
-        idle.start()
-        line = sys.stdin.buffer.readline()
-        idle.cancel()
-        if not line:
-            break
-        path, memory, seconds, name, arguments = json.loads(line)
-        _limit_process(memory, seconds)
-        content = pickle.dumps(_call(name, Path(path), arguments), protocol=5)
-        answers.write(_LENGTH.pack(len(content)) + content)
-        answers.flush()
-    os._exit(0)
+
+    def end(code: int = 0) -> None:
+        shutil.rmtree(scratch, ignore_errors=True)
+        os._exit(code)
+
+    code = 1
+    try:
+        while True:
+            idle = threading.Timer(_IDLE, end)
+            idle.daemon = True
+            idle.start()
+            line = sys.stdin.buffer.readline()
+            idle.cancel()
+            if not line:
+                break
+            path, memory, seconds, name, arguments = json.loads(line)
+            _limit_process(memory, seconds)
+            content = pickle.dumps(_call(name, Path(path), arguments), protocol=5)
+            answers.write(_LENGTH.pack(len(content)) + content)
+            answers.flush()
+        code = 0
+    finally:
+        end(code)
 
 
 def _call(name: str, path: Path, arguments: list[Any]) -> tuple[str, Any]:

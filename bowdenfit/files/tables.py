@@ -31,6 +31,7 @@ from bowdenfit.words import shown
 
 WORKBOOKS = (".xlsx", ".xlsm")
 _FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18  # judged: rows by which the separator is chosen, and bytes that hold as many
+_MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
 _LARGEST = 40e6  # bytes; some fifty times as many are needed to read them
 _SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
@@ -154,6 +155,12 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     Raises:
         DatasetError: See `read_csv`.
     """
+    width = max((len(row.cells) for row in rows), default=0)
+    if width > _MOST_COLUMNS:
+        raise DatasetError(
+            f"{name} has rows of {width:,} cells, and a table has at most {_MOST_COLUMNS:,} columns; the usual cause is a "
+            "table that was exported on its side, or without line ends: keep the columns of forces, angles, strokes and runs."
+        )
     parts = split_table(rows, name)
     header = _header(parts, name)
     if not parts.body:

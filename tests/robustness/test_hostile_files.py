@@ -5,6 +5,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 import time
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +17,7 @@ import scipy.io
 from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf
-from bowdenfit.files import read_channels
+from bowdenfit.files import apart, read_channels
 from bowdenfit.files.apart import Limits, limits_times
 
 pytestmark = pytest.mark.extended
@@ -213,6 +214,54 @@ def test_a_file_under_too_small_a_limit_names_the_option(tmp_path):
         read_channels(tmp_path / "bad.mat")
 
 
+def test_a_file_that_took_too_much_is_not_tried_again_until_it_changes(tmp_path):
+    structures(tmp_path / "bad.mat")
+    with limits_times(0.1):
+        with pytest.raises(bf.DatasetError, match="--reading-limit 4") as first:
+            read_channels(tmp_path / "bad.mat")
+        start = time.monotonic()
+        with pytest.raises(bf.DatasetError) as second:
+            apart.call_isolated(tmp_path / "bad.mat", "bowdenfit.files:read_here")
+        assert time.monotonic() - start < 0.1 and str(second.value) == str(first.value)
+        scipy.io.savemat(tmp_path / "bad.mat", {"F": np.arange(5.0)})
+        assert read_channels(tmp_path / "bad.mat").channels
+
+
+def test_a_pipe_inside_a_bag_is_refused_before_it_is_opened(tmp_path):
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [a.db3]}\n")
+    os.mkfifo(tmp_path / "a.db3")
+    with pytest.raises(bf.DatasetError, match=r"a\.db3 is a named pipe, not a file"):
+        read_channels(tmp_path)
+
+
+LEAVES_A_FILE = """
+import tempfile
+
+def read(path):
+    with open(tempfile.gettempdir() + "/half.tmp", "w") as file:
+        file.write("half")
+    path.with_name("started").touch()
+    while True:
+        pass
+"""
+
+
+def test_what_a_killed_reader_was_writing_is_removed(tmp_path, monkeypatch):
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    (tmp_path / "reader_that_hangs.py").write_text(LEAVES_A_FILE)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    with apart._request_lock:
+        if os.getpid() in apart._readers:
+            apart._end_reader(apart._readers[os.getpid()])
+    (tmp_path / "a.mat").write_bytes(b"x")
+    with limits_times(0.1), pytest.raises(bf.DatasetError, match="takes more than"):
+        apart.call_isolated(tmp_path / "a.mat", "reader_that_hangs:read")
+    assert (tmp_path / "started").exists()
+    assert list(scratch.iterdir()) == []
+
+
 def test_readers_that_have_nothing_to_do_hold_no_output_of_ours(tmp_path):
     scipy.io.savemat(tmp_path / "good.mat", {"F": np.arange(5.0)})
     ours, theirs = os.pipe()
@@ -255,3 +304,20 @@ def test_a_table_that_is_not_what_its_ending_says_is_called_what_it_is(run, on_b
     (folder / "cable.toml").write_text(told)
     code, _, err = run("check", folder)
     assert (code, err) == (2, "Error: angles.xlsx is not a .xlsx file but text; rename it to .csv.\n")
+
+
+def wide(path, columns):
+    """A table of forces with so many columns."""
+    more = [f"c{i}" for i in range(columns - 2)]
+    rows = [["input_force_N", "output_force_N", *more]]
+    rows += [[f"{10 + i}", f"{7 + 0.7 * i:.2f}", *"1" * len(more)] for i in range(5)]
+    path.write_text("".join(",".join(row) + "\n" for row in rows))
+
+
+def test_of_a_wide_table_few_columns_are_listed_and_a_very_wide_one_is_refused(run, tmp_path):
+    wide(tmp_path / "a.csv", 150)
+    code, out, _ = run("check", tmp_path / "a.csv")
+    assert code == 0 and "... and 50 more columns." in out
+    wide(tmp_path / "a.csv", 10_000)
+    code, _, err = run("check", tmp_path / "a.csv")
+    assert code == 2 and "a.csv has rows of 10,000 cells, and a table has at most 2,000 columns" in err

@@ -257,7 +257,7 @@ def _kind_in_words(raw: RawTable, data: Dataset | None) -> str:
 
 
 def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[str, str]) -> str:
-    """Return every column: its unit, what it is read as, and its range."""
+    """Return the columns: unit, what they are read as, and range; of very many the first, and all that are read."""
     can_be = find_candidates(list(zip(raw.header, raw.units, strict=True)), wanted, tuple(named.values()))
     read_as = dict(named)
     for quantity, columns in can_be.items():
@@ -270,7 +270,10 @@ def _column_table(raw: RawTable, wanted: tuple[Quantity, ...], named: Mapping[st
             column = numbers.get(heading)
             spread = [f"{column.low:.5g}", f"{column.high:.5g}"] if column else ["", ""]
             rows.append([heading, heading_of(heading, below).unit or "-", read_as.get(heading, "-"), *spread])
-    return narrow_table(["column", "unit", "read as", "lowest", "highest"], rows, left=_LEFT)
+    listed_rows = [row for i, row in enumerate(rows) if i < _MAX_LISTED or row[0] in read_as]
+    listing = narrow_table(["column", "unit", "read as", "lowest", "highest"], listed_rows, left=_LEFT)
+    more = len(rows) - len(listed_rows)
+    return f"{listing}\n... and {more} more columns." if more else listing
 
 
 def describe_recording_file(

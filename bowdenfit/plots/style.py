@@ -69,6 +69,10 @@ SETTINGS: dict[Any, Any] = {
     "text.hinting": "no_hinting",  # as far apart in PNG as in SVG and PDF; to fit letters to dots takes a sixth of a PNG
 }
 
+_NO_LOOKS = {
+    "backend", "backend_fallback", "interactive", "toolbar", "timezone", "webagg", "tk", "macosx", "docstring", "keymap",
+}  # fmt: skip
+
 
 def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Run a function under the settings of this file; matplotlib's own are back afterwards."""
@@ -76,10 +80,21 @@ def in_paper_style(function: Callable[Arguments, Result]) -> Callable[Arguments,
     def styled(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         if all(plots.mpl.rcParams[name] == value for name, value in SETTINGS.items()):
             return function(*args, **kwargs)  # called by another such function; a context takes 3 ms
-        with plots.mpl.rc_context(SETTINGS), _boxes_without_words():
+        with plots.mpl.rc_context(_all_settings()), _boxes_without_words():
             return function(*args, **kwargs)
 
     return styled
+
+
+@functools.cache
+def _all_settings() -> dict[Any, Any]:
+    """Return the settings of this file on top of matplotlib's defaults, so that no matplotlibrc lying about counts.
+
+    What does not concern the look of a figure stays: the backend, and how windows behave.
+    """
+    defaults = plots.mpl.rcParamsDefault
+    looks = {name: defaults[name] for name in defaults if name.partition(".")[0] not in _NO_LOOKS}
+    return looks | SETTINGS
 
 
 @contextmanager

@@ -44,11 +44,14 @@ def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
     """
     refuse_link(folder)
     exists = folder.is_dir()  # perhaps a disk of its own, or one in a folder that may not be written
+    missing = _missing_folders(folder.parent)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         name = f".{folder.resolve().name[:40]}."
         temporary = Path(tempfile.mkdtemp(prefix=name, suffix=PARTIAL, dir=folder if exists else folder.parent))
+        temporary.chmod(0o700)  # whatever the umask is, it can be filled and removed
     except OSError as error:
+        _remove_empty(missing)
         raise disk_error(folder, error) from None
     try:
         yield temporary
@@ -133,8 +136,13 @@ def folder_to_write(folder: Path) -> Iterator[Path]:
     Raises:
         StoreError: It cannot be made, or something inside cannot be written.
     """
+    missing = _missing_folders(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            _remove_empty(missing)
+            raise
         yield folder
     except OSError as error:
         raise disk_error(folder, error) from None
@@ -253,11 +261,14 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
         return
     refuse_links_inside(folder)
     refuse_link(folder / _LOCK)  # which is emptied
-    new = not folder.exists()
+    missing = _missing_folders(folder)
     lock = FileLock(folder / _LOCK, timeout=0)
     with folder_to_write(folder):
         try:
             lock.acquire()
+        except PermissionError:  # the umask is such that what is made cannot be written
+            _remove_empty(missing)
+            raise
         except Timeout:
             raise StoreError(
                 f"another fit or calibration is being written into {folder}; wait for it, or name another folder with --output."
@@ -268,7 +279,19 @@ def reserve_folder(folder: Path | None) -> Iterator[None]:
         with suppress(OSError):  # while it is held, so that nobody else's goes; Windows removes it by itself
             (folder / _LOCK).unlink()
         lock.release()
-        if new and not any(folder.iterdir()):
+        if missing and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """Return a folder and those around it that do not exist, the inner ones first."""
+    return [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Remove those of some folders that are empty, the inner ones first."""
+    for folder in folders:
+        with suppress(OSError):
             folder.rmdir()
 
 

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import bowdenfit as bf
+from bowdenfit.plots.style import in_paper_style
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, parse_page_width
 
 
@@ -71,3 +72,13 @@ def test_figures_may_be_as_wide_as_is_said_and_no_narrower(least, unit):
     assert parse_page_width((least, unit)) == 3.0
     with pytest.raises(bf.UsageError, match="say a width from 3 in to 20 in"):
         parse_page_width((0.999 * least, unit))
+
+
+def test_settings_of_matplotlib_that_lie_about_do_not_count():
+    @in_paper_style
+    def settings_in_force():
+        return mpl.rcParams["text.usetex"], mpl.rcParams["savefig.facecolor"], mpl.rcParams["font.size"]
+
+    with mpl.rc_context({"text.usetex": True, "savefig.facecolor": "red", "font.size": 30}):
+        assert settings_in_force() == (False, "auto", 8)
+        assert mpl.rcParams["text.usetex"]

@@ -1,12 +1,15 @@
 """The results folder while a fit is written: one at a time, on a disk that may be full, ended at any moment."""
 
+import errno
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 import bowdenfit as bf
 from bowdenfit.errors import DiskError
@@ -15,7 +18,7 @@ from bowdenfit.outputs import write_text
 from bowdenfit.questions.calibrate.replications import open_replications
 from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
-from bowdenfit.results.folder import folder_to_write, refuse_unwritable, reserve_folder
+from bowdenfit.results.folder import fill_folder_atomically, folder_to_write, refuse_unwritable, reserve_folder
 
 pytestmark = pytest.mark.extended
 
@@ -203,3 +206,25 @@ def test_a_calibration_is_refused_where_something_else_is_being_written(tmp_path
     with reserve_folder(tmp_path / "cal"), pytest.raises(bf.StoreError, match="another fit or calibration is being written"):
         bf.calibrate(YARN, replications=2, workers=1, output=tmp_path / "cal", seed=3)
     assert not (tmp_path / "cal").exists()
+
+
+def refuse_permission(*_, **__):
+    raise PermissionError(errno.EACCES, "Permission denied", "x")
+
+
+@pytest.mark.parametrize(("use", "patched"), [(reserve_folder, FileLock.acquire), (fill_folder_atomically, tempfile.mkdtemp)])
+def test_a_folder_that_its_umask_closes_is_not_left_behind(tmp_path, monkeypatch, use, patched):
+    monkeypatch.setattr(FileLock if patched is FileLock.acquire else tempfile, patched.__name__, refuse_permission)
+    with pytest.raises(bf.StoreError, match="cannot be written"), use(tmp_path / "a" / "b"):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_is_filled_whatever_the_umask_is(tmp_path):
+    before = os.umask(0o777)
+    try:
+        with fill_folder_atomically(tmp_path / "a") as temporary:
+            assert temporary.stat().st_mode & 0o700 == 0o700
+    finally:
+        os.umask(before)
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]

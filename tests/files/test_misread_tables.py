@@ -461,3 +461,11 @@ def test_a_description_of_recordings_alone_needs_no_tables(tmp_path):
         'wrap_angle = { value = 180, unit = "deg" }\n[[recording]]\nfile = "log.csv"\n'
     )
     assert len(bf.read(tmp_path).measurements.tables) == 1
+
+
+@pytest.mark.parametrize(("digits", "computed"), [(10, True), (6, True), (2, False)])
+def test_forces_without_any_noise_are_said_to_be_computed(tmp_path, digits, computed):
+    rows = [f"{a},{f},{f * np.exp(-0.002 * a):.{digits}f}" for a in (45, 90, 135) for f in (10, 20, 30)]
+    (tmp_path / "t.csv").write_text("\n".join(["wrap_angle_deg,input_force_N,output_force_N", *rows]) + "\n")
+    remarks = bf.read(tmp_path / "t.csv").measurements.remarks
+    assert any("these forces were computed" in remark for remark in remarks) == computed

@@ -29,6 +29,7 @@ from bowdenfit.kinds.forces.mountings import (
     remark_on_one_row_runs,
     remark_on_reused_labels,
 )
+from bowdenfit.kinds.plausibility import NO_NOISE
 from bowdenfit.kinds.rows import (
     ENDS,
     OwnAngles,
@@ -52,6 +53,7 @@ _APART = 3.0  # smallest gap between loads over the largest within one
 _SAME = 0.002  # relative difference of equal readings, the last digit of a display
 _ONE_LOAD = 0.03  # relative width of readings at one load
 _SDS = (Quantity("input_force_sd", "force"), Quantity("output_force_sd", "force"))  # a remark says that these are not used
+_FEWEST_ALIKE = 4  # loads beyond the first of each run and stroke, from which their noise is looked at; a judgement
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
 
@@ -135,8 +137,27 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         _concatenate_unused(tables),
     )
     remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
+    remarks |= dict.fromkeys(_remark_on_missing_noise(merged))
     accounts = tuple(account for *_, account in parts)
     return TableFromFiles(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
+
+
+def _remark_on_missing_noise(table: ForceTable) -> list[str]:
+    """Return a remark where all loads of a run and stroke lose the same share of the force, more exactly than a cell can read."""
+    loss = np.log(table.input_force / table.output_force)
+    alike = 3 * table.run + table.stroke
+    _, group = np.unique(alike[table.stroke != 0], return_inverse=True)
+    loss, loads = loss[table.stroke != 0], table.input_force[table.stroke != 0]
+    count = np.bincount(group)
+    deviation = loss - (np.bincount(group, loss) / np.maximum(count, 1))[group]
+    different = len(np.unique(np.column_stack([group, loads]), axis=0)) - len(count)
+    if different < _FEWEST_ALIKE or np.sqrt(np.sum(deviation**2) / different) > NO_NOISE:
+        return []
+    return [
+        f"{listed(table.origin.files)}: all loads of a run and stroke lose the same share of the force to within "
+        f"{NO_NOISE:.0e} of it, finer than any load cell reads. The usual cause is that these forces were computed, by a "
+        "simulation or a spreadsheet; their intervals have almost no width and say nothing of a cable. Put in what was measured."
+    ]
 
 
 def _concatenate_groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:

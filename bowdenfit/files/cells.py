@@ -170,19 +170,23 @@ class Cell:
     def _refuse_ambiguous(self, text: str) -> None:
         """Refuse three digits behind a separator, unless the file leaves no doubt that they are decimals."""
         mark = "," if "," in text else "."
-        meanings = f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}"
+        remedy = ""
         if mark == "," and not self.decimals.comma:
-            raise self.refuse(f"{meanings}; write it without a thousands separator and with a decimal point.")
-        if self.decimals.whole and mark not in self.decimals.seen:
-            raise self.refuse(
-                f"{meanings}, because the file also has {shown(self.decimals.whole)}; write it without a separator of "
-                "thousands, or with a decimal point and a number of digits other than three."
+            remedy = "; write it without a thousands separator and with a decimal point."
+        elif self.decimals.whole and mark not in self.decimals.seen:
+            remedy = (
+                f", because the file also has {shown(self.decimals.whole)}; write it without a separator of thousands, or "
+                "with a decimal point and a number of digits other than three."
             )
-        if against := self.decimals.other(mark):
-            raise self.refuse(
-                f"{meanings}, because elsewhere the file has {shown(against)}; write all its decimals the same way, and "
-                "no thousands separators."
+        elif against := self.decimals.other(mark):
+            remedy = (
+                f", because elsewhere the file has {shown(against)}; write all its decimals the same way, and no thousands "
+                "separators."
             )
+        if remedy:
+            error = self.refuse(f"{self.shown} may mean {text.replace(mark, '')} or {text.replace(mark, '.')}{remedy}")
+            error.fault_key = (self.file, self.column, "thousands")
+            raise error
 
 
 def parse_number(text: str, decimal: str) -> float | None:

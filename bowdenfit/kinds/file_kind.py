@@ -167,6 +167,13 @@ def _guess_by_columns(path: Path, table: RawTable) -> FileKind:
     return FileKind(kind, why, "recordings")
 
 
+def is_angle_table(table: RawTable) -> bool:
+    """Return whether a table has nothing but wrap angles by length, which is read beside others and is no bench alone."""
+    units = [heading_of(heading, unit).unit for heading, unit in _headings(table) if heading]
+    dimensions = [dimension_of(unit) if unit and is_unit(unit) else "" for unit in units]
+    return dimensions.count("length") == 1 and dimensions.count("angle") == len(dimensions) - 1 > 0
+
+
 def _lines_above(path: Path, table: RawTable) -> list[str]:
     _, above = first_lines(first_bytes(path, 1 << 15), path.name, whole=False, most=table.header_row - 1)
     return [line.text for line in above]

@@ -10,6 +10,7 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
+from bowdenfit.files.columns import find_pivot_headings
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming
 from bowdenfit.files.layout import is_index
 from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
@@ -155,6 +156,8 @@ def make_table_command(
     """
     headings = list(zip(table.header, table.units, strict=True))
     options, provided = list[str](), list[str]()
+    if find_pivot_headings(table.header) and not stated:
+        return _make_command(path, [], [])
     if kind == "forces":
         numbers, others = list_number_columns(table), _find_other_columns(headings)
         words, could_be = _find_columns_of_words(headings, numbers), [column for column in numbers if column.name not in others]

@@ -469,3 +469,24 @@ def test_forces_without_any_noise_are_said_to_be_computed(tmp_path, digits, comp
     (tmp_path / "t.csv").write_text("\n".join(["wrap_angle_deg,input_force_N,output_force_N", *rows]) + "\n")
     remarks = bf.read(tmp_path / "t.csv").measurements.remarks
     assert any("these forces were computed" in remark for remark in remarks) == computed
+
+
+@pytest.mark.parametrize("heading", ["Input force (N),45°,90°,180°", "F_in (N),45,90,180", "Wrap angle (deg),10 N,20 N,30 N"])
+def test_a_pivot_table_is_answered_with_how_to_write_it(tmp_path, run, heading):
+    (tmp_path / "t.csv").write_text(f"{heading}\n10,9.2,8.5,7.3\n20,18.5,17,14.6\n30,27.7,25.6,21.9\n", encoding="utf-8")
+    code, out, _ = run("check", tmp_path / "t.csv")
+    said = " ".join(out.split())
+    assert code == 2 and "as in a pivot table" in said and "Write one row for each reading" in said and "NAME" not in said
+
+
+def test_a_table_of_wrap_angles_by_length_is_said_to_be_one(tmp_path, run):
+    (tmp_path / "angles.csv").write_text("cable_length_mm,free_angle_deg,squeezed_angle_deg\n430,0,90\n480,25,70\n530,50,60\n")
+    code, out, _ = run("check", tmp_path / "angles.csv")
+    said = " ".join(out.split())
+    assert code == 2 and "a table of wrap angles at 3 lengths" in said and '[tables] angles = { file = "angles.csv" }' in said
+    assert "NAME" not in said
+
+
+def test_ambiguous_thousands_are_said_once_a_column(tmp_path):
+    said = refused(tmp_path, HEADING + '"1,000",730\n"1,200",876\n"1,400","1,022"\n')
+    assert "'1,000' may mean 1000 or 1.000" in said and "The same in rows 3 and 4." in said

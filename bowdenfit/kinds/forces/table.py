@@ -143,7 +143,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
 
 
 def _remark_on_missing_noise(table: ForceTable) -> list[str]:
-    """Return a remark where all loads of a run and stroke lose the same share of the force, more exactly than a cell can read."""
+    """Return a remark where all loads of a run and stroke lose the same share of the force, finer than a cell can read."""
     loss = np.log(table.input_force / table.output_force)
     alike = 3 * table.run + table.stroke
     _, group = np.unique(alike[table.stroke != 0], return_inverse=True)
@@ -156,7 +156,7 @@ def _remark_on_missing_noise(table: ForceTable) -> list[str]:
     return [
         f"{listed(table.origin.files)}: all loads of a run and stroke lose the same share of the force to within "
         f"{NO_NOISE:.0e} of it, finer than any load cell reads. The usual cause is that these forces were computed, by a "
-        "simulation or a spreadsheet; their intervals have almost no width and say nothing of a cable. Put in what was measured."
+        "simulation or a spreadsheet; their intervals have almost no width, and say nothing of a cable. Put in what was read."
     ]
 
 

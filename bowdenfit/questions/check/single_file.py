@@ -19,7 +19,7 @@ from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds import KINDS, iterate_tables
-from bowdenfit.kinds.file_kind import FileKind, columns_of_kind, guess_file_kind
+from bowdenfit.kinds.file_kind import FileKind, columns_of_kind, guess_file_kind, is_angle_table
 from bowdenfit.kinds.fit_command import (
     FitCommand,
     HeadedColumn,
@@ -84,6 +84,8 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
         backwards = _backward_clock(path)
         text = describe_table_file(raw, file, make_both_commands(path, raw, file), None, backwards, headings, not backwards)
         return text, False  # `fit` asks which of the two it is
+    if is_angle_table(raw) and not named:
+        return _describe_angle_table(raw), False
     command = make_table_command(path, raw, file.kind, named)
     has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
     strict = any(reading.values()) and not command.names_more
@@ -102,6 +104,16 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
     return describe_table_file(
         raw, file, [_with_settings(command, reading)], data, obstacle, headings, not remaining
     ), not obstacle
+
+
+def _describe_angle_table(raw: RawTable) -> str:
+    """Describe a table of wrap angles by length, and where it belongs."""
+    where = (
+        "It is fitted beside readings of forces or efficiencies, or recordings, at some of these lengths: name it in "
+        f'cable.toml, [tables] angles = {{ file = "{raw.file}" }}; bowdenfit init writes that file.'
+    )
+    lines = [f"{raw.file}: a table of wrap angles at {counted(len(raw.rows), 'length')}.", "", _column_table(raw, (), {})]
+    return "\n".join([*lines, "", *describe_row_account(raw.lines), "", filled(where)]) + "\n"
 
 
 def _try_as_data_set(path: Path, reading: Reading, strict: bool) -> tuple[Dataset | None, str]:

@@ -53,6 +53,11 @@ _OTHER_ANGLE_WORDS = (
     "error sd std stdev uncertainty noise radius"
 )
 _ANGULAR, _OTHER_ANGLES = frozenset(_ANGLE_WORDS.split()), frozenset(_OTHER_ANGLE_WORDS.split())
+_BEND_WORDS = (  # of the angular ones those of nothing but a bent cable
+    "bend bends bending bent curve curvature curved wrap wraps wrapping biegung biegewinkel umlenkung umlenkwinkel "
+    "umschlingung krummung kurve coude courbure virage curvatura curva piega"
+)
+_BENDS = frozenset(_BEND_WORDS.split())
 _WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a label, or a direction of motion
 _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
             "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
@@ -120,6 +125,11 @@ def likely_wrap_angle(heading: str, unit: str = "") -> Spelling | None:
     if not written and not words & (_ANGULAR - _WITH_UNIT_ALONE):
         return None
     return Spelling("wrap_angle", written or None, "said")
+
+
+def names_bend(heading: str) -> bool:
+    """Return whether a heading says that it is of a bent cable, as an angle alone does not."""
+    return bool(_BENDS.intersection(_words(heading)))
 
 
 def implied_angle_unit(heading: str) -> str:

@@ -176,6 +176,7 @@ def make_recording_command(
     stated: Mapping[str, ColumnSource],
     always: bool = False,
     doubtful_clock: str = "",
+    angle: tuple[str, str] | None = None,
 ) -> FitCommand:
     """Make the command that fits a recording.
 
@@ -186,6 +187,7 @@ def make_recording_command(
         stated: What the user has named already, by quantity.
         always: Whether channels are named that say themselves what they are.
         doubtful_clock: Name of a clock that says no unit and is unlikely to be in seconds; empty if there is none.
+        angle: The wrap angle, and what says it; what the file states in a line or in its name if omitted.
     """
     options, provided = name_force_columns(columns, "--channel", stated, always, in_order=True)
     if not has_clock and "time" not in stated:
@@ -194,8 +196,8 @@ def make_recording_command(
     elif doubtful_clock and "time" not in stated:
         options.append(option_naming("time", doubtful_clock, "ms", "--channel"))
         provided.append(f"{shown(doubtful_clock)} is in milliseconds, as the file does not say")
-    angle, of_angle = _stated_angle_options(path)
-    return _make_command(path, [*angle, *_column_options(stated, "--channel"), *options], [*of_angle, *provided])
+    option, of_angle = _stated_angle_options(path, angle)
+    return _make_command(path, [*option, *_column_options(stated, "--channel"), *options], [*of_angle, *provided])
 
 
 def make_both_commands(path: Path, table: RawTable, guess: FileKind) -> list[FitCommand]:
@@ -314,12 +316,13 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
     """Return columns of numbers that are likely wrap angles, with the unit to state; empty where the heading has it.
 
     A column without a unit is taken to be in rad where its values are none of degrees: whole turns at most, not all whole.
+    With the same number in every row it may be a count or a label.
     """
     likely = dict[str, str]()
     units = dict(zip(table.header, table.units, strict=True))
     for column in list_number_columns(table):
         spelling = likely_wrap_angle(column.name, units[column.name])
-        if spelling is not None and column.high > column.low:
+        if spelling is not None and (column.high > column.low or (spelling.unit and column.high > 0)):
             in_radians = column.high <= _MOST_RADIANS and column.mean != round(column.mean)
             unwritten = implied_angle_unit(column.name) or ("rad" if in_radians else "deg")
             likely[column.name] = "" if spelling.unit else unwritten
@@ -330,9 +333,9 @@ def _column_options(stated: Mapping[str, ColumnSource], option: str) -> list[str
     return [option_naming(quantity, source.name, source.unit or "", option) for quantity, source in stated.items()]
 
 
-def _stated_angle_options(path: Path) -> tuple[list[str], list[str]]:
-    """Return the option for one wrap angle, as the file states it or as an example, and what it assumes."""
-    stated = find_stated_angle(path)
+def _stated_angle_options(path: Path, measured: tuple[str, str] | None = None) -> tuple[list[str], list[str]]:
+    """Return the option for one wrap angle, as a channel or the file states it or as an example, and what it assumes."""
+    stated = measured or find_stated_angle(path)
     if stated is None:
         return ["--wrap-angle 180deg"], ["180 deg is the wrap angle of the bench"]
     angle, where = stated

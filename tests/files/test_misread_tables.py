@@ -133,6 +133,13 @@ def test_a_column_that_may_be_wrap_angles_is_asked_about_and_never_passed_over(t
     assert "--wrap-angle 180deg \\" not in out and "--column wrap_angle=" in out
 
 
+def test_a_column_with_one_angle_in_every_row_is_asked_about(tmp_path, run):
+    (tmp_path / "t.csv").write_text("bend_deg,Input force (N),Output force (N)\n90,20,18\n90,40,33\n90,60,40\n")
+    with pytest.raises(bf.DatasetError, match="likely to hold the wrap angle of each row"):
+        bf.read(tmp_path / "t.csv", wrap_angle=(180.0, "deg"))
+    assert "--column wrap_angle=bend_deg" in run("check", tmp_path / "t.csv")[1]
+
+
 OTHERS = ["Motor angle (deg)", "joint_angle_deg", "Temperature (degC)", "configuration", "angle_sd_deg"]
 
 

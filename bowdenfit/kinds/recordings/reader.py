@@ -18,6 +18,7 @@ from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.table_files import Source, TableFromFiles
+from bowdenfit.recordings.angle_channels import SAME_BEND, refuse_other_angle
 from bowdenfit.recordings.forces import to_recording
 from bowdenfit.recordings.named_channels import TORQUES, WANTED, match_name, pattern_fields, rows_where, steady_value
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
@@ -34,7 +35,6 @@ from bowdenfit.units import (
     speed_dimension,
 )
 
-_SAME_BEND = float(np.deg2rad(2.0))  # change of a wrap angle during a recording of one bend; as `SAME_BEND` of force tables
 _SAME_LENGTH = 0.005  # change of a length over the range of the route; as `SAME_LENGTH` of force tables
 
 
@@ -120,7 +120,7 @@ def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | No
     if steady is None:
         return None
     value, low, high = steady
-    if high - low > _SAME_BEND:
+    if high - low > SAME_BEND:
         raise _make_change_error(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
     if value < 0:
         raise DatasetError(
@@ -319,10 +319,18 @@ def _read_file(description: Description, path: Path, entry: RecordingFile, chann
         forces = raw.input_force * sensors.input_ratio, raw.output_force * sensors.output_ratio
         raw = replace(raw, input_force=forces[0], output_force=forces[1])
     entry = locate_by_channels(description, rows, entry, sources)
+    refuse_other_angle(rows, sources, raw.input_force, _only_stated_angle(description, entry))
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
     return _File(raw, entry, page, stated or 0.0, unit, file.account)
+
+
+def _only_stated_angle(description: Description, entry: RecordingFile) -> float | None:
+    """Return the wrap angle stated for a recording of a cable with one contact [rad]; None of any other."""
+    source = description.contact[0].wrap_angle
+    stated = source.constant or entry.wrap_angles.get(source.column or "")
+    return None if len(description.contact) > 1 or stated is None else stated.to("angle")
 
 
 def _make_recording(description: Description, file: _File, blocks: Blocks, account: Account) -> Recording:

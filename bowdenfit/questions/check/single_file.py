@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -37,11 +38,12 @@ from bowdenfit.questions.check.data_set_words import (
     describe_row_account,
 )
 from bowdenfit.reading import Reading
+from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
 from bowdenfit.recordings.forces import clock_in_doubt
-from bowdenfit.recordings.named_channels import parse_channels
+from bowdenfit.recordings.named_channels import WANTED, find_channel, parse_channels
 from bowdenfit.recordings.preparation.checks import explain_backward_clock
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table
+from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
 
 _CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the command repeats
 _ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
@@ -139,10 +141,12 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
 
 def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
     """Describe a recording alone; and return whether it can be fitted as it stands."""
-    file, recordings, obstacle = read_recording(path, channels)
+    file = read_channels(path)
+    angle = _measured_angle(file, channels)
+    recordings, obstacle = _read_recording(file, channels, angle)
     backwards = describe_backward_clock(file) if obstacle and "backwards" not in obstacle else ""
     obstacle = "\n".join(filter(None, [obstacle, backwards]))
-    command = _recording_command(path, file, channels)
+    command = _recording_command(path, file, channels, angle)
     usable = not obstacle or (not channels and "--channel" in command.text and not backwards)
     return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
 
@@ -166,37 +170,49 @@ def _backward_clock(path: Path) -> str:
     return describe_backward_clock(file) if long else ""
 
 
-def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str]) -> FitCommand:
+def _measured_angle(file: ChannelFile, channels: Sequence[str]) -> AngleChannel | None:
+    """Return the channel that says at which wrap angle a recording was made, with the force at the input looked for by name."""
+    sources = parse_channels(channels)
+    with suppress(DatasetError):
+        force = find_channel(file, WANTED[0], sources)
+        return next(iter(find_angle_channels(file, sources, np.zeros(0) if force is None else force.values)), None)
+    return None
+
+
+def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str], angle: AngleChannel | None) -> FitCommand:
     """Return the command that fits a recording."""
-    signals = [channel for channel in file.channels if not is_clock(channel)]
+    signals = [channel for channel in file.channels if not is_clock(channel) and not (angle and channel.name == angle.name)]
     headed = [
         HeadedColumn(signal.name, signal.unit, float(signal.values[signal.values == signal.values].mean()))
         for signal in signals
     ]
     has_clock = any(signal.time is not None for signal in signals)
     in_doubt = [clock.name for signal in signals if (clock := clock_in_doubt(file, signal)) is not None]
-    return make_recording_command(path, headed, has_clock, parse_channels(channels), doubtful_clock="".join(in_doubt[:1]))
+    stated = (angle.option, f"the channel {shown(angle.name)}") if angle else None
+    return make_recording_command(
+        path, headed, has_clock, parse_channels(channels), doubtful_clock="".join(in_doubt[:1]), angle=stated
+    )
 
 
-def read_recording(path: str | Path, channels: Sequence[str] = ()) -> tuple[ChannelFile, Recordings | None, str]:
-    """Read the channels of a file, and the recording that they make.
+def _read_recording(
+    file: ChannelFile, channels: Sequence[str] = (), angle: AngleChannel | None = None
+) -> tuple[Recordings | None, str]:
+    """Read the recording that the channels of a file make, prepared and cut into strokes.
 
     Args:
-        path: A file.
+        file: The channels.
         channels: Which channel is what, such as "input_force=ai0:lbf".
+        angle: The channel that says at which wrap angle it was made.
 
     Returns:
-        The channels; the recording, prepared and cut into strokes, None where it cannot be; and why not, in a sentence.
-
-    Raises:
-        DatasetError: The file cannot be read.
+        The recording, None where they make none; and why not, in a sentence.
     """
-    file = read_channels(Path(path))
+    stated = _ANY_ANGLE if angle is None else (angle.angle, "rad")
     try:
-        data = single_file_dataset(Path(path), _ANY_ANGLE, (), parse_channels(channels), kind="recordings")
+        data = single_file_dataset(file.path, stated, (), parse_channels(channels), kind="recordings")
     except DatasetError as error:
-        return file, None, str(error)
-    return file, data.measurements.table(Recordings), ""
+        return None, str(error)
+    return data.measurements.table(Recordings), ""
 
 
 def describe_table_file(

@@ -10,7 +10,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from bowdenfit.errors import BowdenfitError, DatasetError, DescriptionError
 from bowdenfit.words import shown
@@ -25,6 +25,7 @@ _DEEPEST = 12  # keys below keys; a description has four
 _LONGEST_PATTERN = 1000  # characters; names of files have 255 at most
 _NO_NAME = {errno.EINVAL, errno.ENAMETOOLONG, errno.ELOOP}
 _SYSTEM_FOLDERS = ("/proc/", "/sys/")  # some of these wait for ever, some never end
+_ZIP = b"PK\x03\x04"  # how an archive with something in it begins
 _SPECIAL = {
     stat.S_ISFIFO: "a named pipe",
     stat.S_ISCHR: "a device",
@@ -76,21 +77,46 @@ def damage_as(error: BowdenfitError) -> Iterator[None]:
         raise error from failure
 
 
-def refuse_packed(archive: "NpzFile") -> None:
+@contextmanager
+def open_arrays(file: BinaryIO) -> Iterator["NpzFile"]:
+    """Open an archive of arrays that bowdenfit has written; pickled ones are refused.
+
+    Args:
+        file: Open where the archive begins.
+
+    Raises:
+        ValueError: It is no such archive: of a single array NumPy would make room for whatever that says that it holds.
+    """
+    import numpy as np  # here, because `--help` does not load NumPy
+
+    start = file.tell()
+    if file.read(len(_ZIP)) != _ZIP:
+        raise ValueError("no archive of arrays")
+    file.seek(start)
+    with np.load(file) as arrays:
+        _refuse_packed(arrays)
+        yield arrays
+
+
+def _refuse_packed(archive: "NpzFile") -> None:
     """Refuse arrays that ask for more than they bring: what is written here is never packed, and as long as it says.
 
     Args:
         archive: Arrays that NumPy has opened.
 
     Raises:
-        ValueError: One is packed, or says that it is larger than what is there.
+        ValueError: One is packed, says that it is larger than what is there, or shares its bytes with another.
     """
     from numpy.lib import format as npy  # here, because `--help` does not load NumPy
 
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     zipped = archive.zip
     assert zipped is not None  # it is open
-    for entry in zipped.infolist():
+    end = 0
+    for entry in sorted(zipped.infolist(), key=lambda entry: entry.header_offset):
+        if entry.header_offset < end:
+            raise ValueError(f"{entry.filename} shares bytes with another array")
+        end = entry.header_offset + entry.file_size
         if entry.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{entry.filename} is packed")
         with zipped.open(entry) as stream:  # of a member that is longer than the file nothing is read
@@ -125,7 +151,7 @@ def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
         raise DescriptionError(f"{path.name} is nested too deeply; a description has at most {_DEEPEST} levels.") from None
     except ValueError as error:  # no UTF-8, no TOML, a number of thousands of digits, an impossible path
         raise DescriptionError(f"{path.name} is not valid TOML: {' '.join(str(error).split())[:200]}.") from None
-    if _is_deeper(page, _DEEPEST):
+    if is_deeper(page, _DEEPEST):
         raise DescriptionError(f"{path.name} is nested too deeply; a description has at most {_DEEPEST} levels.")
     if crowded := _find_crowded(page):
         key, count = crowded
@@ -146,9 +172,9 @@ def _find_crowded(page: Any, key: str = "") -> tuple[str, int] | None:
     return next((crowded for name, part in parts if (crowded := _find_crowded(part, name))), None)
 
 
-def _is_deeper(page: dict[str, Any], levels: int) -> bool:
-    """Return whether keys lie below more than so many others."""
-    layer: list[Any] = [page]
+def is_deeper(page: Any, levels: int) -> bool:
+    """Return whether dictionaries and lists of plain data lie in more than so many others."""
+    layer: list[Any] = [page] if isinstance(page, dict | list) else []
     for _ in range(levels):
         inside = [part for x in layer for part in (x.values() if isinstance(x, dict) else x)]
         layer = [part for part in inside if isinstance(part, dict | list)]

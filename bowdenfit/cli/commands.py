@@ -155,7 +155,7 @@ def _reply_from_kept(verb: Verb, answers: dict[str, Any], request: dict[str, Any
     """Return the reply from kept answers; None if this question is not among them."""
     try:
         return verb.kept(answers, request) if verb.kept and answers else None
-    except (LookupError, TypeError, ValueError, AttributeError):  # kept when the answer had another shape
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):  # kept when the answer had another shape
         return None
 
 

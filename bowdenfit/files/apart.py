@@ -85,20 +85,21 @@ def read_isolated(path: Path) -> ChannelFile:
     return replace(result, path=path)
 
 
-def call_isolated(path: Path, reader: str, *arguments: Any) -> Any:
+def call_isolated(path: Path, reader: str, *arguments: Any, limits: Limits | None = None) -> Any:
     """Return what a function makes of a file, in the other process.
 
     Args:
         path: The file.
         reader: Module and name of the function.
         arguments: Further ones, which JSON can carry.
+        limits: What it may take; by its size and `LIMITS` if omitted.
 
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.
     """
     for file in (path, *(path.iterdir() if path.is_dir() else ())):
         refuse_special(file)
-    limits, key = Limits.for_file(path), _file_key(path)
+    limits, key = limits or Limits.for_file(path), _file_key(path)
     if key in _too_costly:
         raise DatasetError(_too_costly[key])
     with _request_lock:

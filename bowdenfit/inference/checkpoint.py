@@ -16,7 +16,7 @@ from zlib import crc32
 import numpy as np
 
 from bowdenfit.errors import StoreError, disk_error
-from bowdenfit.inputs import damage_as, refuse_packed, refuse_special
+from bowdenfit.inputs import damage_as, open_arrays, refuse_special
 from bowdenfit.outputs import open_in_place
 
 _MARK = b"bowdenfit checkpoint 1\n"
@@ -115,6 +115,5 @@ def _complete_records(file: BinaryIO) -> Iterator[Record]:
         content = file.read(min(length, os.fstat(file.fileno()).st_size))
         if len(content) < length or crc32(content) != checksum:
             return
-        with np.load(io.BytesIO(content)) as arrays:
-            refuse_packed(arrays)
+        with open_arrays(io.BytesIO(content)) as arrays:
             yield dict(arrays)

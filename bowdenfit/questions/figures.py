@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from bowdenfit.arguments import NumberWithUnit
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.inputs import damage_as
 from bowdenfit.plots.layout import title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
@@ -97,9 +98,17 @@ def read_figure_data(folder: Path, names: Iterable[str] = ()) -> dict[str, Any]:
     if not read_answers(folder, FIGURE_DATA) or not (folder / FIGURE_DATA).exists():
         return {}
     try:
-        return read_arrays(folder / FIGURE_DATA, figure_data_types(names or FIGURES))
-    except (KeyError, TypeError, ValueError):  # kept when the figure showed something else
+        with damage_as(damaged_figure_data(folder)):
+            return read_arrays(folder / FIGURE_DATA, figure_data_types(names or FIGURES))
+    except StoreError:  # or kept when the figure showed something else
         return {}
+
+
+def damaged_figure_data(folder: Path) -> StoreError:
+    """Return the error that says that figures cannot be drawn from the data that a folder keeps of them."""
+    return StoreError(
+        f"{folder / FIGURE_DATA} is damaged, and figures cannot be drawn from it; remove it, and they are worked out again."
+    )
 
 
 def figure_data_types(names: Iterable[str]) -> dict[str, Any]:

@@ -15,14 +15,26 @@ from zlib import crc32
 from bowdenfit.errors import StoreError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import write_text
-from bowdenfit.results.folder import ANSWERS, FIGURE_DATA, FIGURES, FIT, POSTERIOR, read_page, read_text
+from bowdenfit.results.folder import (
+    ANSWERS,
+    DETAILS_TEXT,
+    FIGURE_DATA,
+    FIGURES,
+    FIT,
+    POSTERIOR,
+    SUMMARY,
+    SUMMARY_TEXT,
+    read_page,
+    read_text,
+)
 from bowdenfit.words import filled, printable
 
 SCHEMA = 7  # counted up with every change of what one of the questions answers, and of how figures look
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once; a judgement
 CAPTIONS = "captions.txt"
-_DRAWN = "drawn"
+TEXT_FILES = (SUMMARY, SUMMARY_TEXT, DETAILS_TEXT)
+_DRAWN, _TEXTS = "drawn", "texts"
 
 
 def write_answers(folder: Path, answers: Mapping[str, Any], fit_page: str) -> None:
@@ -60,7 +72,8 @@ def read_answers(folder: Path, *beside: str) -> dict[str, Any]:
         of_this = (page["schema"], page["version"]) == (SCHEMA, installed_version("bowdenfit"))
         as_written = page.pop(CHECKSUM) == page_checksum(page) and of_this
         same = as_written and all(file_checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
-        return dict(page["answers"]) if same else {}
+        answers = dict(page["answers"]) if same else {}
+        return answers if all(isinstance(trouble, str) for trouble in answers.get("troubles", ())) else {}
     except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 
@@ -135,6 +148,32 @@ def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:
     add_answer(folder, _DRAWN, {"with": installed_version("matplotlib"), "captions": dict(captions), "files": files})
 
 
+def record_texts(folder: Path) -> None:
+    """Record checksums of the summary as texts and as JSON, which lie in the folder and are printed as they are."""
+    add_answer(folder, _TEXTS, {name: file_checksum(folder / name) for name in TEXT_FILES})
+
+
+def are_texts_unchanged(folder: Path) -> bool:
+    """Return whether the texts of the summary can be printed; not where some are missing, or where another version wrote them.
+
+    Args:
+        folder: The results folder.
+
+    Raises:
+        StoreError: One has changed since it was written.
+    """
+    recorded = read_answers(folder).get(_TEXTS)  # nothing where fit.json or the draws are missing or have changed
+    if not isinstance(recorded, dict) or not all((folder / name).exists() for name in TEXT_FILES):
+        return False
+    for name in TEXT_FILES:
+        if file_checksum(folder / name) != recorded.get(name):
+            raise StoreError(
+                f"{folder / name} has changed since it was written (edited or damaged); remove it, and bowdenfit summary says "
+                "again what the fit says, or restore it from a copy."
+            )
+    return True
+
+
 def captions_if_unchanged(folder: Path, names: Collection[str], endings: Collection[str]) -> dict[str, str] | None:
     """Return all captions by figure name; None unless every requested figure exists as it would be drawn now.
 
@@ -144,12 +183,14 @@ def captions_if_unchanged(folder: Path, names: Collection[str], endings: Collect
         endings: In which formats.
     """
     page: dict[str, Any] = read_answers(folder).get(_DRAWN, {})
-    if page.get("with") != installed_version("matplotlib"):
-        return None
-    captions: dict[str, str] = page["captions"]
-    files = [f"{name}.{ending}" for name in names or captions for ending in endings]
     try:
+        if page.get("with") != installed_version("matplotlib"):
+            return None
+        captions: dict[str, str] = page["captions"]
+        if not all(name.isidentifier() and isinstance(text, str) for name, text in captions.items()):
+            return None  # a name that leads out of the folder
+        files = [f"{name}.{ending}" for name in names or captions for ending in endings]
         same = all(page["files"][file] == file_checksum(folder / FIGURES / file) for file in files)
-    except (KeyError, StoreError, OSError):  # a figure that it has not, or something else that lies there
+    except (KeyError, TypeError, AttributeError, StoreError, OSError):  # no such figure, or something else lies there
         return None
     return captions if same else None

@@ -12,11 +12,11 @@ import h5py
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import damage_as, refuse_special
+from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
 from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.folder import read_page
-from bowdenfit.results.netcdf import own_member
+from bowdenfit.results.netcdf import own_member, read_own_hdf5
 from bowdenfit.types import Vector
 
 FLEET_TABLE, FLEET_DESCRIPTION = "fleet.csv", "fleet.toml"  # of the measurements: its inspections, and what all have in common
@@ -101,9 +101,14 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
     if not path.is_file():
         problem = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
         raise StoreError(f"{path} cannot be read: {folder} {problem}, or name a folder that `bowdenfit fleet` wrote.")
-    damaged = StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy.")
-    _refuse_changed(folder, damaged)
-    with damage_as(damaged), h5py.File(path) as file:
+    _refuse_changed(folder, StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy."))
+    draws: FleetDraws = read_own_hdf5(path, "bowdenfit.results.fleet_folder:read_draws_file")
+    return draws
+
+
+def read_draws_file(path: Path) -> FleetDraws:
+    """Read a fleet.nc; for `read_own_hdf5`."""
+    with h5py.File(path) as file:
         group, stats = (_members(file, name) for name in (_POSTERIOR, "sample_stats"))
         fixed = {"cable", "cable_name", "chain", "draw", *_METADATA}
         values = {name: np.ascontiguousarray(group[name][0].T) for name in group if name not in fixed}

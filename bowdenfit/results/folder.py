@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
-from bowdenfit.inputs import refuse_special
+from bowdenfit.inputs import is_deeper, refuse_special
 from bowdenfit.outputs import PARTIAL, refuse_link, refuse_links_inside, replace_atomically
 
 FIT, SUMMARY = "fit.json", "summary.json"
@@ -27,7 +27,9 @@ POSTERIOR, CHAIN, FIGURES = "posterior.nc", "chain.checkpoint", "figures"
 ANSWERS, FIGURE_DATA = "answers.json", "figures.npz"
 REPLICATIONS = "replications.jsonl"  # of a calibration
 _LOCK = ".lock"  # there while something is being written
-_LARGEST = 400e6  # bytes of a text; a judgement: far more than a fit writes
+# Judgements: far more than a fit writes. Of JSON a byte may become thirty when it is read, so that this is still a gigabyte.
+_LARGEST, _LARGEST_PAGE = 400e6, 40e6  # bytes of a text, and of a page of JSON
+_DEEPEST = 40  # levels of a page of JSON; the deepest of a fit has ten
 _WRITTEN = (FIT, ANSWERS, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT, REPORT, FIGURE_DATA, POSTERIOR, CHAIN)
 
 
@@ -166,16 +168,20 @@ def file_to_write(path: Path) -> Iterator[Path]:
         raise disk_error(path, error) from None
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, largest: float = _LARGEST) -> str:
     """Read a text file of a results folder.
+
+    Args:
+        path: The file.
+        largest: Bytes that it may have.
 
     Raises:
         StoreError: It is no file, too large, or no text.
         OSError: It is missing, or cannot be read.
     """
     refuse_special(path, StoreError)
-    if path.stat().st_size > _LARGEST:
-        raise StoreError(f"{path} is larger than {_LARGEST / 1e6:.0f} MB: it is damaged; restore the folder from a copy.")
+    if path.stat().st_size > largest:
+        raise StoreError(f"{path} is larger than {largest / 1e6:.0f} MB: it is damaged; restore the folder from a copy.")
     try:
         return path.read_text(encoding="utf-8")
     except ValueError:
@@ -186,13 +192,20 @@ def read_page(path: Path) -> Any:
     """Read a page of JSON of a results folder.
 
     Raises:
-        StoreError: It is no file, too large, or no JSON.
+        StoreError: It is no file, too large, nested too deeply, or no JSON.
         OSError: It is missing, or cannot be read.
     """
     try:
-        return json.loads(read_text(path))
-    except (ValueError, RecursionError):  # no JSON, a number of thousands of digits, nested too deeply
+        page = json.loads(read_text(path, _LARGEST_PAGE), parse_constant=_refuse_constant)
+        if is_deeper(page, _DEEPEST):
+            raise ValueError("nested too deeply")
+        return page
+    except (ValueError, RecursionError):  # no JSON, a number of thousands of digits, NaN, nested too deeply
         raise StoreError(f"{path} is damaged; fit again, or restore the folder from a copy.") from None
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no JSON, and is not written here")
 
 
 def refuse_unwritable(target: Path) -> None:

@@ -2,7 +2,9 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, TypeAlias
 from urllib.parse import unquote
 
@@ -10,12 +12,15 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from bowdenfit.errors import StoreError
+from bowdenfit.errors import DatasetError, StoreError
+from bowdenfit.files.apart import Limits, call_isolated
 from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
+# Bytes and seconds of CPU that reading may take, some times what honest files take: they hold plain arrays.
+_MEMORY, _MEMORY_PER_BYTE, _SECONDS, _SECONDS_PER_BYTE = 1 << 29, 8, 5.0, 5e-7
 EXPECTED, DERIVED = "expected_", "derived"  # the group of what follows from parameters, and may be infinite
 
 
@@ -86,6 +91,51 @@ def read_groups(path: Path) -> Groups:
             for name, group in groups.items()
             if isinstance(group, h5py.Group)
         }
+
+
+def read_groups_isolated(path: Path) -> Groups:
+    """Return what `read_groups` does, from a process with limits: over some damaged files HDF5 goes in circles for ever.
+
+    Raises:
+        StoreError: The file is damaged, or asks for more memory or time than fits its size.
+    """
+    groups: Groups = read_own_hdf5(path, "bowdenfit.results.netcdf:read_groups")
+    return groups
+
+
+def read_own_hdf5(path: Path, reader: str) -> Any:
+    """Return what a function makes of an HDF5 file of a results folder, called in a process with limits.
+
+    Args:
+        path: The file.
+        reader: Module and name of the function, of which whatever it raises is damage.
+
+    Raises:
+        StoreError: The file is damaged, or asks for more memory or time than fits its size.
+    """
+    refuse_special(path, StoreError)
+    size = path.stat().st_size
+    limits = Limits(_MEMORY + _MEMORY_PER_BYTE * size, _SECONDS + _SECONDS_PER_BYTE * size)
+    try:
+        return call_isolated(path, "bowdenfit.results.netcdf:_read_or_refuse", reader, limits=limits)
+    except DatasetError as error:
+        why, _, _ = str(error).partition(":")
+        raise StoreError(f"{path} is damaged ({why}); fit again, or restore the folder from a copy.") from None
+
+
+def _read_or_refuse(path: Path, reader: str) -> Any:
+    """Call a reader by its name; runs in the other process.
+
+    Raises:
+        DatasetError: Whatever the reader stumbles over.
+    """
+    module, _, name = reader.partition(":")
+    try:
+        return getattr(import_module(module), name)(path)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise DatasetError(shorten(str(error), 200)) from None
 
 
 def own_member(group: h5py.Group, name: str) -> Any:

@@ -10,7 +10,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import refuse_packed, refuse_special
+from bowdenfit.inputs import open_arrays, refuse_special
 from bowdenfit.outputs import replace_atomically
 from bowdenfit.types import Flags, Labels, Matrix
 
@@ -76,6 +76,9 @@ def deserialize(kind: Any, value: Any) -> Any:
     Args:
         kind: The type; of an optional one the first that is not None.
         value: Plain data, in which arrays may stand as they are.
+
+    Raises:
+        TypeError: Something is not of its type.
     """
     if isinstance(value, np.ndarray):
         return value
@@ -84,6 +87,9 @@ def deserialize(kind: Any, value: Any) -> Any:
     parts, origin = [part for part in get_args(kind) if part is not NoneType], get_origin(kind)
     if isinstance(kind, UnionType):
         return deserialize(parts[0], value)
+    for container, plain in ((dict, dict), (Mapping, dict), (list, list), (tuple, list)):
+        if origin is container and not isinstance(value, plain):
+            raise TypeError(f"{_shorten(value)} is no {plain.__name__}")
     if origin in (dict, Mapping):
         return {key: deserialize(parts[1], item) for key, item in value.items()}
     if origin is list:
@@ -92,6 +98,8 @@ def deserialize(kind: Any, value: Any) -> Any:
         types = [parts[0]] * len(value) if Ellipsis in parts else parts
         return tuple(deserialize(part, item) for part, item in zip(types, value, strict=True))
     if isinstance(kind, type) and is_dataclass(kind):
+        if not isinstance(value, dict):
+            raise TypeError(f"{_shorten(value)} is no {kind.__name__}")
         hints = get_type_hints(kind)
         named = [(f, stored_key(f)) for f in fields(kind)]
         required = [f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
@@ -99,6 +107,8 @@ def deserialize(kind: Any, value: Any) -> Any:
         return kind(**{name: deserialize(hints[name], value[key]) for name, key in present})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
+    if kind in (str, int, bool) and type(value) is not kind:
+        raise TypeError(f"{_shorten(value)} is no {kind.__name__}")
     return _number(value) if kind is float else value
 
 
@@ -120,10 +130,17 @@ def _array(kind: Any, value: list[Any]) -> np.ndarray:
 
 
 def _number(value: Any) -> float:
+    if type(value) not in (int, float) and value not in (None, "Infinity", "-Infinity"):
+        raise TypeError(f"{_shorten(value)} is no number")
     return float("nan") if value is None else float(value)
 
 
+def _shorten(value: Any) -> str:
+    return f"{str(value)[:40]!r}"
+
+
 _PAGE, _ARRAY = "page", "array"
+_LARGEST_PAGE = 40e6  # bytes; a judgement: far more than figures need
 
 
 def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
@@ -154,15 +171,17 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
         kinds: Annotated type of what is wanted, by name.
     """
     refuse_special(path, StoreError)
-    with path.open("rb") as opened, np.load(opened) as file:  # what is opened here is closed where it is no archive
-        refuse_packed(file)
+    with path.open("rb") as opened, open_arrays(opened) as file:
+        arrays = {name: file[name] for name in file.files}  # each once, however often it is named
 
         def take(data: Any) -> Any:
             if isinstance(data, list):
                 return [take(one) for one in data]
             if not isinstance(data, dict):
                 return data
-            return file[str(data[_ARRAY])] if _ARRAY in data else {key: take(one) for key, one in data.items()}
+            return arrays[str(data[_ARRAY])] if _ARRAY in data else {key: take(one) for key, one in data.items()}
 
-        page = json.loads(file[_PAGE].tobytes())
+        if arrays[_PAGE].nbytes > _LARGEST_PAGE:
+            raise ValueError("its page is too large")
+        page = json.loads(arrays[_PAGE].tobytes())
         return {name: deserialize(kinds[name], take(page[name])) for name in kinds if name in page}

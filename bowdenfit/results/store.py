@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from bowdenfit.dataset import Dataset
-from bowdenfit.errors import DescriptionError, StoreError
+from bowdenfit.errors import BowdenfitError, StoreError
 from bowdenfit.inference.diagnostics import as_chains
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.least_squares import LeastSquares
@@ -21,12 +21,13 @@ from bowdenfit.kinds.tables import Measurements
 from bowdenfit.outputs import write_text
 from bowdenfit.results.answer_cache import CHECKSUM, file_checksum, page_checksum, write_answers
 from bowdenfit.results.folder import CHAIN, FIGURE_DATA, FIT, POSTERIOR, SUMMARY, folder_to_write, read_page
-from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups, write_groups
+from bowdenfit.results.netcdf import DERIVED, EXPECTED, Coordinates, Groups, read_groups_isolated, write_groups
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Draws, Provenance, Record
 from bowdenfit.results.serialization import deserialize, serialize, write_arrays
 
 SCHEMA = 6  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
+_SAMPLERS = "emcee", "nuts"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains
 # What fit.json keeps of the draws; the draws themselves are in posterior.nc.
 COUNTS = ("n_ensembles", "steps", "acceptance", "sampler", "trajectories", "agreement", "diagnostics")
@@ -81,19 +82,64 @@ def load(folder: Path) -> Record:
     """
     page = _read_page(folder)
     try:
-        dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), page["sha256"])
+        sha256 = deserialize(dict[str, str], page["sha256"])
+        dataset = Dataset(parse_description(page["description"]), _measurements(page["measurements"]), sha256)
         squares = deserialize(LeastSquares, page["least_squares"])
         as_written = page["posterior_crc32"] == file_checksum(folder / POSTERIOR)
         if page["posterior"] and (folder / POSTERIOR).exists() and not as_written:
             remedy = "fit again, or restore the folder from a copy."
             raise StoreError(f"{folder / POSTERIOR} has changed since it was written; {remedy}")
         posterior = _posterior(folder / POSTERIOR, page["posterior"]) if page["posterior"] else None
-        verdict = page["verdict"]["converged"], tuple(page["verdict"]["reasons"])
+        verdict = deserialize(bool, page["verdict"]["converged"]), deserialize(tuple[str, ...], page["verdict"]["reasons"])
         provenance = deserialize(Provenance, page["provenance"])
-    except (*_DAMAGE_ERRORS, OSError, DescriptionError) as error:
+        fit = Record(dataset, squares, posterior, *verdict, provenance)
+        _refuse_other_contents(fit)
+    except StoreError:
+        raise
+    except (*_DAMAGE_ERRORS, OSError, BowdenfitError) as error:
         why = f"{type(error).__name__}: {shorten(str(error), 200)}"
         raise StoreError(f"{folder} is damaged ({why}); fit again, or restore the folder from a copy.") from error
-    return Record(dataset, squares, posterior, *verdict, provenance)
+    return fit
+
+
+def _refuse_other_contents(fit: Record) -> None:
+    """Refuse a fit that does not hold what its model says: other parameters or readings, or numbers that no fit can have.
+
+    Raises:
+        ValueError: It does not.
+    """
+    model, squares = fit.model, fit.least_squares
+    readings = {term.name: (len(term.labels),) for term in model.terms}
+    _refuse_other_arrays("least squares", {"z": squares.z}, {"z": (model.space.size,)})
+    _refuse_other_arrays("least squares", squares.readings, readings)
+    if not set(squares.estimates) <= {p.name for p in model.space.parameters}:
+        raise ValueError("estimates of other parameters")
+    if (draws := fit.sampled) is None:
+        return
+    rows = draws.z.shape[:2]
+    if len(rows) != 2 or 0 in rows or draws.n_ensembles < 1 or rows[0] % draws.n_ensembles or draws.sampler not in _SAMPLERS:
+        raise ValueError("draws that no sampler gives")
+    free, derived = {p.name for p in model.space.free}, set(derived_units(model))
+    optimum = (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if fit.dataset.description.route else ()
+    _refuse_other_arrays("draws", {"z": draws.z}, {"z": (*rows, model.space.size)})
+    _refuse_other_arrays("draws", {k: v for k, v in draws.values.items() if k not in derived}, dict.fromkeys(free, rows))
+    _refuse_other_arrays("draws", {k: v for k, v in draws.values.items() if k in derived}, dict.fromkeys(derived, rows), False)
+    _refuse_other_arrays("draws", draws.optimum, dict.fromkeys(optimum, rows))
+    for of_readings in (draws.log_likelihood, draws.expected, draws.replicated):
+        _refuse_other_arrays("draws", of_readings, {name: (*rows, *shape) for name, shape in readings.items()}, False)
+    if set(draws.diagnostics) != {*free, *optimum}:
+        raise ValueError("diagnostics of other parameters")
+
+
+def _refuse_other_arrays(
+    what: str, arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]], finite: bool = True
+) -> None:
+    """Refuse arrays that have not these names and shapes, or are not 64-bit numbers, or (if `finite`) not all finite."""
+    if {name: array.shape for name, array in arrays.items()} != dict(shapes):
+        raise ValueError(f"{what} of other names or shapes")
+    for name, array in arrays.items():
+        if array.dtype != np.float64 or (finite and not np.isfinite(array).all()):
+            raise ValueError(f"{what} of {name} that are no numbers")
 
 
 def _read_page(folder: Path) -> dict[str, Any]:
@@ -220,16 +266,18 @@ def _variable_attributes(fit: Record) -> dict[str, dict[str, str]]:
 def _posterior(path: Path, page: Mapping[str, Any]) -> Draws:
     if not path.exists():
         raise StoreError(f"{path} is missing; fit again, or restore the folder from a copy.")
-    groups = _as_walkers(read_groups(path))
+    groups = _as_walkers(read_groups_isolated(path))
     values, z = dict(sorted((groups["posterior"] | groups.get(DERIVED, {})).items())), groups["unconstrained_posterior"]
     optimum = {name: values.pop(name) for name in (OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY) if name in values}
+    if set(z) != set(groups["posterior"]) - set(optimum):
+        raise ValueError("draws of other parameters in z")
     hints = get_type_hints(Draws)
     counts = {name: deserialize(hints[name], page[name]) for name in COUNTS}
     if counts["trajectories"] is not None:
         statistics = {name: value for name, value in groups["sample_stats"].items() if name != LOG_POSTERIOR}
         counts["trajectories"] = replace(counts["trajectories"], statistics=statistics)
     return Draws(
-        z=np.stack(list(z.values()), axis=-1),
+        z=np.stack(list(z.values()), axis=-1, dtype=np.float64, casting="no"),
         values=values,
         optimum=optimum,
         log_likelihood=groups["log_likelihood"],

@@ -18,7 +18,7 @@ from bowdenfit.questions.summary.brief import summary_text
 from bowdenfit.questions.summary.details import details_text
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.questions.writing import write_page
-from bowdenfit.results.answer_cache import record_drawn_figures, write_captions
+from bowdenfit.results.answer_cache import record_drawn_figures, record_texts, write_captions
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit
 from bowdenfit.results.store import save
 from bowdenfit.words import few, listed, printable
@@ -53,6 +53,8 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
     save(fit, fit.summary(), folder, True, collect_answers(fit), data)
     attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
     attempt(DETAILS_TEXT, lambda: write_text(folder / DETAILS_TEXT, printable(details_text(fit))))
+    if not failed.keys() & {SUMMARY_TEXT, DETAILS_TEXT}:
+        attempt(SUMMARY_TEXT, record_texts, folder)
     mark = warning_mark(assess_fit(fit).troubles)
     for name, shown in data.items():
         attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)

@@ -1,11 +1,13 @@
 """The figures of a fit on its report: the answer first, what is for statisticians folded, two to zoom into."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from bowdenfit.errors import UsageError
+from bowdenfit.inputs import damage_as
 from bowdenfit.pages.section import Chart, HtmlPage, PageSection, Picture, prose_section
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.bends.words import section as bends_section
@@ -13,6 +15,7 @@ from bowdenfit.questions.error_budget import budget_section
 from bowdenfit.questions.figures import (
     FIGURES,
     collect_figure_data,
+    damaged_figure_data,
     figure_caption,
     read_figure_data,
     warning_mark,
@@ -100,15 +103,17 @@ def write_report(fit: Record | str | Path, output: str | Path | None, rank_next:
         StoreError: The results folder is missing or damaged, or the file cannot be written.
     """
     figures = dict[str, Any]()
+    guard: AbstractContextManager[None] = nullcontext()
     if isinstance(fit, str | Path):
         folder = Path(fit)
         output, fit, figures = output or folder / REPORT, load(folder), read_figure_data(folder)
+        guard = damage_as(damaged_figure_data(folder)) if figures else guard
     if output is None:
         raise UsageError("a fit by itself has no folder; name a file for the report.")
     ranking = rank_measurements(fit) if rank_next else None
     figures, path, mark = figures or dict(collect_figure_data(fit)), Path(output), warning_mark(assess_fit(fit).troubles)
     path = path / REPORT if path.is_dir() else path
-    with file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
+    with guard, file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
         for name, data in figures.items():
             write_figure_files(name, data, Path(figures_folder), (PNG,), fit.name, mark=mark)
         write_page(report_page(fit, figures, ranking), Path(figures_folder), temporary)

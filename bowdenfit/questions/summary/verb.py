@@ -8,8 +8,10 @@ from cyclopts import Parameter
 
 from bowdenfit import results as results_door
 from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, Quantity, as_pair, number_with_unit, read_first
+from bowdenfit.errors import StoreError
 from bowdenfit.questions import summary as room
-from bowdenfit.results.folder import DETAILS_TEXT, FIT, SUMMARY, SUMMARY_TEXT, read_page, read_text
+from bowdenfit.results.answer_cache import are_texts_unchanged
+from bowdenfit.results.folder import DETAILS_TEXT, SUMMARY, SUMMARY_TEXT, read_page, read_text
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
@@ -19,21 +21,26 @@ if TYPE_CHECKING:
 
 @read_first
 def summary(results: Annotated[str | Path, RESULTS, PATH], *, full: bool = False) -> "tuple[str, Any] | Record":
-    """The summary of a finished fit, for people and as JSON; or the fit, where they were not written.
+    """The summary of a finished fit, for people and as JSON; or the fit, where they are not there as this version writes them.
 
     Args:
         results: Its folder.
         full: Everything that the fit says, instead of one page.
 
     Raises:
-        StoreError: The folder is missing, unfinished or damaged.
+        StoreError: The folder is missing, unfinished or damaged, or one of the texts was changed.
     """
     folder = Path(results)
-    if all((folder / name).exists() for name in (FIT, SUMMARY, SUMMARY_TEXT, DETAILS_TEXT)):
-        shown = DETAILS_TEXT if full else SUMMARY_TEXT
-        text, page = (read_text(folder / shown), read_page(folder / SUMMARY))
-        return text, page
-    return results_door.load(folder)
+    if not are_texts_unchanged(folder):
+        return results_door.load(folder)
+    text, page = read_text(folder / (DETAILS_TEXT if full else SUMMARY_TEXT)), read_page(folder / SUMMARY)
+    if not _says_whether_trusted(page):
+        raise StoreError(f"{folder / SUMMARY} is damaged; remove it, and bowdenfit summary says again what the fit says.")
+    return text, page
+
+
+def _says_whether_trusted(page: Any) -> bool:
+    return isinstance(page, dict) and isinstance(page.get("verdict"), dict) and type(page["verdict"].get("trusted")) is bool
 
 
 def reply(results: "tuple[str, Any] | Record", options: Mapping[str, Any]) -> Reply:

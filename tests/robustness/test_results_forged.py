@@ -1,0 +1,171 @@
+"""Results folders that somebody edited or forged, with checksums that are right: refused, never believed unread."""
+
+import io
+import random
+import shutil
+import zipfile
+
+import h5py
+import numpy as np
+import pytest
+from forging import ask, contents, forge, reseal
+from sealed import edit_sealed
+
+import bowdenfit as bf
+from bowdenfit.inputs import open_arrays
+from bowdenfit.results.answer_cache import captions_if_unchanged, file_checksum, installed_version
+from bowdenfit.results.folder import read_page
+from bowdenfit.results.serialization import deserialize, read_arrays
+
+
+@pytest.fixture
+def folder(quick_results, tmp_path):
+    return shutil.copytree(quick_results, tmp_path / "fit")
+
+
+def test_the_summary_is_printed_as_it_was_written(folder, run):
+    code, out, _ = run("summary", folder)
+    assert code in (0, 3) and out == (folder / "summary.txt").read_text()
+
+
+@pytest.mark.parametrize("name", ["summary.txt", "details.txt", "summary.json"])
+def test_an_edited_summary_is_not_printed(folder, refuse, name):
+    text = (folder / name).read_text()
+    (folder / name).write_text(text.replace("0.", "0.0"))
+    assert f"{name} has changed since it was written" in refuse("summary", folder)
+
+
+@pytest.mark.extended
+def test_a_summary_that_was_removed_is_written_anew(folder, run):
+    text = (folder / "summary.txt").read_text()
+    (folder / "summary.txt").unlink()
+    assert run("summary", folder)[1] == text
+
+
+@pytest.mark.parametrize("damage", ["gone", "garbage"])
+def test_a_summary_without_its_draws_is_not_printed(folder, refuse, damage):
+    (folder / "posterior.nc").unlink()
+    if damage == "garbage":
+        (folder / "posterior.nc").write_text("garbage")
+    assert "posterior.nc" in refuse("summary", folder)
+
+
+def not_numbers(values):
+    values.flat[3] = np.nan
+    return values
+
+
+DRAWS = {
+    "text": lambda values: np.full(values.shape, b"x", dtype="S1"),
+    "not numbers": not_numbers,
+    "of 16 bits": lambda values: values.astype(np.float16),
+    "fewer": lambda values: values[:, :-1],
+    "of another parameter": lambda values: None,
+}
+
+
+@pytest.mark.parametrize("what", DRAWS)
+def test_forged_draws_are_refused(folder, what):
+    with h5py.File(folder / "posterior.nc", "a") as file:
+        group = file["unconstrained_posterior"]
+        name = next(name for name in group if group[name].ndim == 2)
+        values = DRAWS[what](group[name][()])
+        group.move(name, "other")
+        if values is not None:
+            del group["other"]
+            group[name] = values
+    reseal(folder)
+    with pytest.raises(bf.StoreError, match="damaged"):
+        bf.load(folder)
+
+
+EDITS = {
+    "seed": lambda page: page["provenance"].update(seed="three"),
+    "versions": lambda page: page["provenance"].update(versions=[1]),
+    "hashes": lambda page: page.update(sha256={"cable.toml": 7}),
+    "no hashes": lambda page: page.update(sha256=None),
+    "converged": lambda page: page["verdict"].update(converged="yes"),
+    "reasons": lambda page: page["verdict"].update(reasons="yes"),
+    "estimates": lambda page: page["least_squares"]["estimates"].update(other=page["least_squares"]["estimates"].popitem()[1]),
+    "solution": lambda page: page["least_squares"].update(z=[0.0]),
+    "steps": lambda page: page["posterior"].update(steps="many"),
+    "ensembles": lambda page: page["posterior"].update(n_ensembles=0),
+    "sampler": lambda page: page["posterior"].update(sampler="guess"),
+}
+
+
+@pytest.mark.parametrize("what", EDITS)
+def test_a_forged_fit_is_refused(folder, what):
+    edit_sealed(folder / "fit.json", EDITS[what])
+    with pytest.raises(bf.StoreError, match="damaged"):
+        bf.load(folder)
+
+
+@pytest.mark.parametrize("text", ['{"a":' * 60 + "1" + "}" * 60, "[" * 100_000, '{"a": NaN}', "-Infinity"])
+def test_json_that_is_never_written_here_is_refused(tmp_path, text):
+    (tmp_path / "page.json").write_text(text)
+    with pytest.raises(bf.StoreError, match="damaged"):
+        read_page(tmp_path / "page.json")
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [(int, True), (int, 1.5), (str, 1), (bool, 1), (float, "x"), (float, True), (dict[str, int], []), (tuple[str, ...], "ab")],
+)
+def test_values_of_another_type_are_refused(kind, value):
+    with pytest.raises(TypeError):
+        deserialize(kind, value)
+
+
+def test_a_huge_array_in_place_of_an_archive_is_not_read(tmp_path):
+    written = io.BytesIO()
+    np.lib.format.write_array_header_1_0(written, {"descr": "<f8", "fortran_order": False, "shape": (10**11,)})
+    (tmp_path / "figures.npz").write_bytes(written.getvalue())
+    with pytest.raises(ValueError, match="no archive"):
+        read_arrays(tmp_path / "figures.npz", {})
+
+
+def test_arrays_of_an_archive_share_no_bytes():
+    file = io.BytesIO()
+    np.savez(file, a=np.ones(9), b=np.ones(9))
+    with open_arrays(io.BytesIO(file.getvalue())) as arrays:
+        assert set(arrays.files) == {"a", "b"}
+    with zipfile.ZipFile(file) as archive:
+        first, second = archive.infolist()
+    content = bytearray(file.getvalue())
+    at = content.rindex(b"PK\x01\x02") + 42  # where the second entry of the table of contents says that it begins
+    content[at : at + 4] = first.header_offset.to_bytes(4, "little")
+    assert second.header_offset > 0
+    with pytest.raises(ValueError, match="shares bytes"), open_arrays(io.BytesIO(content)):
+        pass
+
+
+def test_names_of_figures_lead_nowhere_else(folder):
+    (folder / "figures").mkdir(exist_ok=True)
+    (folder / "mine.png").write_text("x")
+    (folder / "figures" / "x.png").write_text("x")
+
+    def drawn(name):
+        page = {"with": installed_version("matplotlib"), "captions": {name: "A figure."}}
+        page["files"] = {f"{name}.png": file_checksum(folder / "figures" / f"{name}.png")}
+        edit_sealed(folder / "answers.json", lambda answers: answers["answers"].update(drawn=page))
+        return captions_if_unchanged(folder, (), ("png",))
+
+    assert drawn("x") == {"x": "A figure."}
+    assert drawn("../mine") is None
+
+
+VERBS = (("summary",), ("summary", "--json"), ("length",), ("identify",), ("plot", "--width", "3.5in"), ("report",))
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize("number", range(24))
+def test_a_forged_folder_is_refused_or_read_and_nothing_else_is_written(folder, tmp_path, monkeypatch, number):
+    chance = random.Random(f"forged {number}")
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    what, verb, before = forge(chance, folder), chance.choice(VERBS), contents(tmp_path, folder)
+    code, said = ask(folder, verb)
+    assert code in (0, 2, 3), (what, verb, said)
+    assert contents(tmp_path, folder) == before
+    assert not [path for path in folder.rglob("*") if path.name.endswith(".partial") or path.name == ".lock"]

@@ -7,15 +7,15 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from bowdenfit.units import LARGEST, conversion_factor
 
-_LONGEST_NAME = 80  # characters, a line of a terminal
+LONGEST_NAME = 80  # characters, a line of a terminal
 
 
 def _nameable(name: str) -> str:
     """Return a name that can be printed and told apart."""
     if not name.strip():
         raise ValueError("the name is empty; write one that differs from the others")
-    if len(name) > _LONGEST_NAME:
-        raise ValueError(f"the name has {len(name)} characters; at most {_LONGEST_NAME} fit into tables and figures")
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"the name has {len(name)} characters; at most {LONGEST_NAME} fit into tables and figures")
     hidden = [letter for letter in name if unicodedata.category(letter) in {"Cc", "Cf", "Cs", "Zl", "Zp"}]
     if hidden:
         raise ValueError(f"the name holds a character that cannot be printed, {hidden[0]!a}; leave it out")

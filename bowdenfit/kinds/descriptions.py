@@ -9,14 +9,14 @@ from pydantic import BaseModel, ValidationError, create_model
 
 from bowdenfit.description import BY_GROUP, Description, Table, Tables
 from bowdenfit.description.file import Place, check_quantities, find_placeholders, read_toml, validate
-from bowdenfit.description.values import Frozen
+from bowdenfit.description.values import LONGEST_NAME, Frozen
 from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError, Faults, suggest_name
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.kind import Design, FrictionKind, Kind, PlannedKind
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.units import ColumnSource
-from bowdenfit.words import listed
+from bowdenfit.words import listed, shown
 
 _NEEDED_BY_TABLES = {"schema", "friction_model", "group", "cable", "route", "contact", "tables", "recording", "design"}
 """Keys without which tables cannot be read."""
@@ -231,6 +231,11 @@ def order_groups(description: Description, measurements: Measurements) -> tuple[
     """
     tables = [(kind, kind.groups(table)) for kind, table in iterate_tables(measurements) if isinstance(kind, FrictionKind)]
     names = list(dict.fromkeys(name for _, groups in tables for name in groups))
+    if description.by_group and (long := next((name for name in names if len(name) > LONGEST_NAME), None)):
+        raise DescriptionError(
+            f"a group has a name of {len(long)} characters, {shown(long)}; at most {LONGEST_NAME} fit into tables and figures, "
+            "and each group's coefficient is called by it: write a shorter one."
+        )
     without = [kind.name for kind, groups in tables if not groups]
     if description.by_group and without:
         raise DescriptionError(

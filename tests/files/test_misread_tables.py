@@ -59,7 +59,8 @@ def test_three_digits_behind_a_mark_beside_whole_numbers_are_ambiguous(tmp_path,
 
 def test_a_whole_column_in_thousands_beside_whole_numbers_is_ambiguous(tmp_path):
     text = "input_force_N;output_force_N\n1.000;686\n1.200;823\n1.400;961\n"
-    assert "'1.000' may mean 1000 or 1.000" in refused(tmp_path, text)
+    sentence = refused(tmp_path, text)
+    assert "'1.000' may mean 1000 or 1.000" in sentence and sentence.endswith("The same in rows 3 and 4.")
 
 
 @pytest.mark.parametrize(

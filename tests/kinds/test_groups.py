@@ -52,6 +52,11 @@ def test_equal_coefficients_of_all_groups_are_the_shared_one(tmp_path):
     assert abs(_log_likelihood(own.model, np.append(z[0] + 0.5, z)) - one) > 1
 
 
+def test_a_group_has_a_name_that_fits_into_a_table(tmp_path):
+    with pytest.raises(DescriptionError, match="a group has a name of 81 characters"):
+        load_dataset(_folder(tmp_path, ("n" * 81, "old"), top=BY_GROUP))
+
+
 def test_a_group_is_read_with_its_own_coefficient(tmp_path):
     model = _density(_folder(tmp_path, top=BY_GROUP)).model
     values = {p.name: jnp.asarray(0.01) for p in model.space.parameters} | {

@@ -101,7 +101,7 @@ def forge(chance: random.Random, folder: Path) -> str:
 
 def forge_draws(chance: random.Random, path: Path) -> None:
     """Other draws, of a type, shape or value that no fit has."""
-    with h5py.File(path, "a") as file:
+    with np.errstate(all="ignore"), h5py.File(path, "a") as file:
         group = file[chance.choice(list(file))]
         name = chance.choice([name for name in group if isinstance(group[name], h5py.Dataset)])
         values = group[name][()]

@@ -177,6 +177,16 @@ def conversion_factor(unit: str, dimension: str, to: str | None = None) -> float
     return float(_registry().Quantity(1.0, _parsed(unit)).to(target).magnitude)
 
 
+def differing_units(one: str, other: str) -> str:
+    """Return in words how two units differ; empty where they are the same."""
+    if one == other or weight_of(one) == other or weight_of(other) == one:
+        return ""
+    if not _same_kind(_parsed(one), _parsed(other)):
+        return "which measures something else"
+    ratio = float(_registry().Quantity(1.0, _parsed(one)).to(_parsed(other)).magnitude)
+    return "" if math.isclose(ratio, 1.0) else f"and 1 {one} is {ratio:.4g} {other}"
+
+
 def contradiction(stated: str | None, written: str | None) -> str:
     """Return in words that a stated unit is another than the one written over the numbers; empty where they agree."""
     stated = (stated or "").strip().lstrip("-\u2212")

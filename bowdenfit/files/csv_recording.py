@@ -50,9 +50,11 @@ from bowdenfit.files.text_file import (
     declared_separator,
     first_bytes,
     first_lines,
+    holds_other_row,
     is_blank,
     last_lines,
     lines_between,
+    other_separator_error,
     refuse_long_row,
     split_cells,
     split_records,
@@ -258,6 +260,11 @@ def read_start(path: Path, data: bytes) -> Sheet:
     layout = _take_units_of_labview(_fit_layout(path, layout, below, separator, above), separator, above)
     over = tuple(rows[separator][i].row for i in layout.over)
     others = {line.row: _explain_row_above(line) for line in every if line.start < below[0].start and line.row not in over}
+    width = len(layout.kinds)
+    for line in every:
+        is_short = others.get(line.row, (BLANK, ""))[0] == ABOVE and len(split_cells(line.text, separator)) < width
+        if is_short and holds_other_row(line.text, width):
+            raise other_separator_error(path.name, line.row, line.text.strip())
     return Sheet(encoding, separator, decimal, below[0].start, layout, tuple(line.text for line in above), over, others)
 
 

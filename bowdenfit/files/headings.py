@@ -13,7 +13,7 @@ from functools import lru_cache
 from bowdenfit.errors import DatasetError, suggest_name
 from bowdenfit.files.clocks import names_time, unit_of_time
 from bowdenfit.files.spellings import parse_heading
-from bowdenfit.units import ColumnSource, is_unit
+from bowdenfit.units import ColumnSource, differing_units, is_unit
 from bowdenfit.words import shown
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\])]*)[\])]\s*$")
@@ -108,6 +108,21 @@ def is_units_row(cells: Sequence[str]) -> bool:
     """Return whether a row holds nothing but units, as "s;N;N" or "[s],[N]"; LVM and others leave some blank."""
     written = [strip_brackets(cell) for cell in cells if cell.strip()]
     return bool(written) and all(is_unit(unit) for unit in written) and not all(map(names_time, written))
+
+
+def refuse_two_units(place: str, headings: Sequence[str], units: Sequence[str]) -> None:
+    """Refuse a unit in the row below a heading that is another than the one in the heading.
+
+    Raises:
+        DatasetError: There is such a pair.
+    """
+    for heading, below in zip(headings, map(strip_brackets, units), strict=False):
+        unit = heading_of(heading).unit
+        if unit and below and is_unit(unit) and is_unit(below) and (why := differing_units(unit, below)):
+            raise DatasetError(
+                f"{place}: the heading {shown(' '.join(heading.split()))} is in {unit}, and the row of units says "
+                f"{below} below it, {why}; correct the one that is wrong, or delete the row of units."
+            )
 
 
 def is_number(text: str) -> bool:

@@ -35,6 +35,7 @@ class Layout:
         heading_cells: Number of cells in the row of headings.
         over: Positions of the rows of headings and units.
         by_numbers: Whether the headings are a row of numbers, which may be data.
+        names, units: What stands over each column, and in a row of units below that; empty where nothing does.
     """
 
     start: int
@@ -45,6 +46,8 @@ class Layout:
     heading_cells: int = 0
     over: tuple[int, ...] = ()
     by_numbers: bool = False
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
     @property
     def room(self) -> int:
@@ -98,6 +101,8 @@ def find_layout(rows: Rows, decimal: str) -> Layout | None:
         max(map(len, header)),
         tuple(over),
         by_numbers,
+        tuple(names),
+        tuple(units),
     )
 
 

@@ -18,10 +18,10 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import Cell, classify_cell, parse_number
 from bowdenfit.files.channels import Channel, make_names_unique
 from bowdenfit.files.clocks import assign_clocks, parse_dates, trim_tails
-from bowdenfit.files.headings import heading_of
+from bowdenfit.files.headings import heading_of, refuse_two_units
 from bowdenfit.files.layout import Layout, is_index, is_summary
 from bowdenfit.files.row_account import AGAIN, BELOW, BETWEEN, BLANK, COMMENT
-from bowdenfit.files.text_file import refuse_long_row
+from bowdenfit.files.text_file import holds_other_row, other_separator_error, refuse_long_row
 from bowdenfit.types import Vector
 from bowdenfit.words import few, shown
 
@@ -125,6 +125,7 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
     Raises:
         DatasetError: Text stands among the numbers of a column.
     """
+    refuse_two_units(sheet.place, sheet.layout.names, sheet.layout.units)
     kinds, cells = sheet.layout.kinds, read_cells(sheet)
     stop = _data_end(bytes(cells.letters))
     left_out, beside = _explain_left_out(sheet, cells, stop), []
@@ -188,11 +189,23 @@ def _explain_left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[in
         elif letter == SPACE or (letter == EMPTY and position >= stop):
             left_out[sheet.number(position)] = BLANK, ""
         elif position >= stop:
+            _refuse_samples(sheet, position, of_row.get(position, []))
             left_out[sheet.number(position)] = BELOW, text_of_row
         elif letter == WORDS and (why := _explain_words(sheet, of_row.get(position, []))):
+            _refuse_samples(sheet, position, of_row[position])
             left_out[sheet.number(position)] = why, text_of_row
             cells.letters[position] = REMARK
     return left_out
+
+
+def _refuse_samples(sheet: SheetRows, position: int, words: Sequence[tuple[int, str]]) -> None:
+    """Refuse to leave out a row whose only words are numbers behind another separator.
+
+    Raises:
+        DatasetError: It is such a row.
+    """
+    if len(words) == 1 and holds_other_row(words[0][1], len(sheet.layout.kinds)):
+        raise other_separator_error(sheet.place, sheet.number(position), words[0][1])
 
 
 def _explain_words(sheet: SheetRows, words: Sequence[tuple[int, str]]) -> str:

@@ -11,11 +11,11 @@ from functools import lru_cache
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.cells import BLANK, is_plain_number
-from bowdenfit.files.headings import is_units_row, plain_name, strip_brackets
+from bowdenfit.files.headings import is_units_row, plain_name, refuse_two_units, strip_brackets
 from bowdenfit.files.layout import is_summary
 from bowdenfit.files.measured_cells import is_reading
 from bowdenfit.files.row_account import ABOVE, AGAIN, BELOW, BETWEEN
-from bowdenfit.files.text_file import SEPARATORS, CsvRecord, split_cells
+from bowdenfit.files.text_file import SEPARATORS, CsvRecord, other_separator_error, split_cells
 from bowdenfit.words import shown
 
 _NEAR_TOP = 60  # judged: rows in which headings are looked for
@@ -83,6 +83,7 @@ def _split_columns(rows: Sequence[CsvRecord], file: str) -> TableParts:
     if below < len(filled) and is_units(filled[below]):
         units = [strip_brackets(cell) for cell in filled[below].cells]
         over.append(filled[below])
+        refuse_two_units(f"{file}, row {filled[below].row}", filled[at].cells, units)
     names = [" ".join(cell.split()) for cell in filled[at].cells]
     if at and _is_over(filled[at - 1], names):
         names = _join_groups(filled[at - 1].cells, names)
@@ -212,11 +213,7 @@ def _refuse_reading(row: CsvRecord, header: CsvRecord, numeric: set[int], file: 
         cells = split_cells(filled[0].strip().strip('"'), separator)
         numbers = sum(map(is_measured, cells))
         if len(cells) == width > 1 and numbers >= max(len(numeric), 1):
-            raise DatasetError(
-                f"{file}, row {row.row}: {shown(filled[0])} looks like a row of readings, but its cells are not separated as "
-                "those of the rows above; the usual causes are rows that were pasted from another file, and quotation marks "
-                "around a whole row. Separate its columns as in the other rows, or begin the row with # if it is a remark."
-            )
+            raise other_separator_error(file, row.row, filled[0])
 
 
 def _refuse_other_headings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> None:

@@ -498,3 +498,47 @@ def test_a_table_of_wrap_angles_by_length_is_said_to_be_one(tmp_path, run):
 def test_ambiguous_thousands_are_said_once_a_column(tmp_path):
     said = refused(tmp_path, HEADING + '"1,000",730\n"1,200",876\n"1,400","1,022"\n')
     assert "'1,000' may mean 1000 or 1.000" in said and "The same in rows 3 and 4." in said
+
+
+def sampled(count, separator=","):
+    return [separator.join((f"{0.02 * i:.2f}", f"{20 + i % 9}.5", f"{15 + i % 7}.25")) for i in range(count)]
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+@pytest.mark.parametrize(("first", "second"), [(400, 200), (30, 600), (600, 1)])
+def test_samples_behind_another_separator_are_no_statistics(tmp_path, separator, first, second):
+    from bowdenfit.files import read_channels
+
+    rows = ["time_s,input_force_N,output_force_N", *sampled(first), *sampled(second, separator)]
+    (tmp_path / "log.csv").write_text("\n".join(rows) + "\n")
+    with pytest.raises(bf.DatasetError, match="looks like a row of readings"):
+        read_channels(tmp_path / "log.csv")
+
+
+def test_statistics_and_remarks_in_recordings_are_left_out_as_before(tmp_path):
+    from bowdenfit.files import read_channels
+
+    rows = ["Bench 3; 1,2", "time_s,input_force_N,output_force_N", *sampled(100), "rope changed; 2 of 3 screws", *sampled(50)]
+    (tmp_path / "log.csv").write_text("\n".join([*rows, "", "mean,21.5,17.3", "Measured on Monday"]) + "\n")
+    assert {len(channel.values) for channel in read_channels(tmp_path / "log.csv").channels} == {150}
+
+
+TWO_UNITS = [("N", "Output force (kgf)", "daN"), ("N", "Output force (N)", "lbf"), ("N", "Output force (N)", "mm")]
+
+
+@pytest.mark.parametrize(("first", "heading", "below"), TWO_UNITS)
+def test_a_unit_below_a_heading_that_contradicts_it_is_refused(tmp_path, first, heading, below):
+    from bowdenfit.files import read_channels
+
+    (tmp_path / "t.csv").write_text(f"Input force (N),{heading}\n{first},{below}\n10,1\n20,2\n30,3\n")
+    rows = [f"{row}" for row in sampled(60)]
+    (tmp_path / "log.csv").write_text("\n".join([f"time,Input force (N),{heading}", f"s,{first},{below}", *rows]) + "\n")
+    for read, name in ((read_csv, "t.csv"), (read_channels, "log.csv")):
+        with pytest.raises(bf.DatasetError, match=f"the row of units says {below} below it"):
+            read(tmp_path / name)
+
+
+@pytest.mark.parametrize(("heading", "below"), [("Output force (N)", "[N]"), ("Output force (kg)", "kgf"), ("F_out", "N")])
+def test_a_unit_below_a_heading_that_agrees_with_it_is_read(tmp_path, heading, below):
+    (tmp_path / "t.csv").write_text(f"Input force (N),{heading}\nN,{below}\n10,1\n20,2\n30,3\n")
+    assert len(read_csv(tmp_path / "t.csv").rows) == 3

@@ -16,6 +16,7 @@ from bowdenfit.words import quoted, shown
 
 _FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
 _SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
+_SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
 _DATES = 1e8  # numbers from here on are dates, of which the unit is plain
 
 
@@ -188,6 +189,7 @@ def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
     Raises:
         DatasetError: It is such a clock.
     """
+    _refuse_short_clock(file, channel)
     if (clock := clock_in_doubt(file, channel)) is None or channel.time is None:
         return
     step, length = float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
@@ -196,4 +198,24 @@ def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
         f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
         f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s. Say which it is: "
         f"{in_milliseconds}, or {in_seconds}."
+    )
+
+
+def _refuse_short_clock(file: ChannelFile, channel: Channel) -> None:
+    """Refuse a clock that says no unit and by which all strokes of a recording would last less than a second.
+
+    Raises:
+        DatasetError: It is such a clock.
+    """
+    clock = next((c for c in file.channels if c.name == channel.clock), None)
+    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
+        return
+    length = float(np.nanmax(channel.time) - np.nanmin(channel.time))
+    if not 0 < length < _SHORTEST or np.nanmax(np.abs(clock.values)) >= _DATES:
+        return
+    options = [option_naming("time", clock.name, unit, "--channel") for unit in ("day", "min", "s")]
+    raise DatasetError(
+        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
+        f"{length:.3g} s, in minutes {60 * length:.4g} s, and in days, as spreadsheets count them, {86400 * length:.4g} s. Say "
+        f"which it is: {options[0]}, {options[1]}, or {options[2]}."
     )

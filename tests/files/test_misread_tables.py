@@ -201,6 +201,15 @@ def test_a_clock_in_milliseconds_without_a_unit_is_asked_about(tmp_path, run):
     assert run("check", recording(tmp_path, 0.02, "time"))[0] == 0
 
 
+@pytest.mark.parametrize(("step", "start", "unit"), [(2.314815e-7, 46083.4951, "day"), (0.02 / 60, 0.0, "min")])
+def test_a_clock_in_days_or_minutes_without_a_unit_is_asked_about(tmp_path, run, step, start, unit):
+    path = clock_recording(tmp_path, [f"{start + i * step:.9f}" for i in range(600)], "Time")
+    code, out, _ = run("check", path)
+    words = " ".join(out.split())
+    assert code == 2 and "does not say its unit; in seconds the recording would last" in words and f"time=Time:{unit}" in words
+    assert "a recording of 12 s" in " ".join(run("check", path, "--channel", f"time=Time:{unit}")[1].split())
+
+
 def test_a_code_for_missing_samples_is_named(tmp_path, run):
     code, out, _ = run("check", recording(tmp_path, 0.02, "time_s", missing=12))
     assert code == 2 and "12 samples of output_force are exactly -9999 N" in " ".join(out.split())

@@ -14,6 +14,7 @@ from bowdenfit.files.cells import Cell, is_plain_number
 from bowdenfit.files.headings import (
     MatchedColumn,
     find_candidates,
+    heading_of,
     is_number,
     meanings,
     option_naming,
@@ -360,7 +361,8 @@ def _check_source(
 
 def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> Column:
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
-    written = written or split_brackets(source.name)[1] or table.units[table.header.index(source.name)] or None
+    written = written or split_brackets(source.name)[1] or table.units[table.header.index(source.name)]
+    written = written or heading_of(source.name).unit or None
     if why := contradiction(source.unit, written):
         raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(source.name)}: {why}.")
     return _column(table, source.name, quantity, source.unit or written)

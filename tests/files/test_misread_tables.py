@@ -551,3 +551,13 @@ def test_a_unit_below_a_heading_that_contradicts_it_is_refused(tmp_path, first, 
 def test_a_unit_below_a_heading_that_agrees_with_it_is_read(tmp_path, heading, below):
     (tmp_path / "t.csv").write_text(f"Input force (N),{heading}\nN,{below}\n10,1\n20,2\n30,3\n")
     assert len(read_csv(tmp_path / "t.csv").rows) == 3
+
+
+@pytest.mark.parametrize("behind", ["N", "kN", "lbf"])
+def test_a_named_column_keeps_the_unit_behind_its_heading(tmp_path, run, behind):
+    (tmp_path / "t.csv").write_text(f"F_in_{behind},cell_B_{behind}\n10,8\n20,16\n30,24\n")
+    columns = ["--column", f"input_force=F_in_{behind}", "--column", f"output_force=cell_B_{behind}"]
+    assert run("check", tmp_path / "t.csv", *columns, "--wrap-angle", "180deg")[0] == 0
+    columns[1] += ":mN"
+    code, _, err = run("check", tmp_path / "t.csv", *columns, "--wrap-angle", "180deg")
+    assert code == 2 and f"its heading says {behind}" in err

@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
 from cyclopts import Parameter
 
 from bowdenfit.arguments import DATASET, PATH, TEXTS, Quantity, as_pair, number_with_unit, read_first, whole_number
 from bowdenfit.errors import UsageError
+from bowdenfit.frames import is_frame, write_frame
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
+    from bowdenfit.frames import Frame
 
 
 class Reading(TypedDict, total=False):
@@ -60,22 +63,31 @@ _SETTINGS = {  # keywords that stand for a setting of cable.toml
 
 
 @read_first
-def read(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: Unpack[Reading]) -> "Dataset":
+def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **reading: Unpack[Reading]) -> "Dataset":
     """Read and check a data set, without fitting anything.
 
     Args:
-        dataset: Folder with a cable.toml, the file itself, or one table or recording.
+        dataset: Folder with a cable.toml, the file itself, or one table or recording: a file, or a data frame of pandas or
+            polars with units in its headings or in attrs["units"].
         reading: See `Reading`; `wrap_angle` is a number and its unit, needed where the rows of a lone file have none.
 
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
-        UsageError: There is no such keyword, or it comes too late for a data set that has been read.
+        UsageError: There is no such keyword, it comes too late for a data set that has been read, or there is no data set.
     """
     from bowdenfit.dataset import Dataset, load_folder_or_file  # here, because --help lists `Reading` without NumPy
 
     if isinstance(dataset, Dataset):
         refuse_named(reading, f"{dataset.description.name} has been read already", "name that where it is read")
         return dataset
+    if is_frame(dataset):
+        with TemporaryDirectory() as folder:
+            return read(write_frame(dataset, Path(folder)), **reading)
+    if not isinstance(dataset, str | Path):
+        raise UsageError(
+            f"a {type(dataset).__name__} is not a data set; name a folder or a file, or put the readings into a pandas "
+            'DataFrame whose headings are quantities with their units, such as "input force (N)".'
+        )
     return load_folder_or_file(
         Path(dataset),
         changed_settings(reading),

@@ -19,6 +19,7 @@ from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
     from bowdenfit.finished_fit import Fit
+    from bowdenfit.frames import Frame
     from bowdenfit.inference.chain import Progress
 
 Sampler = Literal["emcee", "nuts", "both"]
@@ -26,7 +27,7 @@ Sampler = Literal["emcee", "nuts", "both"]
 
 @read_first
 def fit(
-    dataset: Annotated["str | Path | Dataset", DATASET, PATH],
+    dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH],
     *,
     output: Annotated[Output, Parameter(show_default="fits/NAME OF DATASET")] = None,
     mcmc: Annotated[bool, Parameter(negative="--no-mcmc")] = True,

@@ -18,6 +18,7 @@ from bowdenfit.verb import Reply, Verb, Watch, show_progress_bar
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
+    from bowdenfit.frames import Frame
     from bowdenfit.questions.calibrate.answer import Calibration
 
 NOT_CALIBRATED = 3
@@ -27,7 +28,7 @@ _WORKERS = "four at most of the cores; 16 jobs of Slurm"
 
 @read_first
 def calibrate(
-    dataset: Annotated["str | Path | Dataset", DATASET, PATH],
+    dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH],
     *,
     replications: Annotated[int, Parameter(alias="-n", metavar="NUMBER"), whole_number(2)] = 200,
     engine: Annotated["str | Executor", Parameter(metavar="ENGINE")] = "local",
@@ -88,7 +89,7 @@ def calibrate(
 
 
 def _read_stated_and_assumed(
-    dataset: "str | Path | Dataset", reading: Reading, assume: Sequence[str]
+    dataset: "str | Path | Dataset | Frame", reading: Reading, assume: Sequence[str]
 ) -> "tuple[Dataset, Dataset]":
     """Read the data set as it is described, which is simulated, and as the fits take it to be."""
     stated = read(dataset, **reading)

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Contact, Description, FrictionSetting
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.frames import Frame
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.kind import FrictionKind
@@ -31,7 +32,7 @@ class Report(Dataset):
         return describe_data_set(self).strip()
 
 
-def check_data_set(dataset: str | Path | Dataset, reading: Reading) -> Report:
+def check_data_set(dataset: str | Path | Dataset | Frame, reading: Reading) -> Report:
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Loading JAX takes longer than everything else here, so the model is built only for names and priors that the

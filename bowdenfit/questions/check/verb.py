@@ -13,11 +13,12 @@ from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
+    from bowdenfit.frames import Frame
     from bowdenfit.questions.check.data_set_words import Report
 
 
 @read_first
-def check(dataset: Annotated["str | Path | Dataset", DATASET, PATH], **reading: Unpack[Reading]) -> "Report":
+def check(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **reading: Unpack[Reading]) -> "Report":
     """Read a data set, and build the model where only that can tell whether the description makes sense.
 
     Args:

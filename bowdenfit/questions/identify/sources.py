@@ -9,6 +9,7 @@ import numpy as np
 
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
 from bowdenfit.errors import DescriptionError
+from bowdenfit.frames import Frame
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.least_squares import find_maximum_posterior, predict_posterior
 from bowdenfit.inference.log_density import LogDensity
@@ -27,7 +28,7 @@ from bowdenfit.results.store import load
 _PROFILE_SDS, _PROFILE_POINTS = 4.0, 21  # profiles span four standard deviations to each side, enough for a 99.9 % interval
 
 
-def identify_source(source: str | Path | Dataset | Record, reading: Reading) -> Identifiability:
+def identify_source(source: str | Path | Dataset | Frame | Record, reading: Reading) -> Identifiability:
     """Return identifiability of a fit, of a data set by least squares, or of a plan.
 
     Args:
@@ -38,17 +39,17 @@ def identify_source(source: str | Path | Dataset | Record, reading: Reading) -> 
         return _identify(source, reading)
 
 
-def _identify(source: str | Path | Dataset | Record, reading: Reading) -> Identifiability:
+def _identify(source: str | Path | Dataset | Frame | Record, reading: Reading) -> Identifiability:
     """Return identifiability of a fit, of a data set by least squares, or of a plan, with 64-bit floats."""
     if isinstance(source, str | Path) and (Path(source) / "fit.json").exists():
         source = load(Path(source))
     if isinstance(source, Record):
         refuse_named(reading, f"{source.name} is a fit", "fit its data set again with that, or leave it out")
         return _identify_fit(source)
-    if isinstance(source, Dataset) or not _is_plan(Path(source)):
-        return _identify_tables(read(source, **reading))
-    refuse_named(reading, "a plan is judged as it stands", "change the file instead")
-    return _identify_plan(Path(source))
+    if isinstance(source, str | Path) and _is_plan(Path(source)):
+        refuse_named(reading, "a plan is judged as it stands", "change the file instead")
+        return _identify_plan(Path(source))
+    return _identify_tables(read(source, **reading))
 
 
 def _is_plan(path: Path) -> bool:

@@ -14,6 +14,7 @@ from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
+    from bowdenfit.frames import Frame
     from bowdenfit.questions.identify.answer import Identifiability
     from bowdenfit.results.record import Record
 
@@ -24,7 +25,7 @@ NOT_IDENTIFIABLE = "not identifiable"  # what a fit is whose measurements do not
 @read_first
 def identify(
     source: Annotated[
-        "str | Path | Dataset | Record",
+        "str | Path | Dataset | Frame | Record",
         Parameter("SOURCE", help="Such as fits/my-cable, the results of a fit, or my-cable, a data set."),
         PATH,
     ],

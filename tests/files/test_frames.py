@@ -1,0 +1,73 @@
+"""Data frames in place of files: the same data set, whichever library they are of, and a sentence for what is none."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.kinds.forces.table import ForceTable
+
+ANGLE = "90deg"
+
+
+@pytest.fixture
+def frame():
+    force = np.repeat([20.0, 40.0, 60.0], 4) * (1 + 0.01 * np.random.default_rng(1).standard_normal(12))
+    return pd.DataFrame({"input force (N)": force, "output force (N)": 0.83 * force + np.arange(12) / 100})
+
+
+def forces_of(source, **reading):
+    table = bf.read(source, wrap_angle=ANGLE, **reading).measurements.table(ForceTable)
+    assert table is not None
+    return table
+
+
+def test_a_frame_is_read_as_its_csv_file(frame, tmp_path):
+    frame.to_csv(tmp_path / "bench.csv", index=False)
+    expected, table = forces_of(tmp_path / "bench.csv"), forces_of(frame)
+    np.testing.assert_array_equal(table.input_force, expected.input_force)
+    np.testing.assert_array_equal(table.output_force, expected.output_force)
+    assert "12 force readings" in str(bf.check(frame, wrap_angle=ANGLE))
+
+
+def test_units_of_columns_may_be_attributes_also_of_columns_that_are_gone(frame):
+    bare = frame.rename(columns=lambda name: name.removesuffix(" (N)"))
+    bare.attrs["units"] = {"input force": "lbf", "output force": "lbf", "time": "s"}
+    np.testing.assert_allclose(forces_of(bare).input_force, 4.4482216152605 * frame["input force (N)"])
+
+
+def test_a_named_index_is_a_column(frame):
+    runs = frame.set_index(pd.Index(np.repeat(["first", "second"], 6), name="run"))
+    assert forces_of(runs).run_names == ("first", "second")
+
+
+def test_a_frame_of_another_library_writes_itself(frame):
+    class Polars:
+        """What is used of a polars DataFrame."""
+
+        columns = tuple(frame.columns)
+
+        def write_csv(self, path):
+            frame.to_csv(path, index=False)
+
+    np.testing.assert_array_equal(forces_of(Polars()).input_force, frame["input force (N)"])
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (np.ones(3), "ndarray is not a data set"),
+        (pd.DataFrame({("a", "N"): [1.0]}), "several levels of names"),
+        (pd.DataFrame({"input force (N)": []}), "no measurements"),
+        (pd.DataFrame({"input force (N)": [1.0, 2.0]}), r"dataframe\.csv has no column"),
+    ],
+)
+def test_what_is_no_table_of_readings_is_a_sentence(source, words):
+    with pytest.raises(bf.BowdenfitError, match=words):
+        bf.read(source, wrap_angle=ANGLE)
+
+
+def test_units_that_are_no_dictionary_are_a_sentence(frame):
+    frame.attrs["units"] = "N"
+    with pytest.raises(bf.UsageError, match="must be a dictionary by column"):
+        bf.read(frame, wrap_angle=ANGLE)

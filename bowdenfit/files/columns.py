@@ -225,7 +225,7 @@ def _ambiguous_column_error(table: RawTable, quantity: str, columns: Sequence[Ma
 
 
 def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[str, np.ndarray]:
-    """Return the numbers of the columns that are not used, by heading; columns with anything else in them are left out.
+    """Return the numbers of the columns that are not used, or their texts, by heading.
 
     Args:
         table: The file.
@@ -234,8 +234,11 @@ def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[
     used = {column.heading for column in columns.values()}
     unused = dict[str, np.ndarray]()
     for heading, unit, cells in zip(table.header, table.units, zip(*table.rows, strict=True), strict=False):
-        if heading and heading not in used and all(is_plain_number(cell.text) for cell in cells):
-            with suppress(DatasetError):  # numbers that can be read in two ways
+        if not heading or heading in used:
+            continue
+        unused[f"{heading} ({unit})" if unit else heading] = np.array([" ".join(cell.text.split()) for cell in cells])
+        if all(is_plain_number(cell.text) for cell in cells):
+            with suppress(DatasetError):  # numbers that can be read in two ways stay texts
                 unused[f"{heading} ({unit})" if unit else heading] = np.array([cell.number() for cell in cells])
     return unused
 

@@ -23,6 +23,7 @@ from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
 from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, group_residuals
 from bowdenfit.inference.scalar_priors import clipped_z
+from bowdenfit.kinds.plausibility import MOST_LEVELS
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
 from bowdenfit.model import Model
@@ -35,7 +36,6 @@ NOTICEABLE_SHIFT = 0.5
 _FRICTION = ("friction", "friction_model")  # roles of the parameters that a drifting zero could move
 # Judgements below; `scripts/check_benches.py` counts the false alarms that they give together.
 _MANY = 30  # readings from which the heteroskedasticity-consistent test is used too
-_MOST_LEVELS = 24  # loads up to which each has a column of its own
 _CURVE_DEGREE, _POSITION_DEGREE = 4, 2  # degree of the polynomials tested for curves, and for other readings
 _LEAST_FREEDOM = 2.0  # degrees of freedom below which nothing is tested
 _LEAST_OUTLIER_FREEDOM = 5.0  # degrees of freedom from which one reading can be distinguished from the scatter of the others
@@ -194,7 +194,7 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
         for against, x in readings.at.items():
             if not (selected.any() and np.all(np.isfinite(x[selected])) and np.ptp(x[selected]) > 0):
                 continue
-            for columns in _departure_columns(against, x, selected, bool(group)):
+            for columns in _departure_columns(against, x, selected, bool(group), against in readings.unused):
                 lever = np.ones(len(x)) if against == ZERO else readings.lever
                 tested = _test_columns(system, readings, np.where(selected[:, None], columns, 0.0) * lever[:, None])
                 if tested is not None:
@@ -208,20 +208,24 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
                     )
 
 
-def _departure_columns(against: str, x: np.ndarray, selected: np.ndarray, of_curve: bool) -> Iterator[np.ndarray]:
+def _departure_columns(
+    against: str, x: np.ndarray, selected: np.ndarray, of_curve: bool, is_unused: bool
+) -> Iterator[np.ndarray]:
     """Yield columns for the ways in which readings could depend on where they were taken, (reading, column)."""
-    if against == LOAD and np.all(x[selected] > 0):
+    levels = np.unique(x[selected])
+    if is_unused and len(levels) <= min(MOST_LEVELS, selected.sum() // 2):
+        yield (x[:, None] == levels[None, :]).astype(float)
+    elif against == LOAD and np.all(x[selected] > 0):
         load = np.where(selected, x, 1.0)
         yield np.column_stack([np.log(load), np.min(x[selected]) / load])
-        levels = np.unique(x[selected])
-        if 3 <= len(levels) <= min(_MOST_LEVELS, selected.sum() // 2):
+        if 3 <= len(levels) <= min(MOST_LEVELS, selected.sum() // 2):
             yield (x[:, None] == levels[None, :]).astype(float)
     elif against == SPEED:
         yield np.log(np.maximum(np.where(selected, x, 1.0), np.max(x[selected]) / 1e3))[:, None]
     elif against in (STROKE, ZERO):
         yield x[:, None].astype(float)
     elif against == GROUP:
-        yield (x[:, None] == np.unique(x[selected])[None, :]).astype(float)
+        yield (x[:, None] == levels[None, :]).astype(float)
     else:
         if against == WRAP_ANGLE:
             yield np.ones((len(x), 1))  # what is there without any bend: of all departures with the bend the likeliest

@@ -30,6 +30,7 @@ class ResidualGroup:
         run_columns: Columns that the effects of mountings can follow.
         unit: Size of a residual of 1 in units of the reading.
         reading: The readings, to which a departure is relative; a loss as a log ratio.
+        unused: Axis labels of columns that the fit does not use.
         effect: Part of the reading that is due to friction, where it is only a part; a departure is then relative to this.
         lever: Change of a reading by a relative change of friction.
         used: Which of them are readings, not bounds.
@@ -60,6 +61,7 @@ class ResidualGroup:
     freedom: float = 0.0
     scatter: float = 1.0
     effect: np.ndarray | None = None
+    unused: tuple[str, ...] = ()
 
     def excess(self, selected: np.ndarray) -> float:
         """Return by how much selected readings exceed the model, relative to the readings [1]."""
@@ -97,9 +99,11 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
         size = len(solution["residuals"][term.name])
         of_term = solution["residuals"][term.name], solution["jacobian"][position : position + size]
         position += size
-        for block in _make_blocks(term, model.covariates.get(term.name), *of_term, solution["readings"][term.name], values):
+        covariates = model.covariates.get(term.name)
+        unused = tuple(covariates.unused) if covariates is not None else ()
+        for block in _make_blocks(term, covariates, *of_term, solution["readings"][term.name], values):
             stop = start + len(block.residuals)
-            blocks.append(replace(block, rows=slice(start, stop)))
+            blocks.append(replace(block, rows=slice(start, stop), unused=unused))
             start = stop
     return _weigh_by_scatter(blocks)
 
@@ -189,7 +193,7 @@ def _labelled_block(
     sign = np.sign(np.nansum((read - predicted) * residuals))
     reading = np.where(used, read, 0.0)
     numbers = {label: x[:n] for label, x in covariates.numbers.items() if label != RUN}  # which is their order
-    unused = {heading: x[:n] for heading, x in covariates.unused.items()}
+    unused = {heading: column.numbers[:n] for heading, column in covariates.unused.items()}
     back = {STROKE: covariates.back[:n].astype(float)}
     return replace(
         bare, unit=sign * unit, reading=reading, lever=np.ones(n), used=used, group=covariates.group[:n],

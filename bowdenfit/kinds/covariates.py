@@ -9,6 +9,7 @@ import numpy as np
 from bowdenfit.description import Description
 from bowdenfit.display import Part
 from bowdenfit.kinds import find_kind
+from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.sliding_rows import STROKE as STROKE
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.term import WRAP_ANGLE, Term
@@ -27,14 +28,14 @@ class Covariates(Part):
         group: Contact or the like that each reading belongs to; empty where all are of one kind.
         back: Whether a reading was taken on the way back, or while unloading.
         inside: Whether it lies inside the range in which the curves hold.
-        unused: Numbers of the columns that the fit does not use, by heading.
+        unused: Columns that the fit does not use, by heading.
     """
 
     numbers: Mapping[str, np.ndarray]
     group: tuple[str, ...]
     back: np.ndarray
     inside: np.ndarray
-    unused: Mapping[str, np.ndarray] = field(default_factory=dict)
+    unused: Mapping[str, UnusedColumn] = field(default_factory=dict[str, UnusedColumn])
 
 
 def collect_covariates(description: Description, measurements: Measurements, term: Term) -> Covariates:
@@ -61,7 +62,7 @@ def collect_covariates(description: Description, measurements: Measurements, ter
 
 def _covariates_of_kind(
     measurements: Measurements, term: Term
-) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray], np.ndarray]:
+) -> tuple[Mapping[str, np.ndarray], Mapping[str, UnusedColumn], np.ndarray]:
     """Return what the kind knows: loads, wrap angles and the like, unused columns, and which readings are of the return."""
     kind = find_kind(term.name)
     table = measurements.table(kind.table) if kind is not None else None

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from bowdenfit.kinds.rows import ForceRows, RowOrigin
+from bowdenfit.kinds.rows import ForceRows, RowOrigin, UnusedColumn
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import few, listed
 
@@ -38,6 +38,7 @@ _LEAST_FREEDOM = 3  # degrees of freedom of the scatter that is compared with th
 _FINE = 3.0  # least scatter in last digits: below it readings agree because they are rounded alike
 NO_NOISE = 1e-5  # least scatter over the readings of a bench; with less they were computed. A judgement
 _CALCULATED = 3e-3  # largest deviation, over the range of a column, that rounding leaves in what was calculated. A judgement
+MOST_LEVELS = 24  # loads, or values of an unused column, up to which each may have friction of its own; a judgement
 _DEGREE = 3  # degree of the smooth curve that readings follow; a judgement
 _MULTIPLES = {2: "twice", 3: "three times", 4: "four times"}
 _LEAST_AGAIN = 3  # repeated readings, all alike, from which a display is called coarse; a judgement
@@ -49,26 +50,36 @@ _FEWEST_VALUES, _MOST_VALUES = 8, 24  # different values that show the steps of 
 _STEPS_AT_ONCE = 20_000
 
 
-def drop_calculated_columns(unused: Mapping[str, Vector], *readings: Vector) -> dict[str, Vector]:
-    """Return the columns that were not calculated from the readings of the same rows, such as an efficiency or a loss.
+def choose_unused_columns(unused: Mapping[str, np.ndarray], *readings: Vector) -> dict[str, UnusedColumn]:
+    """Return the unused columns that may say under what circumstances readings were taken.
+
+    Left out are columns that are the same throughout, texts of which hardly two are alike, and what was calculated from the
+    readings of the same rows, such as an efficiency or a loss.
 
     Args:
-        unused: Numbers of columns that nothing reads, by heading.
+        unused: Numbers or texts of columns that nothing reads, by heading.
         readings: What was read in the rows, and what people calculate from it.
     """
+    chosen = dict[str, UnusedColumn]()
+    for heading, values in unused.items():
+        levels, level = np.unique(values, return_inverse=True)
+        if len(levels) < 2 or (values.dtype.kind == "f" and not np.all(np.isfinite(values))):
+            continue
+        if values.dtype.kind != "f":
+            if len(levels) <= min(MOST_LEVELS, len(values) // 2):
+                chosen[heading] = UnusedColumn(level.astype(float), tuple(str(text) for text in levels))
+        elif not any(_is_calculated(values, reading) for reading in readings):
+            chosen[heading] = UnusedColumn(values)
+    return chosen
 
-    def is_calculated(numbers: Vector) -> bool:
-        half_a_digit = 0.51 * _last_digit(np.abs(numbers[numbers != 0]))
-        for reading in readings:
-            columns = np.column_stack([np.ones(len(numbers)), reading])
-            left = numbers - columns @ np.linalg.lstsq(columns, numbers, rcond=None)[0]
-            rounded = min(float(np.max(np.abs(numbers - scale * reading))) for scale in (1.0, 100.0))
-            if np.max(np.abs(left)) <= _CALCULATED * np.ptp(numbers) or rounded <= half_a_digit:
-                return True
-        return False
 
-    varying = {heading: numbers for heading, numbers in unused.items() if np.ptp(numbers) > 0}
-    return {heading: numbers for heading, numbers in varying.items() if not is_calculated(numbers)}
+def _is_calculated(numbers: Vector, reading: Vector) -> bool:
+    """Return whether numbers are a linear function of readings, or these themselves, as fractions or in percent, rounded."""
+    columns = np.column_stack([np.ones(len(numbers)), reading])
+    left = np.max(np.abs(numbers - columns @ np.linalg.lstsq(columns, numbers, rcond=None)[0]))
+    rounded = min(float(np.max(np.abs(numbers - scale * reading))) for scale in (1.0, 100.0))
+    half_a_digit = 0.51 * _last_digit(np.abs(numbers[numbers != 0]))
+    return bool(left <= _CALCULATED * np.ptp(numbers) or rounded <= half_a_digit)
 
 
 def explain_impossible_loss(loss: np.ndarray, what: str) -> str:

@@ -29,6 +29,19 @@ Stroke = Literal["pull", "return"]
 _SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}
 
 
+@dataclass(frozen=True)
+class UnusedColumn:
+    """A column of a table that the fit does not use.
+
+    Args:
+        numbers: Its numbers, or the number of each text among `levels`.
+        levels: Its different texts; empty for numbers.
+    """
+
+    numbers: Vector
+    levels: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, repr=False)
 class RowOrigin(Part):
     """File and line of each row of a table, so that any row can be named.

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
 from bowdenfit.types import Labels, Vector
 
@@ -49,7 +50,7 @@ class SlidingRows:
         angles: `ROW_ARRAYS` of every row.
         information: Information of one such reading on its log ratio at unit noise of the output cell [N^2]; computed from
             the forces if omitted.
-        unused: Numbers of columns that the fit does not use, by heading.
+        unused: Columns that the fit does not use, by heading.
     """
 
     input_force: Vector
@@ -62,7 +63,7 @@ class SlidingRows:
     n_effective: Vector
     angles: Mapping[str, np.ndarray]
     information: Vector | None = None
-    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    unused: Mapping[str, UnusedColumn] = field(default_factory=dict[str, UnusedColumn])
 
     def weight(self, noise_ratio: float) -> Vector:
         """Information on the log ratio at unit noise of the output cell [N^2].
@@ -241,7 +242,7 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     order = (np.arange(len(run)) - first[run]).astype(float)
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
     drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
-    return dict(rows.unused) | drifting | {
+    return {heading: column.numbers for heading, column in rows.unused.items()} | drifting | {
         LOAD: rows.input_force,
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),

@@ -28,7 +28,7 @@ from bowdenfit.cable.sensors import NoiseLaw, noise_law, scatter
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
-from bowdenfit.kinds.rows import ForceRows
+from bowdenfit.kinds.rows import ForceRows, UnusedColumn
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
@@ -231,7 +231,7 @@ class TermKind(ABC, Generic[AnyTable]):
         """Return loads, wrap angles and the like of a term's readings, by axis label."""
         return {}
 
-    def unused_columns(self, table: AnyTable, term: Term) -> Mapping[str, np.ndarray]:
+    def unused_columns(self, table: AnyTable, term: Term) -> Mapping[str, UnusedColumn]:
         """Return what columns that the fit does not use say of a term's readings, by heading."""
         return {}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.kinds.plausibility import drop_calculated_columns
+from bowdenfit.kinds.plausibility import choose_unused_columns
 from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
 
 MU, NOISE = 0.12, 0.01
@@ -38,6 +38,18 @@ def test_a_column_that_explains_the_residuals_is_named(tmp_path, load, efficienc
     assert "does not use the column 'Peg'" in first
 
 
+def test_texts_that_explain_the_residuals_are_named_with_what_they_say(tmp_path):
+    path = write_table(tmp_path / "bench.csv", True, 20.0)
+    head, *rows = path.read_text().splitlines()
+    dry = {f"{peg}": "dry" if peg > 3 else "" for peg in range(1, 7)}
+    rows = [",".join([*row.split(",")[:2], dry[row.split(",")[2]]]) for row in rows]
+    path.write_text("\n".join([head.replace("Peg,eta,Lost percent", "Rope"), *rows]) + "\n")
+    first = sentences_of(path, tmp_path)[0]
+    assert "where 'Rope' is 'blank' the loss is" in first
+    assert "where it is 'dry'" in first
+    assert "--column group=Rope --friction by-group" in first
+
+
 def test_a_column_that_says_nothing_of_the_residuals_is_not_named(tmp_path):
     assert sentences_of(write_table(tmp_path / "bench.csv", False, 20.0), tmp_path) == ()
 
@@ -54,6 +66,8 @@ def test_what_was_calculated_from_the_forces_says_nothing_new():
         "loss (%)": np.round(100 * lost / force_in, 1),
         "angle": angle,
         "set": np.full(30, 3.0),
+        "rope": np.array(["old", "new"] * 15),
+        "remark": np.array([f"reading {i}" for i in range(30)]),
     }
     readings = (force_in, force_out, lost, force_out / force_in, lost / force_in)
-    assert list(drop_calculated_columns(columns, *readings)) == ["angle"]
+    assert list(choose_unused_columns(columns, *readings)) == ["angle", "rope"]

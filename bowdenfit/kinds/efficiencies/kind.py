@@ -60,7 +60,7 @@ class EfficiencyTable(Part):
         sd: Standard deviation where given [1], else 0.
         own: Wrap angles measured with the row.
         origin: Where each row was read.
-        unused: Numbers of columns that nothing reads, by heading.
+        unused: Numbers or texts of columns that nothing reads, by heading.
     """
 
     route: Vector
@@ -68,7 +68,7 @@ class EfficiencyTable(Part):
     sd: Vector
     own: OwnAngles
     origin: RowOrigin
-    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    unused: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
 
 
 class EfficiencyDesign(Design):

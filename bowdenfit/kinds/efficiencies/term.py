@@ -17,8 +17,9 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.candidate import UNKNOWN_SCATTER, Candidate, CandidateKind, Simulation, Situation, simulate_rows
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
-from bowdenfit.kinds.plausibility import drop_calculated_columns
+from bowdenfit.kinds.plausibility import choose_unused_columns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.shared_parameters import declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
@@ -159,10 +160,10 @@ class EfficiencyTerms(TermKind[EfficiencyTable]):
         return replace(table, efficiency=efficiency, sd=table.sd / table.efficiency * efficiency)
 
     @override
-    def unused_columns(self, table: EfficiencyTable, term: Term) -> Mapping[str, np.ndarray]:
+    def unused_columns(self, table: EfficiencyTable, term: Term) -> Mapping[str, UnusedColumn]:
         """Return those that were not calculated from the efficiencies."""
         efficiency = table.efficiency
-        return drop_calculated_columns(table.unused, efficiency, 1 - efficiency, 1 / efficiency, np.log(efficiency))
+        return choose_unused_columns(table.unused, efficiency, 1 - efficiency, 1 / efficiency, np.log(efficiency))
 
     @override
     def check(self, table: EfficiencyTable, space: ParameterSpace) -> None:

@@ -73,7 +73,7 @@ class ForceTable(Part):
         velocity: Velocity of the rope [mm/s] or of the motor [rad/s]; NaN where it is not known.
         velocity_unit: Which of the two; empty without velocities.
         group: Group of each row, such as "new rope"; empty without groups.
-        unused: Numbers of columns that nothing reads, by heading; NaN in files that lack one.
+        unused: Numbers or texts of columns that nothing reads, by heading; NaN in files that lack one.
     """
 
     route: Vector
@@ -87,7 +87,7 @@ class ForceTable(Part):
     velocity: Vector
     velocity_unit: str = ""
     group: tuple[str, ...] = ()
-    unused: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
+    unused: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
 
 
 def read_forces(source: Source) -> TableFromFiles[ForceTable]:
@@ -167,7 +167,7 @@ def _concatenate_groups(tables: Sequence[ForceTable]) -> tuple[str, ...]:
     return tuple(name for t in tables for name in (t.group or (NO_GROUP,) * len(t.run)))
 
 
-def _concatenate_unused(tables: Sequence[ForceTable]) -> dict[str, Vector]:
+def _concatenate_unused(tables: Sequence[ForceTable]) -> dict[str, np.ndarray]:
     headings = dict.fromkeys(heading for t in tables for heading in t.unused)
     return {
         heading: np.concatenate([t.unused.get(heading, np.full(len(t.run), np.nan)) for t in tables]) for heading in headings

@@ -17,8 +17,9 @@ from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.next_run import ForceRunCandidates
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.kinds.plausibility import drop_calculated_columns
+from bowdenfit.kinds.plausibility import choose_unused_columns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
+from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
@@ -197,12 +198,12 @@ def _expect_forces(
     return expected, weight
 
 
-def _unused_columns(table: ForceTable, used: np.ndarray) -> dict[str, Vector]:
+def _unused_columns(table: ForceTable, used: np.ndarray) -> dict[str, UnusedColumn]:
     """Return the columns of some rows that the fit does not use and that were not calculated from their forces."""
     force_in, force_out = table.input_force[used], table.output_force[used]
     efficiency, lost = force_out / force_in, force_in - force_out
     calculated = (force_in, force_out, lost, efficiency, 1 - efficiency, 1 / efficiency, np.log(efficiency))
-    return drop_calculated_columns({heading: x[used] for heading, x in table.unused.items()}, *calculated)
+    return choose_unused_columns({heading: x[used] for heading, x in table.unused.items()}, *calculated)
 
 
 def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
@@ -304,9 +305,12 @@ class ForceTerms(TermKind[ForceTable]):
         return covariates
 
     @override
-    def unused_columns(self, table: ForceTable, term: Term) -> Mapping[str, np.ndarray]:
+    def unused_columns(self, table: ForceTable, term: Term) -> Mapping[str, UnusedColumn]:
         """Return the mean of each run."""
         if not isinstance(term, RunsTerm) or term.rows is None:
             return {}
         run = np.unique(term.rows.run, return_inverse=True)[1]
-        return {heading: np.bincount(run, x) / np.bincount(run) for heading, x in term.rows.unused.items()}
+        return {
+            heading: replace(column, numbers=np.bincount(run, column.numbers) / np.bincount(run))
+            for heading, column in term.rows.unused.items()
+        }

@@ -3,6 +3,7 @@
 Where a curve does not follow the wrap angles, the other curve families are tried.
 """
 
+import shlex
 from collections.abc import Sequence
 
 import jax
@@ -18,6 +19,7 @@ from bowdenfit.inference.least_squares import fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import describe_reading, find_readings
+from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
@@ -98,7 +100,7 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     what = _readable_column(departure.group) if departure.group else readings.words
     read = "the loss" if readings.are_efficiencies else "what was read"
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
-    where = _where_low_and_high(departure, fit.model.cable.friction.conditions.groups)
+    where = _where_low_and_high(departure, _levels(fit, departure))
     return (
         f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; as "
         f"much happens by chance in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
@@ -134,11 +136,22 @@ def _odds(p_value: float) -> str:
     return f"one healthy fit in {float(f'{1 / p_value:.1g}'):,.0f}"
 
 
-def _where_low_and_high(departure: Departure, groups: Sequence[str]) -> tuple[str, str]:
+def _levels(fit: Record, departure: Departure) -> Sequence[str]:
+    """Return the names of the groups or of the texts in a column that a departure goes by; empty where it goes by numbers."""
+    if departure.against == GROUP:
+        return fit.model.cable.friction.conditions.groups
+    column = fit.model.covariates[departure.table].unused.get(departure.against)
+    return column.levels if column is not None else ()
+
+
+def _where_low_and_high(departure: Departure, levels: Sequence[str]) -> tuple[str, str]:
     """Describe where the lowest and the highest third of the readings were taken."""
     if departure.against == GROUP:
-        low, high = (groups[round(number) - 1] for number in (departure.low, departure.high))
+        low, high = (levels[round(number) - 1] for number in (departure.low, departure.high))
         return f"in the group {low}", f"in the group {high}"
+    if levels:
+        low, high = (levels[round(number)] or "blank" for number in (departure.low, departure.high))
+        return f"where {shown(departure.against)} is {shown(low)}", f"where it is {shown(high)}"
     if departure.against == STROKE:
         return ("on the return", "on the pull") if departure.inside else ("on the way there", "on the way back")
     if departure.against == ORDER:
@@ -170,17 +183,29 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
             "as straight as it gets is the most informative."
         )
     if departure.against in fit.model.covariates[departure.table].unused:
-        return (
-            f"The fit does not use the column {shown(departure.against)}. If it is the wrap angle, the length or the mounting, "
-            "say so (--column in the help of fit, or columns in cable.toml); else friction depends on something that this "
-            "model lacks: fit the readings by parts, in each of which it is the same."
-        )
+        return _suggest_column(fit, departure)
     if departure.against == ORDER:
         return (
             "Something drifted while it was measured: temperature, wear, or the zero of a load cell. Tare before each run, "
             "take loads and bends in random order, and leave out the readings from before it settled."
         )
     return "Look at those readings first; if they are right, this model is not that of the cable there."
+
+
+def _suggest_column(fit: Record, departure: Departure) -> str:
+    """Suggest what an unused column may be that explains the residuals."""
+    column, heading = fit.model.covariates[departure.table].unused[departure.against], departure.against
+    if column.levels and fit.dataset.measurements.table(ForceTable) is not None:
+        name = shlex.quote(f"group={heading}")
+        return (
+            f"The fit does not use the column {shown(heading)}. For a coefficient of each: --column {name} --friction "
+            f"{BY_GROUP}; if it says which readings are bad, leave these out."
+        )
+    return (
+        f"The fit does not use the column {shown(heading)}. If it is the wrap angle, the length or the mounting, say so "
+        "(--column in the help of fit, or columns in cable.toml); else friction depends on what this model lacks: fit the "
+        "readings by parts, in each of which it is the same."
+    )
 
 
 def _suggest_friction(model: str, options: tuple[str, ...], otherwise: str) -> str:

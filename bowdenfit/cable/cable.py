@@ -173,7 +173,7 @@ class Cable:
         """Return the output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
         exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
-            return loop_output_force(input_force, preload, exponent, stroke)
+            return loop_output_force(input_force, preload, exponent, stroke, self.elasticity.loop_rope(values))
         return self.friction.output_force(values, input_force, exponent, stroke)
 
     def input_force_at(
@@ -193,7 +193,7 @@ class Cable:
         """Return the input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
         exponent, preload = self._friction_at_angles(values, angles, mounting)
         if preload is not None:
-            return loop_input_force(output_force, preload, exponent, stroke)
+            return loop_input_force(output_force, preload, exponent, stroke, self.elasticity.loop_rope(values))
         return self.friction.input_force(values, output_force, exponent, stroke)
 
     def _friction_at_angles(

@@ -20,7 +20,7 @@ from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.physics.friction import play_operator
-from bowdenfit.physics.loop import loop_band
+from bowdenfit.physics.loop import Rope, loop_band
 
 LEAST_EXPONENT = 1e-9  # no mounting takes friction below none; not 0, of which logarithms are infinite
 
@@ -110,10 +110,12 @@ class LoopDrive:
     Args:
         preload: P of each recording [N].
         exponent: Friction exponent of one side, of each [1].
+        rope: How the rope stretches; None where it is taken for linear.
     """
 
     preload: PerRecording
     exponent: PerRecording
+    rope: Rope = None
     least_share = least_force = -jnp.inf
 
     def band(self, mounting: PerRecording) -> PerRecording:
@@ -136,13 +138,13 @@ class LoopDrive:
         exponent = self.band(mounting)
 
         def limits(exponent: PerRecording) -> tuple[PerTime, PerTime]:
-            return loop_band(input_force, self.preload, exponent)
+            return loop_band(input_force, self.preload, exponent, self.rope)
 
         (low, high), slopes = jax.jvp(limits, (exponent,), (jnp.ones_like(exponent),))
         y, slope = play_operator(low, high, start, slopes, restart)
         if noise is None:
             return y, slope
-        lower, upper = loop_band(input_force + noise, self.preload, exponent)
+        lower, upper = loop_band(input_force + noise, self.preload, exponent, self.rope)
         return y + jnp.where(y - low < high - y, lower - low, upper - high), slope
 
     def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
@@ -178,5 +180,6 @@ def make_drive(
     """
     exponent = cable.friction_exponent(values, wrap_angles) if exponent is None else exponent
     if cable.is_loop:
-        return LoopDrive(cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0], exponent)
+        preload = cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0]
+        return LoopDrive(preload, exponent, cable.elasticity.loop_rope(values))
     return RopeDrive(cable.friction, values, exponent, cable.friction.rate(values, velocity))

@@ -12,6 +12,7 @@ from bowdenfit.cable.laws import ContactLaw
 from bowdenfit.description import Description, PriorDefaults
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, TruncatedNormal
 from bowdenfit.parameters.space import Parameter, Scale
+from bowdenfit.physics.loop import Rope
 from bowdenfit.physics.stretch import (
     compliance,
     extension,
@@ -107,6 +108,10 @@ class Elasticity:
     def preload_or_none(self, values: Values, bend: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
         """Return the preload [N]; 0 for a cable of which no measurement depends on it."""
         return self.preload(values, bend)[0] if PRELOAD in values else jnp.zeros(bend.shape)
+
+    def loop_rope(self, values: Values) -> Rope:
+        """Return `rope` where it alone sets the preload of a loop; None elsewhere, as with springs, which are linear."""
+        return self.rope(values) if self.description.preload_follows_stretch and STIFFNESS in values else None
 
     def preload_from(
         self, values: Values, reference_preload: Float[Array, "*#batch"], bend: Float[Array, "*batch"]

@@ -1,14 +1,23 @@
 """The preloaded pull-pull loop: two ropes between two pulleys, one pulling while the other returns.
 
 Forces are differences of the two sides' tensions, positive where they pull the load side forward; Euler friction in full
-slip, a linear elastic rope, and a loop of fixed length, so that the mean tensions of both sides add up to twice the preload.
+slip, and a loop of fixed length. The mean tensions of both sides add up to twice the preload where the rope is linear. A rope
+that is softer at low load than at high makes the sum larger, and friction with it: `moving_preload`.
 """
 
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.physics.stretch import mean_tension
+from bowdenfit.physics.stretch import compliance, extension, mean_tension, tension_from_extension
+
+# Stiffness k [N/mm], bedding-in stretch d [mm] and load T_c [N] of `bowdenfit.physics.stretch.extension`; None if linear.
+Rope = tuple[Array, Array, Array] | None
+
+_ITERATIONS = 8  # of Newton's method, after which no loop is off by more than rounding; tests/physics/test_loop.py
 
 
 def loop_output_force(
@@ -16,6 +25,7 @@ def loop_output_force(
     preload: Float[Array, "..."],
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
+    rope: Rope = None,
 ) -> Float[Array, "..."]:
     r"""Return the output force of a loop while it moves.
 
@@ -25,14 +35,14 @@ def loop_output_force(
     driving the motor (F_in < 0) and the way back follow by exchanging the sides and the ends:
     :math:`F_\text{out} = s \min(s F_\text{in} - 2 P \Lambda,\ s F_\text{in} e^{-\Lambda},\ s F_\text{in} e^{\Lambda})`.
 
-    Not valid while nothing moves (see `bowdenfit.cable.drive.Loop`), and inaccurate for a rope much stiffer at high than at low
-    load, where mean tensions do not quite add up to 2P.
+    For a rope that beds in P is that of `moving_preload`. Not valid while nothing moves: see `bowdenfit.cable.drive.LoopDrive`.
 
     Args:
         input_force: F_in, of either sign [N].
         preload: P, tension of both sides at rest [N].
         friction_exponent: Lambda of one side [1].
         stroke: s, +1 moving forward, -1 back [1].
+        rope: How the rope stretches.
 
     Returns:
         Output force [N].
@@ -40,7 +50,7 @@ def loop_output_force(
     References:
         The actuator of the haptic paper (section 3.1), with its equation 1 along both sides.
     """
-    return loop_response(input_force, preload, friction_exponent, stroke)[0]
+    return loop_response(input_force, preload, friction_exponent, stroke, rope)[0]
 
 
 def loop_input_force(
@@ -48,6 +58,7 @@ def loop_input_force(
     preload: Float[Array, "..."],
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
+    rope: Rope = None,
 ) -> Float[Array, "..."]:
     r"""Return the input force [N] that gives an output force while the loop moves: the inverse of `loop_output_force`.
 
@@ -58,20 +69,87 @@ def loop_input_force(
         preload: P, tension of both sides at rest [N].
         friction_exponent: Lambda of one side [1].
         stroke: s, +1 moving forward, -1 back [1].
+        rope: How the rope stretches.
     """
     along = stroke * output_force
+    preload = moving_preload(along, preload, -friction_exponent, rope)  # as seen from the load side
     slack = along * jnp.where(along > 0, jnp.exp(friction_exponent), jnp.exp(-friction_exponent))
     return stroke * jnp.maximum(along + 2 * preload * friction_exponent, slack)
 
 
 def loop_band(
-    input_force: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."]
+    input_force: Float[Array, "..."],
+    preload: Float[Array, "..."],
+    friction_exponent: Float[Array, "..."],
+    rope: Rope = None,
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Return the output force [N] while moving forward and while moving back; at rest it lies between the two."""
     lower, upper = (
-        loop_output_force(input_force, preload, friction_exponent, jnp.asarray(stroke)) for stroke in (1.0, -1.0)
+        loop_output_force(input_force, preload, friction_exponent, jnp.asarray(stroke), rope) for stroke in (1.0, -1.0)
     )
     return lower, upper
+
+
+def moving_preload(
+    along: Float[Array, "..."], preload: Float[Array, "..."], friction_exponent: Float[Array, "..."], rope: Rope
+) -> Float[Array, "..."]:
+    r"""Return half the sum of both sides' mean tensions while the loop moves [N]; P itself where the rope is linear.
+
+    A moving loop is as long as it was at rest:
+
+    .. math:: e(\bar T_1) + e(\bar T_2) = 2 e(P)
+
+    with the extension e of `bowdenfit.physics.stretch.extension`. That is concave, so that the tensions of a loaded loop add up
+    to more than 2 P. Continued on as a straight line below T = 0, it says that a side is slack where that is so.
+
+    Args:
+        along: Force at the end that friction is counted from, the motor, in the direction of motion [N].
+        preload: P [N].
+        friction_exponent: Lambda of one side; -Lambda where `along` is the force at the load [1].
+        rope: How the rope stretches.
+    """
+    return preload if rope is None else _moving_preload(along, preload, friction_exponent, *rope)
+
+
+def _mean_tensions(along: Array, mean: Array, friction_exponent: Array) -> tuple[Array, Array, Array]:
+    """Return the mean tensions of the pulling and of the returning side [N], and the ratio of their changes with `mean`."""
+    one = jnp.ones_like(friction_exponent)
+    a, b = mean_tension(one, friction_exponent), mean_tension(one, -friction_exponent)
+    pulling = a * (2 * mean + b * along) / (a + b)
+    return pulling, 2 * mean - pulling, b / a
+
+
+def _lengths(pulling: Array, returning: Array, preload: Array, rope: tuple[Array, Array, Array]) -> Array:
+    """Return by how much both sides are shorter than at rest [mm]."""
+    pulled, returned = (
+        jnp.where(tension > 0, extension(tension, *rope), tension * compliance(jnp.zeros_like(tension), *rope))
+        for tension in (pulling, returning)
+    )
+    return 2 * extension(preload, *rope) - pulled - returned
+
+
+@jax.custom_jvp
+def _moving_preload(along: Any, preload: Any, friction_exponent: Any, *rope: Any) -> Array:
+    """Return `moving_preload` of a rope that beds in, by Newton's method, which comes from below all the way."""
+    mean = preload * jnp.ones_like(along * friction_exponent)
+    for _ in range(_ITERATIONS):
+        pulling, returning, ratio = _mean_tensions(along, mean, friction_exponent)
+        slopes = [compliance(jnp.maximum(tension, 0.0), *rope) for tension in (pulling, returning)]
+        mean += _lengths(pulling, returning, preload, rope) * (1 + ratio) / (2 * (slopes[0] + ratio * slopes[1]))
+    return mean
+
+
+@_moving_preload.defjvp
+def _implicit(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Array, Array]:
+    """Return the implicit function's derivative: the change of the lengths with all else, over that with the mean."""
+    mean = _moving_preload(*primals)
+
+    def lengths(mean: Any, along: Any, preload: Any, friction_exponent: Any, *rope: Any) -> Array:
+        return _lengths(*_mean_tensions(along, mean, friction_exponent)[:2], preload, rope)
+
+    _, by_others = jax.jvp(lambda *others: lengths(mean, *others), primals, tangents)
+    _, by_mean = jax.jvp(lambda mean: lengths(mean, *primals), (mean,), (jnp.ones_like(mean),))
+    return mean, -by_others / by_mean
 
 
 def loop_response(
@@ -79,9 +157,14 @@ def loop_response(
     preload: Float[Array, "..."],
     friction_exponent: Float[Array, "..."],
     stroke: Float[Array, "..."],
+    rope: Rope = None,
 ) -> tuple[Float[Array, "..."], Float[Array, "..."], Float[Array, "..."]]:
-    """Return `loop_output_force` [N] and its derivatives by the input force [1] and by the friction exponent [N]."""
+    """Return `loop_output_force` [N] and its derivatives by the input force [1] and by the friction exponent [N].
+
+    The derivatives, which weights need, take the sum of the mean tensions for constant.
+    """
     shares = jnp.exp(-friction_exponent), jnp.exp(friction_exponent)
+    preload = moving_preload(stroke * input_force, preload, friction_exponent, rope)
     return loop_response_from(input_force, 2 * preload * friction_exponent, 2 * preload, *shares, stroke)
 
 
@@ -113,7 +196,7 @@ def loop_response_from(
 def free_motion_loss(
     preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch"]:
-    r"""Return the force [N] needed to move the unloaded loop, :math:`2 P \Lambda`."""
+    r"""Return the force [N] needed to move the unloaded loop, :math:`2 P \Lambda`, whose tensions differ little."""
     return 2 * preload * friction_exponent
 
 
@@ -133,12 +216,16 @@ def dynamic_range(
     return largest_force / free_motion_loss(preload, friction_exponent)
 
 
-def slack_load(preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"]) -> Float[Array, "*batch"]:
+def slack_load(
+    preload: Float[Array, "*batch"], friction_exponent: Float[Array, "*#batch"], rope: Rope = None
+) -> Float[Array, "*batch"]:
     r"""Return the input force at which the return side goes slack [N], :math:`2 P \Lambda/(1 - e^{-\Lambda})`.
 
-    This holds while moving forward; for the way back use the negative exponent.
+    A rope that beds in takes the tension of 2 e(P) in place of 2 P. This holds while moving forward; for the way back use the
+    negative exponent.
     """
-    return 2 * preload / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
+    alone = 2 * preload if rope is None else tension_from_extension(2 * extension(preload, *rope), *rope)
+    return alone / mean_tension(jnp.ones_like(friction_exponent), friction_exponent)
 
 
 def side_tensions(
@@ -146,6 +233,7 @@ def side_tensions(
     preload: Float[Array, "*#batch"],
     friction_exponent: Float[Array, "*#batch"],
     stroke: Float[Array, "*#batch"],
+    rope: Rope = None,
 ) -> tuple[Float[Array, "*batch"], Float[Array, "*batch"]]:
     r"""Return the mean tensions of the pulling and of the returning side [N] under an input force of at least 0.
 
@@ -158,9 +246,10 @@ def side_tensions(
         preload: P [N].
         friction_exponent: Lambda of one side [1].
         stroke: +1 moving forward, -1 back [1].
+        rope: How the rope stretches; P is then that of `moving_preload`.
     """
-    one = jnp.ones_like(input_force * stroke * friction_exponent)
-    a, b = mean_tension(one, stroke * friction_exponent), mean_tension(one, -stroke * friction_exponent)
-    taut = a * (2 * preload + b * input_force) / (a + b)
-    slack = taut > 2 * preload
-    return jnp.where(slack, a * input_force, taut), jnp.where(slack, 0.0, 2 * preload - taut)
+    exponent = stroke * friction_exponent * jnp.ones_like(input_force)
+    mean = moving_preload(input_force, preload, exponent, rope)
+    pulling, returning, _ = _mean_tensions(input_force, mean, exponent)
+    slack = returning < 0
+    return jnp.where(slack, mean_tension(input_force, exponent), pulling), jnp.where(slack, 0.0, returning)

@@ -12,11 +12,20 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from bowdenfit.physics.friction import capstan_output_force, play_operator
-from bowdenfit.physics.loop import free_motion_loss, loop_band, loop_output_force, side_tensions, slack_load
+from bowdenfit.physics.loop import (
+    free_motion_loss,
+    loop_band,
+    loop_input_force,
+    loop_output_force,
+    moving_preload,
+    side_tensions,
+    slack_load,
+)
 
 PRELOADS = (1.0, 7.0, 30.0, 100.0)
 EXPONENTS = (0.01, 0.1, 0.5, 1.2, 3.0)
 LOADS = (0.1, 1.0, 5.0, 20.0, 80.0, 500.0)
+FORWARD = jnp.asarray(1.0)
 CLOSE = 1e-10  # relative to the larger force
 
 output_force = jax.jit(loop_output_force)
@@ -268,3 +277,100 @@ def test_a_loop_that_turns_inside_its_band_holds_the_output_force():
     np.testing.assert_array_equal(found[14:27], 8.0)  # from 14 N, less 2 P Lambda, down to 2 N
     np.testing.assert_array_equal(found[27:43], force[27:43] + 6.0)
     np.testing.assert_array_equal(found[42:], -8.0)
+
+
+# A rope that beds in ------------------------------------------------------------------------------------------------
+
+
+def _random_loops(n, seed=3):
+    """Loops from far stiffer to far softer at low load than the preload, and forces past where a side goes slack."""
+    draw = np.random.default_rng(seed)
+    preload, exponent = (np.exp(draw.uniform(*limits, n)) for limits in ((-1, 5), (-4, 1)))
+    rope = np.exp(draw.uniform(1, 6, n)), np.exp(draw.uniform(-4, 1.5, n)), np.exp(draw.uniform(0, 4, n))
+    along = draw.uniform(-1.5, 1.5, n) * 2 * preload * exponent / -np.expm1(-exponent)
+    return jax.tree.map(jnp.asarray, (along, preload, exponent, rope))
+
+
+def _bedded(input_force, preload, exponent, stroke, rope):
+    """Output force from the tensions that make the loop as long as it was at rest; 0 for those that would push."""
+    stiffness, bedding_stretch, bedding_load = rope
+    pulling, returning = _profile(-stroke * exponent), _profile(stroke * exponent)
+
+    def extended(tension):
+        return tension / stiffness + bedding_stretch * (1 - np.exp(-tension / bedding_load))
+
+    def tensions(lower):
+        return max(input_force, 0.0) + lower, max(-input_force, 0.0) + lower
+
+    def too_long(lower):
+        one, other = tensions(lower)
+        return extended(one * pulling[1]) + extended(other * returning[1]) - 2 * extended(preload)
+
+    one, other = tensions(brentq(too_long, 0.0, 1e4 * preload, xtol=1e-13) if too_long(0.0) < 0 else 0.0)
+    return one * pulling[0] - other * returning[0]
+
+
+@pytest.mark.parametrize("stroke", [1.0, -1.0])
+def test_a_loop_whose_rope_beds_in_is_the_loop_solved_numerically(stroke):
+    along, preload, exponent, rope = _random_loops(60)
+    loops = zip(*map(np.asarray, (along, preload, exponent)), np.array(rope).T, strict=True)
+    expected = [_bedded(f, p, x, stroke, r) for f, p, x, r in loops]
+    output = loop_output_force(along, preload, exponent, jnp.asarray(stroke), rope)
+    np.testing.assert_allclose(output, expected, rtol=0, atol=1e-9 * np.max(np.abs(along)))
+
+
+def test_of_many_loops_whose_ropes_bed_in_each_is_as_long_as_at_rest():
+    along, preload, exponent, rope = _random_loops(20_000)
+    mean = np.asarray(moving_preload(along, preload, exponent, rope))
+    shares = -np.expm1(-exponent) / exponent, np.expm1(exponent) / exponent
+    pulling = shares[0] * (2 * mean + shares[1] * along) / sum(shares)
+
+    def extended(tension):
+        bedded = rope[1] * -np.expm1(-np.maximum(tension, 0) / rope[2])
+        return tension / rope[0] + np.where(tension > 0, bedded, tension * rope[1] / rope[2])
+
+    at_rest = 2 * extended(preload)
+    np.testing.assert_allclose(extended(pulling) + extended(2 * mean - pulling), at_rest, rtol=1e-9)
+    assert np.all(mean >= preload * (1 - 1e-12))
+
+
+def test_a_rope_that_hardly_beds_in_is_a_linear_one():
+    along, preload, exponent, (stiffness, _, load) = _random_loops(1000)
+    rope = (stiffness, 1e-12 * load / stiffness, load)
+    output = loop_output_force(along, preload, exponent, FORWARD, rope)
+    np.testing.assert_allclose(output, loop_output_force(along, preload, exponent, FORWARD), atol=1e-9 * np.max(along))
+
+
+@pytest.mark.parametrize("stroke", [1.0, -1.0])
+def test_the_input_force_of_a_loop_whose_rope_beds_in_is_the_inverse(stroke):
+    force, preload, exponent, rope = _random_loops(2000)
+    output = loop_output_force(force, preload, exponent, jnp.asarray(stroke), rope)
+    again = loop_input_force(output, preload, exponent, jnp.asarray(stroke), rope)
+    np.testing.assert_allclose(again, force, rtol=1e-7, atol=1e-9)
+
+
+def test_the_return_side_of_a_rope_that_beds_in_goes_slack_where_the_branches_meet():
+    _, preload, exponent, rope = _random_loops(2000)
+    load = slack_load(preload, exponent, rope)
+    at = loop_output_force(load, preload, exponent, FORWARD, rope)
+    np.testing.assert_allclose(at, load * jnp.exp(-exponent), rtol=1e-9)
+    below = loop_output_force(0.9 * load, preload, exponent, FORWARD, rope)
+    assert np.all(below < 0.9 * load * jnp.exp(-exponent))
+    _, returning = side_tensions(load * jnp.array([[0.9], [1.1]]), preload, exponent, FORWARD, rope)
+    assert np.all(returning[0] > 0)
+    assert np.all(returning[1] == 0)
+
+
+def test_the_gradient_of_a_loop_whose_rope_beds_in_is_that_of_differences():
+    along, preload, exponent, rope = _random_loops(30, seed=5)
+    parts = (along, preload, exponent, *rope)
+
+    def outputs(parts):
+        return loop_output_force(*parts[:3], FORWARD, parts[3:])
+
+    slopes = jax.jit(jax.grad(lambda *parts: jnp.sum(outputs(parts)), argnums=tuple(range(6))))(*parts)
+    for i, part in enumerate(parts):
+        step = 1e-6 * jnp.abs(part)
+        above, below = (outputs((*parts[:i], part + sign * step, *parts[i + 1 :])) for sign in (1, -1))
+        largest = float(jnp.max(jnp.abs(slopes[i])))
+        np.testing.assert_allclose(slopes[i], (above - below) / (2 * step), rtol=1e-4, atol=1e-5 * largest)

@@ -22,7 +22,13 @@ from bowdenfit.kinds.tables import AngleTable, LoopTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE, Circumstances, Term, TermKind, Truth
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.parameters.space import Parameter
-from bowdenfit.physics.loop import free_motion_loss, loop_output_force, loop_response, loop_response_from
+from bowdenfit.physics.loop import (
+    free_motion_loss,
+    loop_output_force,
+    loop_response,
+    loop_response_from,
+    moving_preload,
+)
 
 LOOP_FORCE = "loop_output_force"
 LOOP_MOUNTING = "loop_mounting"
@@ -66,17 +72,19 @@ class LoopTerm:
         """Return output force, its derivatives, and the variance of the friction exponent from errors of the wrap angles."""
         mounting = values[RUN_SCATTER] * values[LOOP_MOUNTING] if LOOP_MOUNTING in values else 0.0
         force, elastic = LoadCells.of(values).true_input(data["input_force"]), self.cable.elasticity
+        rope = elastic.loop_rope(values)
         if "cases" in data:
             exponent = self.cable.friction_exponent(values, data["cases"]) + mounting
             preload = elastic.preload(values, jnp.sum(data["cases"], axis=-1))[0]
-            per_case = jnp.stack([2 * preload * exponent, 2 * preload, jnp.exp(-exponent), jnp.exp(exponent)])
-            loss, twice, less, more = per_case @ data["spread"]
-            return *loop_response_from(force, loss, twice, less, more, data["stroke"]), 0.0
+            per_case = jnp.stack([exponent, preload, jnp.exp(-exponent), jnp.exp(exponent)])
+            exponent, preload, less, more = per_case @ data["spread"]
+            preload = moving_preload(data["stroke"] * force, preload, exponent, rope)
+            return *loop_response_from(force, 2 * preload * exponent, 2 * preload, less, more, data["stroke"]), 0.0
         angles, variance = resolve_angles(self.cable, values, data)
         exponent = self.cable.friction_exponent(values, angles) + mounting
         of_cable = elastic.preload(values, jnp.sum(angles, axis=-1))[0]
         preload = jnp.where(data["has_preload"], data["preload"], of_cable)
-        response = loop_response(force, preload, exponent, data["stroke"])
+        response = loop_response(force, preload, exponent, data["stroke"], rope)
         return *response, self.cable.exponent_variance(values, angles, variance)
 
     def _mean_and_sd(
@@ -198,7 +206,7 @@ class LoopTerms(TermKind[LoopTable]):
         exponent, stroke = cable.friction_exponent(values, bends) + mounting, jnp.asarray(table.stroke, dtype=float)
         free = stroke * free_motion_loss(preload, exponent)
         force = jnp.where(jnp.isnan(table.input_force), free, jnp.nan_to_num(table.input_force))
-        output = loop_output_force(force, preload, exponent, stroke)
+        output = loop_output_force(force, preload, exponent, stroke, cable.elasticity.loop_rope(values))
         cells, noise = LoadCells.of(values), scale * values[FORCE_NOISE]
         of_input_cell = noise * cable.description.sensors.noise_ratio
         return {

@@ -291,7 +291,7 @@ class LoopRecordingsTerm(BlocksTerm):
         cells, force = LoadCells.of(values), data["input_force"]
         stroke = jnp.sign(data["moving"])  # which also holds the weight of each block
         exponent = (drive.exponent + more)[None, :]
-        output = loop_output_force(cells.true_input(force), drive.preload[None, :], exponent, stroke)
+        output = loop_output_force(cells.true_input(force), drive.preload[None, :], exponent, stroke, drive.rope)
         return self._per_run(data, data["moving"] * (force - cells.shown_output(output)))
 
     def expected(self, values: Values, data: Data) -> Float[Array, " runs"]:

@@ -10,7 +10,14 @@ from jaxtyping import Float
 from bowdenfit.cable.elasticity import LENGTHENING, PRELOAD, STIFFNESS, STRETCH_FRICTION, Elasticity
 from bowdenfit.errors import UsageError
 from bowdenfit.model import Model
-from bowdenfit.physics.loop import free_motion_loss, loop_input_force, loop_output_force, side_tensions, slack_load
+from bowdenfit.physics.loop import (
+    Rope,
+    free_motion_loss,
+    loop_input_force,
+    loop_output_force,
+    side_tensions,
+    slack_load,
+)
 from bowdenfit.physics.stretch import mean_tension
 
 Values = Mapping[str, Array]
@@ -64,20 +71,24 @@ class BentCable:
         reference = values[PRELOAD] if preload is None else jnp.asarray(preload)
         return self.elastic.preload_from(values, reference, self.total_angle(values))
 
+    def rope(self, values: Values) -> Rope:
+        """How the rope of a loop stretches; None where it is taken for linear."""
+        return self.elastic.loop_rope(values)
+
     def output_force(
         self, values: Values, input_force: Float[Array, "*forces"], stroke: float = 1.0, preload: float | None = None
     ) -> Array:
         """Output force [N]; of a single rope by its friction model."""
         force, exponent = jnp.broadcast_arrays(input_force, self.exponent(values))
         if self.model.cable.is_loop:
-            return loop_output_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
+            return loop_output_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke), self.rope(values))
         return self.model.cable.friction.output_force(values, force, exponent, jnp.asarray(stroke))
 
     def input_force(self, values: Values, output_force: Array, stroke: float, preload: float | None) -> Array:
         """Input force [N] that gives an output force: the inverse of `output_force`."""
         force, exponent = jnp.broadcast_arrays(output_force, self.exponent(values))
         if self.model.cable.is_loop:
-            return loop_input_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke))
+            return loop_input_force(force, self.preload(values, preload)[0], exponent, jnp.asarray(stroke), self.rope(values))
         return self.model.cable.friction.input_force(values, force, exponent, jnp.asarray(stroke))
 
     def friction(self, values: Values, preload: float | Array | None = None) -> Float[Array, " bends"]:
@@ -87,7 +98,7 @@ class BentCable:
 
     def slack_load(self, values: Values, preload: float | None = None) -> Float[Array, " bends"]:
         """Input force at which the return side of a loop goes slack [N]."""
-        return slack_load(self.preload(values, preload)[0], self.exponent(values))
+        return slack_load(self.preload(values, preload)[0], self.exponent(values), self.rope(values))
 
     def position(
         self, values: Values, input_force: float, preload: float | None = None
@@ -107,7 +118,7 @@ class BentCable:
     def _pulling_tension(self, values: Values, force: Array, preload: Array, stroke: float) -> Array:
         """Mean tension of the side that pulls [N]."""
         if self.model.cable.is_loop:
-            return side_tensions(force, preload, self.exponent(values), jnp.asarray(stroke))[0]
+            return side_tensions(force, preload, self.exponent(values), jnp.asarray(stroke), self.rope(values))[0]
         return mean_tension(jnp.maximum(force, preload), stroke * self._stretch_exponent(values))
 
     def _stretch_exponent(self, values: Values) -> Array:
@@ -132,7 +143,7 @@ class BentCable:
         exponent, at_rest = self.exponent(values), self.preload(values, preload)[0]
         one = jnp.ones_like(exponent)
         a, b = mean_tension(one, exponent), mean_tension(one, -exponent)
-        pulling, returning = side_tensions(force, at_rest, exponent, one)
+        pulling, returning = side_tensions(force, at_rest, exponent, one, self.rope(values))
         second = jnp.where(returning > 0, 1 / (b * self.elastic.compliance(values, returning)), 0.0)
         return 1 / (a * self.elastic.compliance(values, pulling)) + second
 

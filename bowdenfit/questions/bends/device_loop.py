@@ -109,7 +109,7 @@ def draw_loop(fit: Record, bends: np.ndarray, device: Device | None, preloads: n
                 "without_mounting": free_motion_loss(preload, nominal),
             }
             loop["felt"] = jnp.max(free_motion_loss(others, exponent), axis=1)
-            loop["slack_from"] = jnp.min(slack_load(others, exponent), axis=1)
+            loop["slack_from"] = jnp.min(slack_load(others, exponent, bent.rope(values)), axis=1)
             return loop | ({"stiffness": bent.stiffness(values, 0.0)} if stretches else {})
 
         program = for_each_draw(implied, fit.model.space.size + 1, run_once=True)

@@ -40,9 +40,9 @@ def collect_loops(fit: Record) -> tuple[LoopCurve, ...] | None:
     def curves(values: Values) -> dict[str, Any]:
         exponent, preload = bent.exponent(values), bent.preload(values)[0]
         force = jnp.asarray(forces)
-        forward, back = loop_band(force, preload[:, None], exponent[:, None])
+        forward, back = loop_band(force, preload[:, None], exponent[:, None], bent.rope(values))
         capstan = loop_band(force, jnp.zeros_like(exponent)[:, None], exponent[:, None])[0]
-        return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent)}
+        return {"forward": forward, "back": back, "capstan": capstan, "slack": slack_load(preload, exponent, bent.rope(values))}
 
     draws, loops = evaluate_curves(fit, curves), []
     for i, bend in enumerate(angles):
@@ -68,7 +68,8 @@ def collect_bending_loss(fit: Record) -> BendingLoss | None:
         exponent, own = bent.exponent(values), bent.preload(values)[0]
 
         def efficiency(preload: Any, factor: Any = 1.0) -> Any:
-            return loop_output_force(jnp.asarray(force), preload, factor * exponent, jnp.asarray(1.0)) / force
+            bends = factor * exponent
+            return loop_output_force(jnp.asarray(force), preload, bends, jnp.asarray(1.0), bent.rope(values)) / force
 
         return {
             "fitted": efficiency(own),

@@ -23,6 +23,7 @@ from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.kinds.terms import draw_readings
 from bowdenfit.model import build_model
+from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.questions.figures import collect_figure_data
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, read_bench, replace_readings
@@ -139,11 +140,18 @@ def test_efficiency_is_predicted_at_wrap_angles_with_its_own_and_another_preload
     values = fit.posterior.values
     mu, preload = values["mu"].ravel(), values["preload"].ravel()
     exponent = mu * np.pi / 2
-    expected = np.median(np.minimum(20 - 2 * preload * exponent, 20 * np.exp(-exponent))) / 20
+    rope = tuple(jnp.asarray(values[name].ravel()) for name in ("stiffness", "bedding_stretch", "bedding_load"))
+
+    def efficiency(preload):
+        force, exponents = jnp.full(len(exponent), 20.0), jnp.asarray(exponent)
+        preloads = jnp.broadcast_to(preload, force.shape)
+        return np.median(loop_output_force(force, preloads, exponents, jnp.ones(()), rope)) / 20
+
+    expected = efficiency(preload)
     assert float(rows[0]["efficiency"]) == pytest.approx(expected, rel=1e-5)
     code, out, _ = run("predict", folder, "--wrap-angle", "90deg", "--input-force", "20N", "--quantity", "efficiency",
                        "--preload", "30N", "--csv")  # fmt: skip
-    stiffer = np.median(20 - 60 * exponent) / 20  # at 90 deg, where preload is meant
+    stiffer = efficiency(30.0)  # at 90 deg, where preload is meant
     assert float(table(out)[0]["efficiency"]) == pytest.approx(stiffer, rel=1e-5)
 
 

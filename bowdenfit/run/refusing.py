@@ -12,7 +12,7 @@ from bowdenfit.inference.least_squares import MaximumPosterior
 from bowdenfit.model import Model
 
 _MOST_UNDETERMINED = 20  # judged: with fewer such combinations of coefficients a fit takes seconds, and says which they are
-_MOST_STATES, _MOST_DRAWS = 1 << 30, 8 << 30  # bytes; judged: far more than a fit by default settings takes
+_MOST_STATES, _MOST_DRAWS = 4 << 30, 8 << 30  # bytes; judged: far more than a fit by default settings takes
 _BYTES = 8  # of a number
 _ARRAYS = 3  # that draws have for each reading: what is expected, what is drawn anew, and the log likelihood
 

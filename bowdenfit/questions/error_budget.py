@@ -277,7 +277,7 @@ def widening_sentence(fit: Record) -> str:
     if budget is None or not notable:
         return ""
     row = next((row for row in notable if row.quantity == OPTIMAL_LENGTH), notable[0])
-    name = "the best length" if row.quantity == OPTIMAL_LENGTH else row.quantity
+    name = {OPTIMAL_LENGTH: "the best length", OPTIMAL_EFFICIENCY: "the efficiency there"}.get(row.quantity, row.quantity)
     source = next(source.words for source in budget.sources if source.name == row.largest)
     unit = "" if row.unit == "1" else f" {row.unit}"
     others = counted(len(notable) - 1, "other answer")

@@ -44,7 +44,8 @@ _COEFFICIENT = "friction coefficient"
 
 def summary_text(fit: Record) -> str:
     """Return one page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
-    sentences, outlier_lines = _sentence_lines(fit), _outlier_lines(fit)
+    (answer, verdict), outlier_lines = _sentence_lines(fit), _outlier_lines(fit)
+    sentences = [*answer, *verdict]
     shown, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - len(outlier_lines) - _OTHER_LINES)
     if not complete and assess_fit(fit).trusted and not assess_fit(fit).doubts:  # that all readings agree is said above already
         longer, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - _OTHER_LINES + 1)
@@ -52,15 +53,15 @@ def summary_text(fit: Record) -> str:
     below = [line for block in (shown, outlier_lines, [_MORE]) for line in (["", *block] if block else [])]
     further = filled(interval_width_caveat(fit)).splitlines() if assess_fit(fit).trusted else []
     if further and sum(map(len, sentences)) + len(further) + len(below) <= LINES:
-        sentences.insert(-1, further)
-    return "\n".join([*_shorten_to(sentences, LINES - len(below)), *below]) + "\n"
+        verdict.insert(-1, further)
+    return "\n".join([*_shorten_to(answer, verdict, LINES - len(below)), *below]) + "\n"
 
 
-def _shorten_to(sentences: list[list[str]], room: int) -> list[str]:
-    """Return sentences in at most so many lines: the first, the last, and of the others as many as there is room for."""
-    first, *others, last = sentences
-    if sum(map(len, sentences)) <= room:
-        return [line for sentence in sentences for line in sentence]
+def _shorten_to(answer: list[list[str]], verdict: list[list[str]], room: int) -> list[str]:
+    """Return sentences in at most so many lines: the first, the verdict, and of the rest of the answer what has room."""
+    (first, *others), last = answer, [line for sentence in verdict for line in sentence]
+    if sum(map(len, answer)) + len(last) <= room:
+        return [line for sentence in (*answer, last) for line in sentence]
     left, kept = room - len(first) - len(last) - 1, list[list[str]]()
     for sentence in others:
         if (left := left - len(sentence)) < 0:
@@ -70,16 +71,22 @@ def _shorten_to(sentences: list[list[str]], room: int) -> list[str]:
     return [line for sentence in (first, *kept, [more], last) for line in sentence][:room]
 
 
-def _sentence_lines(fit: Record) -> list[list[str]]:
-    """Return the lines of the answer, of whether to trust it and of what to do next, every sentence on a line of its own."""
+def _sentence_lines(fit: Record) -> tuple[list[list[str]], list[list[str]]]:
+    """Return the lines of each sentence of the answer, and of whether to trust it and what to do next.
+
+    Of a fit that is not to be trusted, why comes first and the answer last.
+    """
     fit_verdict, name = assess_fit(fit), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
     first, *others = summary_sentences(fit)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
-        sentences = [f"{name}: {first}", widening_sentence(fit), *others, *reasons_to_trust(fit), suggest_next_step(fit)]
+        answer = [f"{name}: {first}", widening_sentence(fit), *others]
+        verdict = [*reasons_to_trust(fit), suggest_next_step(fit)]
     else:
-        sentences = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict), f"What they would say: {first}"]
-    return [filled(sentence).splitlines() for sentence in sentences if sentence]
+        answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]
+        verdict = [f"What they would say: {first}"]
+    first_lines, last_lines = ([filled(sentence).splitlines() for sentence in part if sentence] for part in (answer, verdict))
+    return first_lines, last_lines
 
 
 def _quantity_lines(fit: Record, lines: int) -> tuple[list[str], bool]:

@@ -131,7 +131,7 @@ def _array(kind: Any, value: list[Any]) -> np.ndarray:
 
 def _number(value: Any) -> float:
     if type(value) not in (int, float) and value not in (None, "Infinity", "-Infinity"):
-        raise TypeError(f"{_shorten(value)} is no number")
+        raise TypeError(f"{_shorten(value)} is not a number")
     return float("nan") if value is None else float(value)
 
 

@@ -139,7 +139,7 @@ def _refuse_other_arrays(
         raise ValueError(f"{what} of other names or shapes")
     for name, array in arrays.items():
         if array.dtype != np.float64 or (finite and not np.isfinite(array).all()):
-            raise ValueError(f"{what} of {name} that are no numbers")
+            raise ValueError(f"{what} of {name} that are not finite numbers")
 
 
 def _read_page(folder: Path) -> dict[str, Any]:

@@ -44,6 +44,7 @@ for name in ("fork", "register_at_fork", "sched_getaffinity", "killpg", "getuid"
 for name in ("SIGKILL", "SIGALRM", "SIGXCPU", "setitimer", "pthread_sigmask", "sigwaitinfo", "set_wakeup_fd", "SIGCHLD"):
     if hasattr(signal, name):
         delattr(signal, name)
+subprocess.Popen.kill = subprocess.Popen.terminate  # which are one on Windows
 from bowdenfit.cli import main
 codes = []
 for command in sys.argv[1].split(";"):

@@ -156,7 +156,7 @@ def _remark_on_missing_noise(table: ForceTable) -> list[str]:
     return [
         f"{listed(table.origin.files)}: all loads of a run and stroke lose the same share of the force to within "
         f"{NO_NOISE:.0e} of it, finer than any load cell reads. The usual cause is that these forces were computed, by a "
-        "simulation or a spreadsheet; their intervals have almost no width, and say nothing of a cable. Put in what was read."
+        "simulation or a spreadsheet; their intervals have almost no width. Fit what was read on a bench."
     ]
 
 

@@ -80,7 +80,8 @@ def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
 def _select_rows(rows: SlidingRows, kept: np.ndarray) -> SlidingRows:
     """Return the kept readings."""
     arrays = {name: value[kept] for name, value in vars(rows).items() if isinstance(value, np.ndarray)}
-    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
+    unused = {heading: replace(column, numbers=column.numbers[kept]) for heading, column in rows.unused.items()}
+    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()}, unused=unused)
 
 
 def _assign_parts(term: RunsTerm, rows: SlidingRows, unit: LeaveOut) -> tuple[Labels, tuple[str, ...]]:

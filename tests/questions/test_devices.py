@@ -264,7 +264,7 @@ def test_the_verb_prints_and_writes_what_the_library_answers(saved, run, tmp_pat
     page = json.loads(out)
     assert page["fixed"] is None
     assert page["gain"]["safe"] > 0
-    assert run(*asked, "--csv")[1].startswith('wrap_angle_deg,"friction_N*m"')
+    assert run(*asked, "--csv")[1].startswith("wrap_angle_deg,friction_N*m")
     assert run("compensate", saved)[0] == 2
 
 
@@ -342,7 +342,7 @@ def test_words_and_files_of_teleoperation_can_be_read(saved, run, tmp_path):
     page = json.loads((tmp_path / "answer" / "teleoperation.json").read_text())
     assert len(page["schemes"][0]["stable"]) == len(page["walls"])
     assert (tmp_path / "answer" / "teleoperation.png").stat().st_size > 10_000
-    assert run(*asked, "--csv")[1].startswith('coupling,"wall_stiffness_N*m/rad",stable')
+    assert run(*asked, "--csv")[1].startswith("coupling,wall_stiffness_N*m/rad,stable")
 
 
 def test_the_figure_of_teleoperation_is_readable(remote):

@@ -68,7 +68,7 @@ def _without(rows, i, unit):
             mine = mine[np.argsort(rows.input_force[mine], kind="stable")]
             groups += np.array_split(mine, 8) if unit == "load" else [np.array([k]) for k in np.sort(mine)]
     kept = ~np.isin(np.arange(len(run)), groups[i])
-    arrays = {name: value[kept] for name, value in vars(rows).items() if name != "angles"}
+    arrays = {name: value[kept] for name, value in vars(rows).items() if name not in ("angles", "unused")}
     return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
 
 

@@ -70,7 +70,7 @@ class AngleChannel:
             return ""
         return (
             f"{file}: the channel {shown(self.name)} is {self.option} throughout, which is likely to be the wrap angle, and "
-            f"{np.rad2deg(stated):.4g} deg is stated; the friction coefficient is wrong as the angle is. Use --wrap-angle "
+            f"{np.rad2deg(stated):.4g} deg is stated; the friction coefficient would be wrong by their ratio. Use --wrap-angle "
             f"{self.option}, or state that in cable.toml. If it is another angle, say so in the name of the channel, such as "
             "joint angle, or take it out of the file."
         )

@@ -251,7 +251,7 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
     assert pair.mean == pytest.approx(truth, abs=4 * pair.sd)  # fails by chance for one seed in 10^4
     assert pair.sd < 0.4 * pair.first_sd
     text = " ".join(details_text(fit).split())
-    assert "hardly tell mu_edge and gain_error apart" in text
+    assert "hardly separate mu_edge from gain_error" in text
     assert fit.summary()["confounded"][0]["combination"] == pair.combination
     assert not fit.least_squares.estimates["mu_edge"].identified
 

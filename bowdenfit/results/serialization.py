@@ -125,6 +125,8 @@ def stored_key(field: Field[Any]) -> str:
 def _array(kind: Any, value: list[Any]) -> np.ndarray:
     if kind in (Labels, Flags):
         return np.array(value, dtype=int if kind is Labels else bool)
+    if kind is np.ndarray and value and all(isinstance(item, str) for item in value):
+        return np.array(value)
     array = np.array(value, dtype=float)
     return array.reshape(len(value), len(value[0]) if value else 0) if kind is Matrix else array
 

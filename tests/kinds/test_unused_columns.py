@@ -48,6 +48,7 @@ def test_texts_that_explain_the_residuals_are_named_with_what_they_say(tmp_path)
     assert "where 'Rope' is 'blank' the loss is" in first
     assert "where it is 'dry'" in first
     assert "--column group=Rope --friction by-group" in first
+    assert describe_lack_of_fit(bf.load(tmp_path / "fit"))[0] == first
 
 
 def test_a_column_that_says_nothing_of_the_residuals_is_not_named(tmp_path):

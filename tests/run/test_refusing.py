@@ -52,7 +52,7 @@ def test_a_fit_of_many_more_contacts_than_readings_ends_with_a_sentence(tmp_path
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        (["sampler.n_walkers=10000", "sampler.n_ensembles=100"], r"may take 28\.8 GB for 3 parameters, and at most 1\.1 GB"),
+        (["sampler.n_walkers=10000", "sampler.n_ensembles=100"], r"may take 28\.8 GB for 3 parameters, and at most 4\.3 GB"),
         (["sampler.method=nuts", "sampler.n_chains=1000", "sampler.max_steps=10000000"], "lower sampler.max_steps"),
         (["sampler.max_steps=10000000"], r"may take 12\.3 GB"),
     ],

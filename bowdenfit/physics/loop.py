@@ -122,9 +122,9 @@ def _mean_tensions(along: Array, mean: Array, friction_exponent: Array) -> tuple
 def _lengths(pulling: Array, returning: Array, preload: Array, rope: tuple[Array, Array, Array]) -> Array:
     """Return by how much both sides are shorter than at rest [mm]."""
     pulled, returned = (
-        jnp.where(tension > 0, extension(tension, *rope), tension * compliance(jnp.zeros_like(tension), *rope))
+        extension(jnp.maximum(tension, 0.0), *rope) + jnp.minimum(tension, 0.0) * compliance(jnp.zeros_like(tension), *rope)
         for tension in (pulling, returning)
-    )
+    )  # each side of 0 by itself: exponentials far below it would be infinite, and gradients no numbers
     return 2 * extension(preload, *rope) - pulled - returned
 
 

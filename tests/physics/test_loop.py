@@ -374,3 +374,10 @@ def test_the_gradient_of_a_loop_whose_rope_beds_in_is_that_of_differences():
         above, below = (outputs((*parts[:i], part + sign * step, *parts[i + 1 :])) for sign in (1, -1))
         largest = float(jnp.max(jnp.abs(slopes[i])))
         np.testing.assert_allclose(slopes[i], (above - below) / (2 * step), rtol=1e-4, atol=1e-5 * largest)
+
+
+def test_the_gradient_is_finite_where_a_rope_that_beds_in_at_nothing_is_far_from_taut():
+    rope = jnp.asarray(10.0), jnp.asarray(1e-3), jnp.asarray(1e-5)  # the slack side is at a thousand bedding loads below 0
+    loop = jnp.asarray(80.0), jnp.asarray(1.0), jnp.asarray(0.5)
+    slopes = jax.grad(loop_output_force, argnums=(0, 1, 2))(*loop, FORWARD, rope)
+    assert np.all(np.isfinite(slopes))

@@ -1,6 +1,7 @@
 """Reading a data set with changes to its description: the keywords that every verb on measurements takes."""
 
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
@@ -83,7 +84,7 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
     if is_frame(dataset):
         with TemporaryDirectory() as folder:
             return read(write_frame(dataset, Path(folder)), **reading)
-    if not isinstance(dataset, str | Path):
+    if not isinstance(dataset, str | PathLike):
         raise UsageError(
             f"a {type(dataset).__name__} is not a data set; name a folder or a file, or put the readings into a pandas "
             'DataFrame whose headings are quantities with their units, such as "input force (N)".'

@@ -23,8 +23,8 @@ def table(tmp_path, words, factors=(0.73, 1.37), runs=(1, 2)):
 def strokes(path):
     """The strokes of the first run's six readings, and what is remarked on the words."""
     measured = bf.read(path, wrap_angle=(180, "deg")).measurements
-    said = [remark for remark in measured.remarks if "is taken for pull" in remark]
-    return measured.table(ForceTable).stroke.tolist()[:6], said
+    remarks = [remark for remark in measured.remarks if "is taken for pull" in remark]
+    return measured.table(ForceTable).stroke.tolist()[:6], remarks
 
 
 PAIRS = ["up down", "Forward backward", "in OUT", "hin her", "↑ ↓", "F R", "Auf ab", "upstroke downstroke", "+ -", "cw ccw"]
@@ -35,9 +35,9 @@ def test_the_stroke_that_loses_force_is_the_pull(tmp_path, words):
     first, second = words.split()
     for pair, factors in (((first, second), (0.73, 1.37)), ((first, second), (1.37, 0.73))):
         sign = 1 if factors[0] < 1 else -1
-        read, said = strokes(table(tmp_path, pair, factors))
+        read, remarks = strokes(table(tmp_path, pair, factors))
         assert read == [sign] * 3 + [-sign] * 3
-        assert len(said) == 1 and f"the stroke {pair[0 if sign > 0 else 1]!r} is taken" in said[0]
+        assert len(remarks) == 1 and f"the stroke {pair[0 if sign > 0 else 1]!r} is taken" in remarks[0]
 
 
 @pytest.mark.parametrize("words", ["pull push", "hin zurück", "out return", "pull relax"])

@@ -51,8 +51,8 @@ def test_an_angle_that_contradicts_the_stated_one_is_refused_and_proposed(tmp_pa
 
 @pytest.mark.parametrize("heading", ["bend_deg", "wrap_angle_deg", "Umlenkwinkel [°]", "angle (deg)"])
 def test_an_angle_that_changes_inside_a_recording_is_where_the_file_is_to_be_split(tmp_path, heading):
-    said = refused(recording(tmp_path, heading, HALVES), 90)
-    assert "changes from 90 to 180 deg at sample 301" in said and "split the file there" in said
+    refusal = refused(recording(tmp_path, heading, HALVES), 90)
+    assert "changes from 90 to 180 deg at sample 301" in refusal and "split the file there" in refusal
 
 
 def test_check_proposes_the_angle_of_a_channel_and_fit_refuses_another(tmp_path, run):

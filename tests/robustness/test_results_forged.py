@@ -165,7 +165,7 @@ def test_a_forged_folder_is_refused_or_read_and_nothing_else_is_written(folder, 
     (tmp_path / "work").mkdir()
     monkeypatch.chdir(tmp_path / "work")
     what, verb, before = forge(chance, folder), chance.choice(VERBS), contents(tmp_path, folder)
-    code, said = ask(folder, verb)
-    assert code in (0, 2, 3), (what, verb, said)
+    code, printed = ask(folder, verb)
+    assert code in (0, 2, 3), (what, verb, printed)
     assert contents(tmp_path, folder) == before
     assert not [path for path in folder.rglob("*") if path.name.endswith(".partial") or path.name == ".lock"]

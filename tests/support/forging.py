@@ -163,7 +163,7 @@ def main() -> None:
             before, began = contents(place, folder), time.process_time()
             signal.setitimer(signal.ITIMER_PROF, 3 * SLOWEST)
             faulthandler.register(signal.SIGPROF)
-            code, said = ask(folder, verb)
+            code, printed = ask(folder, verb)
             signal.setitimer(signal.ITIMER_PROF, 0)
             took, memory = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             (place / "work" / "x.csv").unlink(missing_ok=True)
@@ -174,7 +174,7 @@ def main() -> None:
             if any(faults):
                 wrong += 1
                 case = f"WRONG {number} {what}, {' '.join(verb)}: exit {code}, {took:.0f} s, {memory >> 10} MB, {left}"
-                print(case, said[-1500:], flush=True)
+                print(case, printed[-1500:], flush=True)
             shutil.rmtree(folder)
             number += 1
     for end, count in sorted(ends.items()):

@@ -126,10 +126,14 @@ class Cell:
     def _number(self) -> str:
         return self.text if self.measured is None else self.measured
 
-    @property
-    def is_missing_code(self) -> bool:
-        """Whether it holds a number that programs write where a reading is missing, such as -9999."""
-        return bool(_MISSING_CODE.fullmatch(_normalize(self._number)))
+    def refuse_missing_code(self, remedy: str = "delete the row") -> None:
+        """Refuse a negative number that programs write where a reading is missing, such as -9999.
+
+        Raises:
+            DatasetError: It holds such a number.
+        """
+        if _MISSING_CODE.fullmatch(_normalize(self._number)):
+            raise self.refuse(f"{self.shown} is a code that programs write where a reading is missing; {remedy}.")
 
     def percentage(self) -> float | None:
         """Return the number where the cell itself carries a percent sign ("78.5 %"), else None."""

@@ -234,12 +234,12 @@ def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[
     used = {column.heading for column in columns.values()}
     unused = dict[str, np.ndarray]()
     for heading, unit, cells in zip(table.header, table.units, zip(*table.rows, strict=True), strict=False):
-        if not heading or heading in used:
-            continue
-        unused[f"{heading} ({unit})" if unit else heading] = np.array([" ".join(cell.text.split()) for cell in cells])
-        if all(is_plain_number(cell.text) for cell in cells):
-            with suppress(DatasetError):  # numbers that can be read in two ways stay texts
-                unused[f"{heading} ({unit})" if unit else heading] = np.array([cell.number() for cell in cells])
+        if heading and heading not in used:
+            values: list[str] | list[float] = [" ".join(cell.text.split()) for cell in cells]
+            if all(is_plain_number(cell.text) for cell in cells):
+                with suppress(DatasetError):  # numbers that can be read in two ways stay texts
+                    values = [cell.number() for cell in cells]
+            unused[f"{heading} ({unit})" if unit else heading] = np.array(values)
     return unused
 
 

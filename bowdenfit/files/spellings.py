@@ -63,6 +63,7 @@ _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn
             "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
 _GUESSES = {name: quantity for quantity, names in _AMBIGUOUS_NAMES.items() for name in names.split("|")}
 _RATIO = ("ratio",)
+_MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
 _DIMENSIONS = {"velocity": ("velocity", "angular_velocity"), "wrap_angle": ("angle",), "efficiency": _RATIO, "loss": _RATIO}
 _SYMBOL = re.compile(r"([ft])(in|out|ein|aus|input|output|motor|mot|act|load|prox|dist|ent|sal|i|o)")
 _ENDS = {"mot": "motor", "act": "actuator", "ent": "entrada", "sal": "salida", "i": "in", "o": "out"}
@@ -130,6 +131,19 @@ def likely_wrap_angle(heading: str, unit: str = "") -> Spelling | None:
 def names_bend(heading: str) -> bool:
     """Return whether a heading says that it is of a bent cable, as an angle alone does not."""
     return bool(_BENDS.intersection(_words(heading)))
+
+
+def likely_angle_unit(heading: str, high: float, are_whole: bool) -> str:
+    """Return the likely unit of angles whose heading has none; empty for what may be a count.
+
+    Args:
+        heading: What they are called, which may be the unit itself.
+        high: The largest of them.
+        are_whole: Whether they are whole numbers.
+    """
+    if unit := implied_angle_unit(heading):
+        return unit
+    return "deg" if high > _MOST_RADIANS else "" if are_whole else "rad"
 
 
 def implied_angle_unit(heading: str) -> str:

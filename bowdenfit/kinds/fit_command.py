@@ -13,7 +13,7 @@ from bowdenfit.files.clocks import names_time
 from bowdenfit.files.columns import find_pivot_headings
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming
 from bowdenfit.files.layout import is_index
-from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, parse_heading
+from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.file_kind import (
     BESIDE_FORCES,
@@ -34,7 +34,6 @@ _SPREAD = re.compile(
 
 WRAP_ANGLE = Quantity("wrap_angle", "angle")
 _FEW = 20  # rows up to which 1, 2, 3 may be loads as well as an index; a judgement
-_MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
 
 
 @dataclass(frozen=True)
@@ -323,8 +322,7 @@ def likely_wrap_angles(table: RawTable) -> dict[str, str]:
     for column in list_number_columns(table):
         spelling = likely_wrap_angle(column.name, units[column.name])
         if spelling is not None and (column.high > column.low or (spelling.unit and column.high > 0)):
-            in_radians = column.high <= _MOST_RADIANS and column.mean != round(column.mean)
-            unwritten = implied_angle_unit(column.name) or ("rad" if in_radians else "deg")
+            unwritten = likely_angle_unit(column.name, column.high, column.mean == round(column.mean)) or "deg"
             likely[column.name] = "" if spelling.unit else unwritten
     return likely
 

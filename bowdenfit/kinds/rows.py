@@ -134,9 +134,8 @@ def route_column(route: Route) -> Quantity:
 def read_angle(cell: Cell, column: Column) -> float:
     """Return a wrap angle between 0 and 2000 deg [rad]."""
     angle = column.value(cell)
-    if angle < 0 and cell.is_missing_code:
-        raise cell.refuse(f"{cell.shown} is a code that programs write where an angle is missing; leave the cell blank.")
     if angle < 0:
+        cell.refuse_missing_code("leave the cell blank")
         raise cell.refuse(f"{cell.shown} is negative; wrap angles add up without sign, so write the absolute value.")
     if angle > LARGEST_ANGLE:
         raise cell.refuse(
@@ -195,9 +194,8 @@ def read_tension(cell: Cell, column: Column, what: str) -> float:
     if cell.limit() is not None:
         raise cell.refuse(f"{cell.shown} is a bound, not a reading; write the value, and 0 for a slack rope.")
     value = column.value(cell)
-    if value < 0 and cell.is_missing_code:
-        raise cell.refuse(f"{cell.shown} is a code that programs write where a reading is missing; delete the row.")
     if value < 0:
+        cell.refuse_missing_code()
         raise cell.refuse(
             f"{what} of {cell.shown} is negative; a rope cannot be pushed: the usual cause is the sign convention of the "
             "load cell or its tare, so write tension as positive, and 0 for a slack rope."

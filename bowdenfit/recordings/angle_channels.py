@@ -11,14 +11,13 @@ from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.headings import Quantity, meanings
 from bowdenfit.files.pieces import subsample
-from bowdenfit.files.spellings import implied_angle_unit, likely_wrap_angle, names_bend, parse_heading
+from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, names_bend, parse_heading
 from bowdenfit.types import Vector
 from bowdenfit.units import ColumnSource, conversion_factor
 from bowdenfit.words import shown
 
 SAME_BEND = float(np.deg2rad(2.0))  # difference of two readings of one wrap angle; as `SAME_BEND` of force tables
 _SAME_SHARE = 0.02  # the same as a share of the angle; a judgement
-_MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
 _PIECES = 100  # parts of a recording in which it is seen whether an angle stands still; a judgement
 _STILL = 0.9  # share of the parts with most motion in which a wrap angle stands still; a judgement
 _FOLLOWS = 0.5  # correlation with the force from which an angle is that of the load; a judgement
@@ -123,7 +122,8 @@ def _read_channel(channel: Channel, force: Vector) -> AngleChannel | None:
     finite = np.isfinite(values)
     if (likely is None and not is_sure) or not finite.any():
         return None
-    unit = (likely.unit if likely else None) or implied_angle_unit(name) or _guess_unit(values[finite])
+    are_whole = bool(np.all(values[finite] == np.round(values[finite])))
+    unit = (likely.unit if likely else None) or likely_angle_unit(name, float(values[finite].max()), are_whole)
     if not unit:
         return None
     angles = values * conversion_factor(unit, "angle")
@@ -135,13 +135,6 @@ def _read_channel(channel: Channel, force: Vector) -> AngleChannel | None:
     if not is_sure and not _stands_still(angles, force):
         return None
     return _locate_change(channel, unit, angles)
-
-
-def _guess_unit(values: Vector) -> str:
-    """Return the likely unit of an angle by its numbers; empty for what may be a count."""
-    if values.max() > _MOST_RADIANS:
-        return "deg"
-    return "" if np.all(values == np.round(values)) else "rad"
 
 
 def _pieces(values: Vector) -> list[np.ndarray]:

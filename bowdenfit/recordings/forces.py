@@ -174,48 +174,46 @@ def _velocity(file: ChannelFile, channel: Channel | None, source: ColumnSource |
     return converted(file, channel, "velocity", source, kind), INTERNAL_UNITS[kind]
 
 
-def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
-    """Return the clock of a channel where it says no unit and would have the samples seconds apart; None for any other."""
+def _read_clock_without_unit(file: ChannelFile, channel: Channel) -> tuple[Channel, float, float] | None:
+    """Return the clock of a channel that says no unit, with its step and its length if these are seconds [s].
+
+    None for any other clock, for one that holds dates, and for few samples.
+    """
     clock = next((c for c in file.channels if c.name == channel.clock), None)
     if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
         return None
-    step = float(np.nanmedian(np.diff(channel.time)))
-    return clock if step >= _SLOWEST and np.nanmax(np.abs(clock.values)) < _DATES else None
+    if np.nanmax(np.abs(clock.values)) >= _DATES:
+        return None
+    return clock, float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
+
+
+def clock_in_doubt(file: ChannelFile, channel: Channel) -> Channel | None:
+    """Return the clock of a channel where it says no unit and would have the samples seconds apart; None for any other."""
+    clock = _read_clock_without_unit(file, channel)
+    return clock[0] if clock is not None and clock[1] >= _SLOWEST else None
 
 
 def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
     """Refuse a clock that says no unit and is unlikely to be in seconds.
 
     Raises:
-        DatasetError: It is such a clock.
+        DatasetError: By it samples would be seconds apart, or all strokes last less than a second.
     """
-    _refuse_short_clock(file, channel)
-    if (clock := clock_in_doubt(file, channel)) is None or channel.time is None:
+    if (read := _read_clock_without_unit(file, channel)) is None:
         return
-    step, length = float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
-    in_milliseconds, in_seconds = (option_naming("time", clock.name, unit, "--channel") for unit in ("ms", "s"))
+    clock, step, length = read
+    if step >= _SLOWEST:
+        units = ["ms", "s"]
+        last = f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s"
+    elif 0 < length < _SHORTEST:
+        units = ["day", "min", "s"]
+        last = (
+            f"{length:.3g} s, in minutes {60 * length:.4g} s, and in days, as spreadsheets count them, {86400 * length:.4g} s"
+        )
+    else:
+        return
+    *options, option = (option_naming("time", clock.name, unit, "--channel") for unit in units)
     raise DatasetError(
-        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
-        f"{length / 3600:.2g} hours at one sample each {step:g} s, in milliseconds {length / 1000:.4g} s. Say which it is: "
-        f"{in_milliseconds}, or {in_seconds}."
-    )
-
-
-def _refuse_short_clock(file: ChannelFile, channel: Channel) -> None:
-    """Refuse a clock that says no unit and by which all strokes of a recording would last less than a second.
-
-    Raises:
-        DatasetError: It is such a clock.
-    """
-    clock = next((c for c in file.channels if c.name == channel.clock), None)
-    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
-        return
-    length = float(np.nanmax(channel.time) - np.nanmin(channel.time))
-    if not 0 < length < _SHORTEST or np.nanmax(np.abs(clock.values)) >= _DATES:
-        return
-    options = [option_naming("time", clock.name, unit, "--channel") for unit in ("day", "min", "s")]
-    raise DatasetError(
-        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last "
-        f"{length:.3g} s, in minutes {60 * length:.4g} s, and in days, as spreadsheets count them, {86400 * length:.4g} s. Say "
-        f"which it is: {options[0]}, {options[1]}, or {options[2]}."
+        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last {last}. "
+        f"Say which it is: {', '.join(options)}, or {option}."
     )

@@ -36,7 +36,7 @@ _LARGEST_GAIN_ERROR = 0.1  # log ratio that a bad calibration of load cells may 
 _WINDOW, _SHARE = 5, 20  # least blocks on both sides over which a force must rise, and one part in so many of the recording
 _SURELY_RISES = 4.0  # standard errors by which it must
 _STILL = 0.05  # fraction of the highest speed below which the motor is taken to stand
-_OPPOSED = -0.5  # judged: correlation below which the forces go against each other
+OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _FOLLOWS = 0.5  # correlation, and share of the output's variance that friction explains, below both of which it does not
 _CHANGES = 3.0  # spread of the input, in units of its noise, from which the output could follow it
 
@@ -297,7 +297,7 @@ def refuse_dead(force_in: Vector, force_out: Vector, file: str, name: str, loop:
     alike = float(np.corrcoef(force_in, force_out)[0, 1]) if np.ptp(force_out) > 0 else 0.0
     spread = float(np.var(np.log(loop.force_out + loop.lost))) if loop is not None else 0.0
     explained = 1 - float(np.var(loop.deviation)) / spread if loop is not None and spread > 0 else 0.0
-    if alike < _OPPOSED and explained < _FOLLOWS:
+    if alike < OPPOSED and explained < _FOLLOWS:
         raise DatasetError(
             f"{file}: the output falls where the input rises in {name!r}: correlation {alike:.2f}. The usual causes are the "
             "two tensions of a pull-pull pair, of which one falls while the other rises, and a load cell with its sign turned: "

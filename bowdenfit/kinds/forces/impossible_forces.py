@@ -21,6 +21,7 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import GAIN_ERROR
+from bowdenfit.recordings.rope_strokes import OPPOSED
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent, shown
 
@@ -38,7 +39,6 @@ _LEAST_FOR_LINE = 3  # readings of a cell above which a line with two coefficien
 _WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the slope is looked at
 _SURE = 3.0  # standard errors of the slope
 _SLOPE = 0.5  # share of a rope's least slope
-_OPPOSED = -0.5  # judged: correlation below which the forces go against each other
 _EXPLAINED = 0.25  # share of the variance of the output
 _ZERO_ERROR = 0.005  # error of zero over the largest force where none is stated; a judgement
 _SDS = 3.0  # standard deviations of stated errors of the load cells that are allowed: 1 in 370 is beyond
@@ -167,7 +167,7 @@ def check_following(table: ForceTable) -> None:
         rows = np.flatnonzero(table.stroke == stroke)
         if _does_not_follow(table, rows, stroke):
             force_in, force_out = table.input_force[rows], table.output_force[rows]
-            opposed = np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < _OPPOSED
+            opposed = np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < OPPOSED
             how_much = "falls where the input rises" if opposed else "hardly depends on it"
             cause = "the two tensions of a pull-pull pair" if opposed else "a dead load cell"
             raise DatasetError(

@@ -279,8 +279,8 @@ def _read_tensions(table: RawTable, columns: Mapping[str, Column], description: 
 
 def _read_force(column: Column, cell: Cell) -> float:
     value = column.value(cell)
-    if value < 0 and cell.is_missing_code:
-        raise cell.refuse(f"{cell.shown} is a code that programs write where a reading is missing; delete the row.")
+    if value < 0:
+        cell.refuse_missing_code()
     if value <= 0:
         raise cell.refuse(
             f"{cell.shown} is not positive; the usual cause is the sign convention of the load cell or a "

@@ -74,6 +74,7 @@ _WEIGHTS = {"kg": "kgf", "g": "gf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "
 _PINT_NAMES = {"r/min": "rpm", "rev/min": "rpm", "1/min": "rpm", "u/min": "rpm", "newton": "N", "newtons": "N"}
 # Names with products, quotients and small powers. Pint would compute whatever else it is given, such as 9**9**9.
 _UNIT_TEXT = re.compile(r"[\w°%‰/*^().·\s-]{1,40}")
+_MULTIPLE = re.compile(r"[x×*]? ?(?P<factor>10+) ?[x×*]? ?(?P<unit>[^\W\d].*)")  # (x10 N), (100 N)
 _DEGREE, _DEGREE_OR_GON = re.compile(r"\bGrad\b"), re.compile(r"\bgrad\b")  # the first is German, and giga-radians to pint
 _NO_UNIT = re.compile(r"\d\d|%%|(?:\*\*|\^)[\s(-]*\d[\s)]*(?:\*\*|\^)")
 
@@ -125,6 +126,12 @@ def is_unit(text: str) -> bool:
     except DatasetError:
         return False
     return True
+
+
+def multiple_of(text: str) -> tuple[str, str] | None:
+    """Return the factor and the unit of a multiple of ten in the place of a unit, such as "x10 N"; None for any other text."""
+    match = _MULTIPLE.fullmatch(text.strip())
+    return (match["factor"], match["unit"]) if match and is_unit(match["unit"]) else None
 
 
 @cache
@@ -226,6 +233,11 @@ def _parsed(unit: str) -> "pint.Unit":
     if _DEGREE_OR_GON.search(text):
         raise DatasetError(
             f"the unit {shown(unit)} is a degree in German and a hundredth of a right angle elsewhere; write deg, or gradian"
+        )
+    if multiple := multiple_of(text):
+        factor, single = multiple
+        raise DatasetError(
+            f"the unit {shown(unit)} is a multiple, which is not read; multiply the numbers by {factor} and write {single}"
         )
     if not _UNIT_TEXT.fullmatch(text) or _NO_UNIT.search(text):
         raise DatasetError(unknown)

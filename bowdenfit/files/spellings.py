@@ -40,13 +40,13 @@ _AMBIGUOUS_NAMES = {  # what only the user can say
     "wrap_angle": "wrap|bend|bend angle|bending angle|total bend angle|contact angle|angle|theta|phi|winkel|biegewinkel|"
     "umlenkwinkel|angle de contact|angulo|angulo de contacto|angulo de curvatura|angolo|nominal angle|nominal wrap|"
     "measured angle|measured wrap|nominal wrap angle|measured wrap angle|deg|degree|degrees|grad|turns|turn|wraps|windings|"
-    "umdrehungen|windungen|tours|vueltas|giri",
+    "umdrehungen|windungen|tours|vueltas|giri|loops|coils",
 }
 # A heading with one of these words may be that of wrap angles; with one of the second, it is that of something else's angle.
 _ANGLE_WORDS = (
     "angle angles deg degree degrees bend bends bending bent curve curvature curved turn turns wrap wraps wrapping theta phi "
     "deflection winkel grad biegung biegewinkel umlenkung umlenkwinkel umschlingung krummung kurve umdrehungen windungen coude "
-    "courbure virage angulo curvatura curva giro vueltas angolo piega giri elbow direction configuration"
+    "courbure virage angulo curvatura curva giro vueltas angolo piega giri loops coils elbow direction configuration"
 )
 _OTHER_ANGLE_WORDS = (
     "motor encoder joint crank pulley servo shaft wheel drum position motorwinkel gelenk knee ankle hip flexion phase step "
@@ -60,7 +60,8 @@ _BEND_WORDS = (  # of the angular ones those of nothing but a bent cable
 _BENDS = frozenset(_BEND_WORDS.split())
 _WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a label, or a direction of motion
 _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
-            "vueltas": "turn", "giri": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
+            "vueltas": "turn", "giri": "turn",
+            "windings": "turn", "loops": "turn", "coils": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
 _GUESSES = {name: quantity for quantity, names in _AMBIGUOUS_NAMES.items() for name in names.split("|")}
 _RATIO = ("ratio",)
 _MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
@@ -141,7 +142,10 @@ def likely_angle_unit(heading: str, high: float, are_whole: bool) -> str:
         high: The largest of them.
         are_whole: Whether they are whole numbers.
     """
-    if unit := implied_angle_unit(heading):
+    unit = implied_angle_unit(heading)
+    if unit == "deg" and names_bend(heading) and are_whole and high <= _MOST_RADIANS:
+        return ""  # the number of 90 deg bends
+    if unit:
         return unit
     return "deg" if high > _MOST_RADIANS else "" if are_whole else "rad"
 

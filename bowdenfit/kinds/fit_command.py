@@ -11,7 +11,7 @@ import numpy as np
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
 from bowdenfit.files.columns import find_pivot_headings
-from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming
+from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming, split_brackets
 from bowdenfit.files.layout import is_index
 from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import RawTable, read_table
@@ -24,7 +24,7 @@ from bowdenfit.kinds.file_kind import (
     guess_file_kind,
     read_numbers,
 )
-from bowdenfit.units import ColumnSource, dimension_of, is_unit
+from bowdenfit.units import ColumnSource, dimension_of, is_unit, multiple_of
 from bowdenfit.words import listed, shown
 
 _SPREAD = re.compile(
@@ -44,6 +44,7 @@ class HeadedColumn:
         name: What it is called.
         unit: Unit that the file gives; empty without one.
         mean, low, high: Of its values.
+        are_whole: Whether they are whole numbers.
         is_index: Whether it only counts the rows.
     """
 
@@ -52,6 +53,7 @@ class HeadedColumn:
     mean: float = 0.0
     low: float = 0.0
     high: float = 0.0
+    are_whole: bool = False
     is_index: bool = False
 
 
@@ -65,8 +67,9 @@ def list_number_columns(table: RawTable) -> list[HeadedColumn]:
             and len(known) > len(table.rows) / 2
             and not (names_time(heading) and not parse_heading(heading, unit))
         ):
-            counts = len(known) > _FEW and is_index(np.array(known))
-            columns.append(HeadedColumn(heading, unit, float(np.mean(known)), min(known), max(known), counts))
+            values = np.array(known)
+            whole, counts = bool(np.all(values == np.round(values))), len(known) > _FEW and is_index(values)
+            columns.append(HeadedColumn(heading, unit, float(values.mean()), min(known), max(known), whole, counts))
     return columns
 
 
@@ -104,12 +107,15 @@ def name_force_columns(
         provided += [f"NAME is the {option.removeprefix('--')} of the {name}" for name in missing]
     elif len(sure) < len(unnamed):
         provided += [f"{shown(ends[name].name)} is the {name}" for name in ends if name not in sure]
+    multiples = {name: multiple for name in unnamed if (multiple := multiple_of(split_brackets(ends[name].name)[1]))}
+    for name, (factor, unit) in multiples.items():
+        provided.append(f"the numbers under {shown(ends[name].name)} are multiplied by {factor} and headed ({unit})")
     options = []
-    for name in unnamed:
+    for name in [name for name in unnamed if name not in multiples]:
         unit = "" if _unit(ends[name]) else "N"
         if always or unit or name not in sure:
             options.append(option_naming(name, ends[name].name, unit, option))
-    if any(not _unit(column) for column in ends.values()):
+    if any(not _unit(column) for name, column in ends.items() if name not in multiples):
         provided.append("the forces are in newtons, as the file does not say")
     return options, provided
 
@@ -266,11 +272,24 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
         DatasetError: There is such a column.
     """
     for name, unit in likely_wrap_angles(table).items():
+        if unit is None:
+            raise DatasetError(
+                f"{path.name} has a column {shown(name)}, which is likely to count the bends of each row, and --wrap-angle "
+                f"states one angle for all rows. {_counted_bends(name)} If it counts something else, take it out of the file."
+            )
         raise DatasetError(
             f"{path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and --wrap-angle "
             f"states one angle for all rows. Name it instead: {option_naming('wrap_angle', name, unit)}; if it is another "
             "angle, take the column out of the file."
         )
+
+
+def _counted_bends(name: str) -> str:
+    """Return what to do about a column that counts bends."""
+    return (
+        f"Write the wrap angle into a column of its own, headed wrap_angle_deg: the number in {shown(name)} times the angle "
+        "of one bend."
+    )
 
 
 def _find_columns_of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:
@@ -306,23 +325,25 @@ def _wrap_angle_options(table: RawTable, path: Path) -> tuple[list[str], list[st
         return _stated_angle_options(path)
     best = next((name for name in likely if "measured" in name.lower()), next(iter(likely)))
     others = [shown(name) for name in likely if name != best]
-    rather = f" rather than {listed(others)}" if others else ""
+    rather = f" rather than {listed(others)}, and not one of several bends, whose angles add up" if others else ""
     unit, clause = likely[best], f"{shown(best)} is the wrap angle{rather}"
+    if unit is None:
+        return [], [f"the table has a column wrap_angle_deg, the number of bends in {shown(best)} times the angle of one"]
     return [option_naming("wrap_angle", best, unit)], [clause + (f", in {unit}" if unit else "")]
 
 
-def likely_wrap_angles(table: RawTable) -> dict[str, str]:
+def likely_wrap_angles(table: RawTable) -> dict[str, str | None]:
     """Return columns of numbers that are likely wrap angles, with the unit to state; empty where the heading has it.
 
     A column without a unit is taken to be in rad where its values are none of degrees: whole turns at most, not all whole.
-    With the same number in every row it may be a count or a label.
+    Small whole numbers count bends, and have None. With the same number in every row it may be a count or a label.
     """
-    likely = dict[str, str]()
+    likely = dict[str, str | None]()
     units = dict(zip(table.header, table.units, strict=True))
     for column in list_number_columns(table):
         spelling = likely_wrap_angle(column.name, units[column.name])
         if spelling is not None and (column.high > column.low or (spelling.unit and column.high > 0)):
-            unwritten = likely_angle_unit(column.name, column.high, column.mean == round(column.mean)) or "deg"
+            unwritten = likely_angle_unit(column.name, column.high, column.are_whole) or None
             likely[column.name] = "" if spelling.unit else unwritten
     return likely
 

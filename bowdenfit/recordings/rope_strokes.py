@@ -254,8 +254,9 @@ def _explain_other_ratio(loop: Hysteresis, file: str, name: str) -> DatasetError
         f"{file}: in {name!r} the output force follows a reversing input in a loop about {ratio:.2g} times the input "
         f"force, and is {what}, which friction cannot do. The usual causes are a lever, a pulley or a drum between rope "
         "and load cell, a unit that is not the one stated, and a load cell of another range. Correct the unit, or state "
-        f"the force on the rope over the reading of its cell: [sensors] output_ratio = {1 / ratio:.2g} in cable.toml, or "
-        f"--set sensors.output_ratio={1 / ratio:.2g} (input_ratio for the input's)."
+        "exactly the force on the rope over the reading of its cell, of which the loop says about "
+        f"{1 / ratio:.3g}: [sensors] output_ratio in cable.toml, or --set sensors.output_ratio={1 / ratio:.3g} "
+        "(input_ratio for the input's)."
     )
 
 

@@ -53,6 +53,8 @@ _SLIGHT = 0.1  # log gain of force that load cells may differ by
 # A row is impossible by itself, however few others show the noise, where its forces differ by this factor and by this share of
 # the table's largest force. Calculation: log(2.5) is six standard deviations of cells with a noise of a tenth of the load.
 _ANY_GAIN, _LARGE_GAIN = 2.5, 0.1
+_OTHER_RATIO = 0.1  # log ratio about which pull and return may lie by the gains of load cells; a judgement
+_ABOUT_UNIT = 0.05  # log ratio within which units explain it; a judgement
 _TYPED = "a typing error, a cell that slipped by a row, or a wrong stroke; correct the row or leave it out"
 _STROKES = {1: ("pulling", "more"), -1: ("returning", "less")}
 
@@ -231,6 +233,14 @@ class ForceGains:
         return bool(-np.median(self.log_gain[~up]) > _ABOUT * np.median(self.log_gain[up]))
 
     @property
+    def center(self) -> float:
+        """Log ratio of output to input about which pulls and returns lie, which is 0 of a rope; NaN of one stroke alone."""
+        pull, back = self.stroke == 1, self.stroke == -1
+        if not (pull.any() and back.any()):
+            return float("nan")
+        return float(np.median(self.log_gain[pull]) - np.median(self.log_gain[back])) / 2
+
+    @property
     def wide(self) -> bool:
         """Whether the mistake concerns the whole table."""
         return self.mixed or max(self.share(1), self.share(-1)) > _MOSTLY
@@ -309,6 +319,8 @@ def _describe_cause_of_table(gains: ForceGains) -> str:
     """Return the usual cause of a mistake in a whole table, by which strokes show it, and its remedy."""
     strokes = [stroke for stroke in (1, -1) if np.any(gains.stroke == stroke)]
     wrong = [stroke for stroke in strokes if gains.share(stroke) > _MOSTLY]
+    if wrong != strokes and abs(gains.center) > _OTHER_RATIO:
+        return _describe_other_ratio(gains.center)
     units = _find_mistaken_units(gains, wrong[0]) if wrong else ""
     if units and (len(strokes) == 1 or wrong != strokes):
         return f"the unit in one heading, {units} mistaken; correct the heading"
@@ -316,14 +328,31 @@ def _describe_cause_of_table(gains: ForceGains) -> str:
         return "rows in which the rope slides back and that are not marked so; add a column stroke with pull and return"
     if wrong == strokes:
         also = " or pull and return" if len(strokes) > 1 else ""
-        zero = "" if len(strokes) > 1 else ", or a load cell that was not zeroed"
+        other = "" if len(strokes) > 1 else ", a load cell that was not zeroed, or a lever or pulley before one"
+        remedy = "" if len(strokes) > 1 else "; a lever's or pulley's ratio is stated as sensors.output_ratio"
         return (
-            f"that the columns input_force and output_force{also} are swapped{zero}; correct the headings, or map them in "
-            'cable.toml: columns = { input_force = { name = "..." } }'
+            f"that the columns input_force and output_force{also} are swapped{other}; correct the headings, or map them in "
+            f'cable.toml: columns = {{ input_force = {{ name = "..." }} }}{remedy}'
         )
     return (
         "the unit, gain or zero of one load cell, or a wrong stroke; correct the table, or state [sensors] offset_sd, or "
         "input_gain_error_sd and output_gain_error_sd"
+    )
+
+
+def _describe_other_ratio(center: float) -> str:
+    """Return the usual cause where pull and return lie about another ratio than 1, and its remedy.
+
+    Args:
+        center: Log ratio of output to input about which they lie [1].
+    """
+    seen = f"because pull and return lie about an output of {np.exp(center):.2g} times the input"
+    units = [units for units, factor in _FACTORS.items() if abs(abs(center) - np.log(factor)) < _ABOUT_UNIT]
+    if units:
+        return f"the unit in one heading, {units[0]} mistaken, {seen}; correct the heading"
+    return (
+        f"a lever, a pulley or a drum between rope and load cell, or a wrong unit, {seen}; correct the unit, or state the "
+        f"exact force on the rope over the reading of its cell, as by --set sensors.output_ratio={np.exp(-center):.3g}"
     )
 
 

@@ -172,7 +172,11 @@ def _suggest_remedy(fit: Record, departure: Departure) -> str:
     if departure.against == SPEED and losses:
         return _suggest_friction(model, ("rate-dependent",), "the delay between the channels")
     if departure.against == STROKE and losses:
-        return _suggest_friction(model, ("stroke-dependent",), "the zero and the gain of both load cells")
+        return (
+            "A load cell with a wrong gain looks the same: calibrate the cells, or let the fit find the gain, as by --set "
+            "sensors.input_gain_error_sd=0.1 --set sensors.output_gain_error_sd=0.1. "
+            + _suggest_friction(model, ("stroke-dependent",), "the zero and the gain of both load cells")
+        )
     if departure.against == GROUP:
         return _suggest_friction(model, (BY_GROUP,), "what else is not the same in these groups")
     if departure.against == WRAP_ANGLE and losses:

@@ -87,7 +87,7 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
         text = describe_table_file(raw, file, make_both_commands(path, raw, file), None, backwards, headings, not backwards)
         return text, False  # `fit` asks which of the two it is
     if is_angle_table(raw) and not named:
-        return _describe_angle_table(raw), False
+        return _describe_angle_table(raw), True
     command = make_table_command(path, raw, file.kind, named)
     has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
     strict = any(reading.values()) and not command.names_more

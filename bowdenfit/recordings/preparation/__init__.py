@@ -262,7 +262,7 @@ def _remarks(cleaned: _Cleaned, delay: Delay, counts: dict[str, int]) -> list[st
             remarks.append(f"The clock of {name} has {int(channel.gap.sum())} gaps, {length:.3g} s together.")
     if counts["saturated"]:
         remarks.append(
-            f"{counts['saturated']} samples lie at the end of a load cell's range and say only that the force was at least "
-            "as large."
+            f"{counts['saturated']} samples rest at the lowest or the highest reading of a load cell, as of one that is "
+            "overloaded or whose plug is loose; the force is not known there."
         )
     return remarks

@@ -341,6 +341,18 @@ def test_run_effects_that_are_there_are_preferred_to_none(by_run_effect):
     assert "12 of run efficiency" in text
 
 
+def test_fits_that_differ_in_a_prior_alone_are_said_to(by_run_effect, mountings):
+    measured_apart = {"prior": {"lognormal": {"median": 0.2, "log_sd": 0.1}}}
+    fits = {"with": by_run_effect["with"], "known": fitted(mountings, friction={"mu_edge": measured_apart})}
+    comparison = bf.compare(fits)
+    (other,) = comparison.other_priors
+    assert comparison.other_priors[other] == ("mu_edge",)
+    text = " ".join(comparison_text(comparison).split())
+    assert f"{other} differs from {comparison.best} only in the prior of mu_edge" in text
+    assert "Prefer the simpler one" not in text
+    assert bf.compare(by_run_effect).other_priors == {}
+
+
 def test_a_fit_with_a_fixed_parameter_is_loaded_as_it_was_saved(by_run_effect, tmp_path):
     by_run_effect["without"].save(tmp_path / "without")
     assert [p.name for p in bf.load(tmp_path / "without").model.space.fixed] == ["tau"]

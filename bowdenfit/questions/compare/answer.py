@@ -66,6 +66,8 @@ class Comparison(Display):
         left_out: What was left out at a time: a whole run, its readings at one load, or one of them.
         few_runs: Number of runs, where so few are left out in parts unasked; 0 else.
         troubles: Why fits are not to be trusted, by fit; those that are to be have none.
+        other_priors: Parameters whose priors are all that a fit differs in from the one that predicts best, by fit; those that
+            differ in more are not there.
     """
 
     differences: dict[str, ElpdDifference]
@@ -79,6 +81,7 @@ class Comparison(Display):
     left_out: LeaveOut = "run"
     few_runs: int = 0
     troubles: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    other_priors: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     JSON: ClassVar = (
         "fits",
@@ -217,7 +220,25 @@ def _compare_fits(fits: Mapping[str, Record], report: Report | None, leave_out: 
             for name, fit in ordered.items()
             if (fit_verdict := assess_fit(fit)).troubles
         },
+        _find_other_priors(ordered),
     )
+
+
+def _find_other_priors(fits: Mapping[str, Record]) -> dict[str, tuple[str, ...]]:
+    """Return the parameters whose priors are all that a fit differs in from the first one, by fit."""
+    (_, first), *others = fits.items()
+    return {name: names for name, fit in others if (names := _list_other_priors(first, fit))}
+
+
+def _list_other_priors(one: Record, other: Record) -> tuple[str, ...]:
+    """Return the parameters whose priors two fits differ in; empty where they differ in anything else, or in none."""
+    without_priors = [
+        fit.dataset.description.model_dump(exclude={"friction", "prior", "sampler", "name", "source"}) for fit in (one, other)
+    ]
+    of_one, of_other = ({p.name: p for p in fit.model.space.free} for fit in (one, other))
+    if without_priors[0] != without_priors[1] or of_one.keys() != of_other.keys():
+        return ()
+    return tuple(name for name, p in of_one.items() if p.prior != of_other[name].prior)
 
 
 def _require_draws(name: str, fit: Record) -> Draws:

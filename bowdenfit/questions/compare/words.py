@@ -96,10 +96,22 @@ def verdict_sentences(comparison: Comparison) -> list[str]:
         )
         noun = "the difference is" if len(undecided) == 1 else "the differences are"
         lines.append(
-            f"The data cannot distinguish {best} from {listed(undecided)}: {noun} within what chance gives ({size}). Prefer "
-            "the simpler one."
+            f"The data cannot distinguish {best} from {listed(undecided)}: {noun} within what chance gives ({size})."
         )
+        if any(name not in comparison.other_priors for name in undecided):
+            lines[-1] += " Prefer the simpler one."
+    lines += [_prior_sentence(comparison, name) for name in others if name in comparison.other_priors]
     return lines + [_trust_sentence(comparison, name) for name in comparison.differences if name in comparison.troubles]
+
+
+def _prior_sentence(comparison: Comparison, name: str) -> str:
+    """Say that a fit is the same model as the best one with other priors, and what decides between them."""
+    parameters = comparison.other_priors[name]
+    priors = "prior" if len(parameters) == 1 else "priors"
+    return (
+        f"{name} differs from {comparison.best} only in the {priors} of {listed(parameters)}: neither is simpler, and what is "
+        "known besides these readings decides between them. The last table shows how far that moves each number."
+    )
 
 
 def _trust_sentence(comparison: Comparison, name: str) -> str:

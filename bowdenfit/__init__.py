@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.pool.verb import pool
     from bowdenfit.questions.predict.verb import predict
     from bowdenfit.questions.report.verb import report
+    from bowdenfit.questions.schema.verb import schema
     from bowdenfit.questions.simulate.verb import simulate
     from bowdenfit.questions.summary.verb import plot
     from bowdenfit.questions.teleoperate.verb import teleoperate
@@ -57,6 +58,7 @@ _WHERE = {
     "predict": "bowdenfit.questions.predict.verb",
     "read": "bowdenfit.reading",
     "report": "bowdenfit.questions.report.verb",
+    "schema": "bowdenfit.questions.schema.verb",
     "simulate": "bowdenfit.questions.simulate.verb",
     "teleoperate": "bowdenfit.questions.teleoperate.verb",
     **dict.fromkeys(
@@ -89,6 +91,7 @@ __all__ = [
     "predict",
     "read",
     "report",
+    "schema",
     "simulate",
     "teleoperate",
 ]

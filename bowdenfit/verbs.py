@@ -13,6 +13,7 @@ from bowdenfit.questions.next.verb import VERB as NEXT
 from bowdenfit.questions.pool.verb import VERB as POOL
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.questions.report.verb import VERB as REPORT
+from bowdenfit.questions.schema.verb import VERB as SCHEMA
 from bowdenfit.questions.simulate.verb import VERB as SIMULATE
 from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
@@ -21,5 +22,5 @@ from bowdenfit.run.verb import VERB as FIT
 
 VERBS = (
     CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, COMPENSATE, TELEOPERATE, EXPORT, CALIBRATE, FLEET, POOL,
-    PLOT, REPORT, SIMULATE, METABOLIC,
+    PLOT, REPORT, SIMULATE, METABOLIC, SCHEMA,
 )  # fmt: skip

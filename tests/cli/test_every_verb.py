@@ -29,6 +29,7 @@ COMMANDS = {  # what is typed behind each verb, and a word of what it prints
     "plot": (("FIT", "--figure", "coefficients", "-o", "TMP/figures"), "coefficients.png"),
     "report": (("FIT", "-o", "TMP/report.html"), "report.html"),
     "simulate": (("DATASETS/synthetic-bench/bench.toml", "--seed", "1", "-o", "TMP/simulated"), "simulated"),
+    "schema": (("cable",), "friction_model"),
     "metabolic": (("DATASETS/on-body-metabolic",), "than no exoskeleton"),
 }
 MAY_DOUBT = {"calibrate", "pool", "metabolic", "fit"}  # of two replications, of least squares alone, ...

@@ -35,6 +35,7 @@ import numpy as np
 
 from bowdenfit.questions.predict.lengths import predict_at_lengths
 from bowdenfit.results.serialization import serialize
+from bowdenfit.stages import announce_stage
 
 
 class Fit(Record):
@@ -52,6 +53,7 @@ class Fit(Record):
         Raises:
             StoreError: The folder is missing, unfinished or damaged.
         """
+        announce_stage(f"reading {Path(path).name}")
         return cls.of(load_record(Path(path)))
 
     def save(self, path: str | Path, force: bool = False) -> None:

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from bowdenfit.arguments import DATASET, PATH, TEXTS, Quantity, as_pair, number_with_unit, read_first, whole_number
 from bowdenfit.errors import UsageError
 from bowdenfit.frames import is_frame, write_frame
+from bowdenfit.stages import announce_stage
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
             f"a {type(dataset).__name__} is not a data set; name a folder or a file, or put the readings into a pandas "
             'DataFrame whose headings are quantities with their units, such as "input force (N)".'
         )
+    announce_stage(f"reading {Path(dataset).name}")
     return load_folder_or_file(
         Path(dataset),
         changed_settings(reading),

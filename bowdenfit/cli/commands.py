@@ -28,6 +28,7 @@ import bowdenfit as bf
 from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
 from bowdenfit.cli.running import watch_verb
+from bowdenfit.cli.stage_line import print_stages, show_stages
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
@@ -65,6 +66,8 @@ def command(verb: Verb) -> App:
 
     def run(*arguments: Any, **options: Any) -> int:
         request = command_signature.bind(*arguments, **options).arguments
+        if request.pop("verbose", False):
+            print_stages()
         forms = [form for form in ("json", "csv") if request.pop(form, False)]
         if len(forms) == 2:
             raise UsageError("--json and --csv are two forms of the same answer; name one of them.")
@@ -86,6 +89,8 @@ def _command_signature(verb: Verb) -> Signature:
         if meaning:
             annotation = Annotated[bool, Parameter(help=meaning)]
             parameters.append(Stated(form, Stated.KEYWORD_ONLY, default=False, annotation=annotation))
+    of_verbose = Parameter(name=["--verbose", "-v"], help="Print each stage of the work, with the time of day.")
+    parameters.append(Stated("verbose", Stated.KEYWORD_ONLY, default=False, annotation=Annotated[bool, of_verbose]))
     return Signature(parameters)
 
 
@@ -169,7 +174,8 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     if "report" in parameters_of(function):
         request["report"] = lambda sentence: say(sentence, err=True)
     if verb.watch is None:
-        answer = function(**request)
+        with show_stages(None, verb.name or verb.function.__name__):
+            answer = function(**request)
     else:
         with watch_verb(request["output"], verb.watch) as progress:
             answer = function(**request, progress=progress)

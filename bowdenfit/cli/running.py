@@ -8,16 +8,14 @@ their names or not at all, and a checkpoint only grows.
 
 import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import copy_context
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
-from tqdm import tqdm
-
+from bowdenfit.cli.stage_line import Report, show_stages
 from bowdenfit.cli.terminal import say_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.resources import refuse_low_memory
@@ -113,9 +111,6 @@ def _end_process() -> None:
         os._exit(INTERRUPTED)
 
 
-Report: TypeAlias = Callable[..., None]
-
-
 @contextmanager
 def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
     """Yield what to call while something long runs; say how to go on when the user (or the system) stops it.
@@ -135,7 +130,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         return f"{watch.remark} {folder}: run the same command with --resume" if kept is not None and kept.exists() else ""
 
     try:
-        with announce_continuation(how_to_go_on), _bar(watch) as show:
+        with announce_continuation(how_to_go_on), show_stages(watch, watch.bar["desc"]) as show:
 
             def report(*progress: Any) -> None:
                 refuse_interrupted()
@@ -152,13 +147,3 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
                 f"{shortage} What was done so far is kept in {folder}: with room, run the same command with --resume."
             ) from None
         raise
-
-
-@contextmanager
-def _bar(watch: Watch) -> Iterator[Report]:
-    """Show a progress bar, on a terminal only."""
-    if not sys.stderr.isatty():
-        yield lambda *_: None
-        return
-    with tqdm(leave=False, **watch.bar) as bar:
-        yield lambda *progress: watch.show(bar, *progress)

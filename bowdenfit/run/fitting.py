@@ -28,6 +28,7 @@ from bowdenfit.model import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
+from bowdenfit.stages import announce_stage
 
 _SLOW_IMPORTS = ("emcee", "arviz_stats.base", "arviz_stats.ecdf_utils")  # which get their time while XLA compiles
 PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
@@ -37,14 +38,22 @@ _MODULES = {"emcee": "bowdenfit.inference.ensemble", "nuts": "bowdenfit.inferenc
 
 @dataclass
 class Stopwatch:
-    """Seconds spent in each stage of a fit."""
+    """Seconds spent in each stage of a fit.
 
+    Args:
+        announces: Whether stages are announced as they begin; not those beside others.
+        seconds: By stage.
+    """
+
+    announces: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time what runs inside."""
         start = time.perf_counter()
+        if self.announces:
+            announce_stage(name)
         try:
             yield
         finally:
@@ -88,7 +97,7 @@ def fit_posterior(
     Raises:
         BowdenfitError: Coefficients cannot be told apart, or draws would not fit into memory.
     """
-    watch, beside = Stopwatch(), Stopwatch()
+    watch, beside = Stopwatch(), Stopwatch(announces=False)
     density, settings = LogDensity(build_model(data)), data.description.sampler
     with ThreadPoolExecutor(1) as classical, ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as importing:
         maximum = classical.submit(find_maximum, density, beside)
@@ -97,9 +106,9 @@ def fit_posterior(
         squares = classical.submit(lambda: estimate(density, *maximum.result(), beside))  # one thread: after the other
         for library in _SLOW_IMPORTS:
             importing.submit(import_module, library)
-        with watch.stage("compile the posterior"):
+        with watch.stage("compiling the posterior"):
             programs = compile_programs(density, seed, compiling)
-        with watch.stage("wait for the start"):
+        with watch.stage("waiting for least squares"):
             _, start = maximum.result()
         request = SamplingRequest(
             density, start, settings, seed, programs.quantities, start_checkpoint(), resume, _with_memory(report)
@@ -113,15 +122,15 @@ def fit_posterior(
 def find_maximum(density: LogDensity, watch: Stopwatch) -> tuple[Objective, MaximumPosterior]:
     """Return the compiled objective of least squares, and the maximum of the posterior."""
     with jax.enable_x64(True):  # a setting of each thread
-        with watch.stage("compile least squares"):
+        with watch.stage("compiling least squares"):
             objective = make_objective(density)
-        with watch.stage("maximum of the posterior"):
+        with watch.stage("finding the maximum of the posterior"):
             return objective, find_maximum_posterior(density, objective)
 
 
 def estimate(density: LogDensity, objective: Objective, start: MaximumPosterior, watch: Stopwatch) -> LeastSquares:
     """Return the classical estimates, which begin at the maximum of the posterior."""
-    with jax.enable_x64(True), watch.stage("least squares"):
+    with jax.enable_x64(True), watch.stage("fitting by least squares"):
         return fit_least_squares(density, objective, start.z)
 
 
@@ -185,15 +194,15 @@ def draw_posterior(programs: Programs, request: SamplingRequest, watch: Stopwatc
     """Sample the posterior by each of the samplers; return the draws, and why they should not be trusted."""
     model, chains = request.posterior.model, list[Chain]()
     for name, program in programs.samplers.items():
-        with watch.stage(f"import {LIBRARIES[name]}"):
+        with watch.stage(f"loading {LIBRARIES[name]}"):
             sampler = import_module(_MODULES[name])
-        with watch.stage(f"sample with {SAMPLER_NAMES[name]}" if chains else "sample"):
+        with watch.stage(f"sampling with {SAMPLER_NAMES[name]}" if chains else "sampling"):
             chains.append(sampler.sample(request, program))
-    with watch.stage("replicate"):
+    with watch.stage("predicting readings"):
         posterior = _posterior(model, chains[0], programs.draw_programs.quantities, request.seed)
     if len(chains) == 1:
         return posterior, chains[0].reasons
-    with watch.stage("compare samplers"):
+    with watch.stage("comparing samplers"):
         agreement = compare_samplers(*(_sampler_draws(model, chain) for chain in chains))
     of_other = [f"{SAMPLER_NAMES[chains[1].sampler]}: {reason}" for reason in chains[1].reasons]
     return replace(posterior, agreement=agreement), (*chains[0].reasons, *of_other, *agreement.reasons())

@@ -14,6 +14,7 @@ from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_mem
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN, reserve_folder
+from bowdenfit.stages import announce_stage
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def fit(
     refuse_low_memory()
     folder = Path(output) if output is not None else None
     data = run.choose_sampler(read(dataset, **reading), sampler, mcmc)
+    announce_stage("loading JAX")
     with reserve_folder(folder):
         seed = run.choose_seed(folder, data, mcmc, seed, resume, force)
         keep_compiled_programs()

@@ -21,6 +21,7 @@ from bowdenfit.questions.writing import write_page
 from bowdenfit.results.answer_cache import record_drawn_figures, record_texts, write_captions
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, remove_earlier_fit
 from bowdenfit.results.store import save
+from bowdenfit.stages import announce_stage
 from bowdenfit.words import few, listed, printable
 
 
@@ -49,6 +50,7 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
         except Exception as error:
             failed[name] = error
 
+    announce_stage("working out the answers")
     data = _figure_data(fit, failed) if figures else {}
     save(fit, fit.summary(), folder, True, collect_answers(fit), data)
     attempt(SUMMARY_TEXT, lambda: write_text(folder / SUMMARY_TEXT, printable(summary_text(fit))))
@@ -57,7 +59,9 @@ def write_results(fit: Fit, folder: Path, figures: bool) -> tuple[str, ...]:
         attempt(SUMMARY_TEXT, record_texts, folder)
     mark = warning_mark(assess_fit(fit).troubles)
     for name, shown in data.items():
+        announce_stage(f"drawing {name}")
         attempt(name, write_figure_files, name, shown, folder / FIGURES, (PNG,), fit.name, None, mark)
+    announce_stage("writing the report")
     attempt(REPORT, lambda: write_page(report_page(fit, data), folder / FIGURES, folder / REPORT))
     drawn_figures = {name: shown for name, shown in data.items() if name not in failed}
     if data:

@@ -23,6 +23,7 @@ from bowdenfit.questions.calibrate.words import calibration_page, calibration_te
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import DETAILS_TEXT, FIGURES, REPORT, SUMMARY_TEXT, folder_to_write, reserve_folder
 from bowdenfit.results.serialization import plain_data
+from bowdenfit.stages import announce_stage
 
 Report = Callable[[int, int], None]
 # Judgements: a piece of so few replications does not repay the seconds in which its programs are compiled, and so many
@@ -84,6 +85,7 @@ def replicate_missing(
     """
     job = CalibrationJob(plan, (workers or 0) if engine == "local" else 0)
     missing = [number for number in range(replications) if number not in done]
+    announce_stage("compiling, and fitting the first replications")
     with open_engine(engine, workers, folder and folder / JOBS_FOLDER) as opened:
         for piece in opened.results(run_piece, split_into_pieces(job, missing, opened.workers)):
             for replication in piece:

@@ -27,6 +27,7 @@ from bowdenfit.questions.compare.common_readings import (
 from bowdenfit.questions.recorded.friction_effects import RateEffect, compare_speeds
 from bowdenfit.questions.summary.verdict import NOT_CONVERGED, assess_fit
 from bowdenfit.results.record import Draws, Record
+from bowdenfit.stages import announce_stage
 from bowdenfit.words import listed
 
 _COMPARED_ROLES = {"friction", "friction_model", "sensor"}
@@ -251,6 +252,7 @@ def _predict_left_out(
     name: str, fit: Record, draws: Draws, common: CommonReadings, parts: Mapping[str, RunParts], report: Report | None
 ) -> LooPrediction:
     """Return the expected log density of every reading, had it been left out."""
+    announce_stage(f"leaving out readings of {name}")
     return leave_one_out(
         LooDensity(Density(fit.model), parts=parts),
         draws.z,

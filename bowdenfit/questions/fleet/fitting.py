@@ -32,6 +32,7 @@ from bowdenfit.results.answer_cache import file_checksum
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
 from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically
 from bowdenfit.results.serialization import plain_data
+from bowdenfit.stages import announce_stage
 from bowdenfit.words import counted, printable
 
 # Standard deviations to a twentieth: a tenth is then hardly ever exceeded by more than half as much.
@@ -237,6 +238,7 @@ def fit_fleet(
     with jax.enable_x64(True):
         cases, broken = _read_all(folder, inspections, reading)
         jobs = place and place / JOBS_FOLDER
+        announce_stage("compiling, and fitting the first cables")
         with open_engine(options.engine, options.workers, jobs, options.workers or 1) as opened:
             fits = store.open(options.resume, options.force) if store else {}
             _fit_pieces(opened, cases, seed, store, fits, report)

@@ -31,6 +31,7 @@ from bowdenfit.questions.pool.pooled_data import (
     select_inspections,
 )
 from bowdenfit.results.fleet_folder import FleetDraws, read_fleet_draws
+from bowdenfit.stages import announce_stage
 from bowdenfit.words import few
 
 _NEW = 25  # new cables of each draw of the population, so that which are drawn does not matter to the early ones
@@ -78,6 +79,7 @@ def pool_results(
         measurements: Folder of the fleet's measurements.
         seed: Seed of everything random; that of the fleet if None.
     """
+    announce_stage(f"reading {results.name}")
     draws = read_fleet_draws(results)
     if measurements is not None:
         read_inspections(measurements)  # refuses a wrong folder before anything is drawn
@@ -105,7 +107,9 @@ def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measur
 
 def _pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measurements: Path | None) -> Pool:
     data = select_inspections(fleet)
+    announce_stage("sampling the population")
     result = _draw_with_readings(data, seed, measurements)
+    announce_stage("summarizing the cables")
     population = result.population
     count, single = len(data.coefficients), len(data.cables) == 1
     generator = np.random.default_rng([seed, 13])

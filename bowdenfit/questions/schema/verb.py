@@ -16,11 +16,11 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 @read_first
-def schema(file: Annotated[File, Parameter("FILE")] = "cable") -> dict[str, Any]:
+def schema(file: Annotated[File, Parameter("FILE")]) -> dict[str, Any]:
     """Return the JSON schema of a file, as plain data.
 
     Args:
-        file: Of which file: cable (cable.toml), device (device.toml), fleet (fleet.toml), or summary (summary.json).
+        file: Such as cable (of cable.toml), device (device.toml), fleet (fleet.toml), or summary (summary.json).
     """
     return dict(_SCHEMAS[file]())
 
@@ -62,7 +62,7 @@ VERB = Verb(
     """Print the JSON schema of a file, for editors.
 
     With it an editor completes and checks the keys while you write. Keep it beside
-    the file, bowdenfit schema > cable.schema.json, and let the first line of
+    the file, bowdenfit schema cable > cable.schema.json, and let the first line of
     cable.toml name it: #:schema ./cable.schema.json (taplo, Even Better TOML).
     """,
     json="",

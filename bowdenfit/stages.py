@@ -1,0 +1,17 @@
+"""Stages of work that takes long, announced by Python's logging: a terminal shows the last one, `--verbose` prints them all.
+
+A notebook sees them with `logging.basicConfig(level=logging.INFO)`.
+"""
+
+import logging
+
+LOGGER = logging.getLogger("bowdenfit")
+
+
+def announce_stage(words: str) -> None:
+    """Announce what is done from now on.
+
+    Args:
+        words: Such as "drawing efficiency".
+    """
+    LOGGER.info(words)

@@ -32,7 +32,8 @@ from bowdenfit.words import shown
 WORKBOOKS = (".xlsx", ".xlsm")
 _FIRST_ROWS, _FIRST_BYTES = 200, 1 << 18  # judged: rows by which the separator is chosen, and bytes that hold as many
 _MOST_COLUMNS = 2000  # judged: tables of forces have some ten; each is compared with every spelling of a heading
-_LARGEST = 40e6  # bytes; some fifty times as many are needed to read them
+_MOST_CELLS = 150_000  # measured: each takes some 60 us; ring-downs of 50 s at 1 kHz have as many
+_LARGEST = 10e6  # bytes; some fifty times as many are needed to read them
 _SEPARATOR, _CONTINUED = "the separator", "the rest of a cell that runs over several rows"
 
 
@@ -143,6 +144,21 @@ def _refuse_large(path: Path) -> None:
         )
 
 
+def _refuse_many_cells(name: str, rows: Sequence[CsvRecord]) -> None:
+    """Refuse a table that would take minutes to read; empty cells cost nothing and do not count.
+
+    Raises:
+        DatasetError: It has too many cells.
+    """
+    cells, most = sum(sum(map(bool, row.cells)) for row in rows), int(_MOST_CELLS * LIMITS.get())
+    if cells > most:
+        raise DatasetError(
+            f"{name} has {len(rows):,} rows with {cells:,} cells, and a table has at most {most:,} cells; the usual cause is "
+            "that it holds every sample of a logger: name it as a recording, keep one row for each reading, or allow more "
+            "with --reading-limit 4."
+        )
+
+
 def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], separator: str) -> RawTable:
     """Return the table that the rows of a file make.
 
@@ -161,6 +177,7 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
             f"{name} has rows of {width:,} cells, and a table has at most {_MOST_COLUMNS:,} columns; the usual cause is a "
             "table that was exported on its side, or without line ends: keep the columns of forces, angles, strokes and runs."
         )
+    _refuse_many_cells(name, rows)
     parts = split_table(rows, name)
     header = _header(parts, name)
     if not parts.body:

@@ -183,6 +183,12 @@ def _own_angle(column: Column, cell: Cell) -> float:
     return read_angle(cell, column)
 
 
+def number_names(names: Sequence[str]) -> tuple[Labels, tuple[str, ...]]:
+    """Return the number of each name among those that differ, in the order in which they come, and these."""
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    return np.array([numbers[name] for name in names], dtype=int), tuple(numbers)
+
+
 def origin_of_rows(table: RawTable) -> RowOrigin:
     """Return file and line of the rows of one table."""
     rows = np.array([row[0].row for row in table.rows])

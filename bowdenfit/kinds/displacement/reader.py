@@ -20,6 +20,7 @@ from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, follow_m
 from bowdenfit.kinds.rows import (
     OwnAngles,
     check_spelling,
+    number_names,
     origin_of_rows,
     read_own_angles,
     read_route,
@@ -144,8 +145,7 @@ def _assign_runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[
         f"{label} ({condition})" if label and len(conditions_of_label[label]) > 1 else label or condition or "all"
         for label, condition in zip(labels, conditions, strict=True)
     ]
-    names = tuple(dict.fromkeys(keys))
-    return np.array([names.index(key) for key in keys]), names
+    return number_names(keys)
 
 
 def _check_runs(table: DisplacementTable) -> None:

@@ -10,7 +10,7 @@ from bowdenfit.description import Route, Table
 from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity
-from bowdenfit.kinds.rows import OwnAngles
+from bowdenfit.kinds.rows import OwnAngles, number_names
 from bowdenfit.types import Labels, Vector
 from bowdenfit.words import few, listed, shown
 
@@ -51,12 +51,13 @@ def find_mountings(
         own: Wrap angles measured with the row.
         limits: The route; None without.
     """
-    named, sds = np.array(labels), np.nan_to_num(own.sd)
+    named, _ = number_names(labels)
+    rows_of = np.split(np.argsort(named, kind="stable"), np.cumsum(np.bincount(named))[:-1])
+    sds = np.nan_to_num(own.sd)
     steps = [np.full(len(route), SAME_LENGTH * np.ptp(limits.range) if limits else np.inf)]
     steps += [np.maximum(SAME_BEND, _SDS * sd) for sd in sds.T]
     cluster = np.zeros((len(labels), len(steps)), dtype=int)
-    for label in dict.fromkeys(labels):
-        rows = named == label
+    for rows in rows_of:
         for k, (values, step) in enumerate(zip((route, *own.angle.T), steps, strict=True)):
             cluster[rows, k] = _cluster_values(values[rows], float(np.max(step[rows])))
     groups = group or [""] * len(labels)

@@ -36,6 +36,7 @@ from bowdenfit.kinds.rows import (
     RowOrigin,
     convert_to_forces,
     find_end_column,
+    number_names,
     origin_of_rows,
     read_own_angles,
     read_route,
@@ -248,16 +249,14 @@ def _assign_runs(
     if column is None:
         keys = _describe_conditions(route, own, limits.unit if limits else "")
         keys = [f"{name}, {key}" for name, key in zip(group, keys, strict=True)] if group else keys
-        names = tuple(dict.fromkeys(keys))
-        return np.array([names.index(key) for key in keys]), names, [
+        return *number_names(keys), [
             f"{file} has no run column: all rows at one {limits.variable if limits else 'wrap angle'}"
             f"{' and of one group' if group else ''} are taken as one run (one mounting of the cable); where each row had a "
             'mounting of its own, write run = "each row" beside the file in cable.toml.'
         ]  # fmt: skip
     labels = [cell.text.strip() or "(no run)" for cell in column.cells]
     if how != "at one length":
-        names = tuple(dict.fromkeys(labels))
-        return np.array([names.index(label) for label in labels]), names, []
+        return *number_names(labels), []
     run, distinct = find_mountings(labels, group, route, own, limits)
     remark = remark_on_reused_labels(labels, group, len(distinct), file, limits)
     return run, tuple(distinct), [remark] if remark else []

@@ -22,6 +22,7 @@ from bowdenfit.kinds.rows import (
     convert_to_radians,
     describe_range,
     format_fixed,
+    number_names,
     origin_of_rows,
     read_angle,
     read_tension,
@@ -73,7 +74,7 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
     unloading = _read_branches(columns.get("branch"), len(load))
     table.faults.refuse()
     cycle, names = _assign_cycles(columns.get("cycle"), wrap_angle)
-    peak = np.array([load[cycle == c].max() for c in cycle])
+    peak = np.array([load[cycle == c].max() for c in range(len(names))])[cycle]
     made = StretchTable(load, wrap_angle, np.asarray(stretch), unloading, peak, cycle, names, origin_of_rows(table))
     _check_rising(stretches, made)
     remarks = tuple(_branch_remarks(table, made, "branch" in columns))
@@ -117,12 +118,12 @@ def _read_branch(cell: Cell) -> bool:
 def _assign_cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:
     """Return the cycle of each row and the names of cycles: one name at one wrap angle."""
     names = [cell.text.strip() or "(no cycle)" for cell in column.cells] if column else [""] * len(wrap_angle)
-    shown = [
-        f"{name + ', ' if name else ''}{np.rad2deg(angle):.4g} deg"
-        for name, angle in zip(names, wrap_angle, strict=True)
-    ]
-    different = tuple(dict.fromkeys(shown))
-    return np.array([different.index(name) for name in shown], dtype=int), different
+    return number_names(
+        [
+            f"{name + ', ' if name else ''}{np.rad2deg(angle):.4g} deg"
+            for name, angle in zip(names, wrap_angle, strict=True)
+        ]
+    )
 
 
 def _check_rising(column: Column, made: StretchTable) -> None:

@@ -61,6 +61,13 @@ QUICK = ("sampler.n_walkers=64", "sampler.target_ess=300", "sampler.target_r_hat
 MOST_MEMORY = 3 * 2**30  # bytes of a process, beyond which it drops what it has compiled
 
 
+def pytest_addoption(parser):
+    """Let more and other cases be tried of what slow tests mangle, forge and kill at random."""
+    options = parser.getgroup("cases at random, of slow tests in tests/robustness")
+    options.addoption("--cases", type=int, help="how many each test tries; as many as it says if omitted")
+    options.addoption("--first-case", type=int, help="number of the first, which decides it and all that follow")
+
+
 def pytest_unconfigure():
     """Leave no programs behind."""
     if NEW is not None:
@@ -166,6 +173,18 @@ def on_body_squares(least_squares_of) -> bf.Fit:
 def bench() -> Path:
     """The plan of the synthetic bench."""
     return ROOT / "datasets" / "synthetic-bench" / "bench.toml"
+
+
+@pytest.fixture
+def cases(request):
+    """Return the numbers of the cases at random that a slow test tries: the usual ones, or those of the options."""
+
+    def choose(usual: range) -> range:
+        first, count = (request.config.getoption(name) for name in ("--first-case", "--cases"))
+        first = usual.start if first is None else first
+        return range(first, first + (count or len(usual)))
+
+    return choose
 
 
 @pytest.fixture

@@ -37,7 +37,7 @@ from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.results.folder import refuse_unwritable
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 from bowdenfit.verbs import VERBS
-from bowdenfit.words import listed
+from bowdenfit.words import few, listed, shown
 
 if TYPE_CHECKING:
     from bowdenfit.finished_fit import Fit
@@ -130,6 +130,7 @@ def describe_error(error: CycloptsError) -> str:
 
 def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
     """Run a verb, and print its reply for people, or as "json" or "csv"; return the exit code."""
+    _refuse_flags_of_others(os.environ.get("XLA_FLAGS", ""))
     parameters = parameters_of(verb.function).items()
     declared = {name: parameter for name, parameter in parameters if parameter.option.parse is not False}
     request = {name: parameter.plain.default for name, parameter in declared.items()} | options
@@ -149,6 +150,20 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
     for note in reply.notes:
         say(note, err=True)
     return reply.exit_code
+
+
+def _refuse_flags_of_others(flags: str) -> None:
+    """Refuse flags that XLA cannot know, over which it would end the process in words of its own.
+
+    Raises:
+        UsageError: There is one.
+    """
+    others = [word for word in flags.split() if word.startswith("-") and not word.startswith("--xla_")]
+    if others:
+        raise UsageError(
+            f"XLA_FLAGS in the environment holds {few([shown(word) for word in others])}, and flags of XLA begin with --xla_; "
+            "unset XLA_FLAGS, or correct it."
+        )
 
 
 def _load_kept_answers(source: Path) -> dict[str, Any]:

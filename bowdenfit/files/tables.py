@@ -108,6 +108,8 @@ def read_csv(path: Path, most: int | None = None) -> RawTable:
     if most is None:
         _refuse_large(path)
     name, data = path.name, first_bytes(path, -1 if most is None else _FIRST_BYTES)
+    if most is None:
+        _refuse_many_lines(name, data)
     content = recognize(path, data[:4096])
     if content not in (UNKNOWN, PLAIN_TEXT):
         raise DatasetError(f"{name} is {content.what}, not a CSV file; save the table as CSV and name that file.")
@@ -144,13 +146,27 @@ def _refuse_large(path: Path) -> None:
         )
 
 
+def _refuse_many_lines(name: str, data: bytes) -> None:
+    """Refuse a file of very many lines, before an object is made of each; most are blank, or there are too many cells too.
+
+    Raises:
+        DatasetError: There are too many.
+    """
+    lines, most = max(data.count(b"\n"), data.count(b"\r")), int(_MOST_CELLS * LIMITS.get())
+    if lines > most:
+        raise DatasetError(
+            f"{name} has {lines:,} lines, and a table has at most {most:,}, blank ones and remarks too; keep the lines of "
+            "readings, name a file that holds every sample of a logger as a recording, or allow more with --reading-limit 4."
+        )
+
+
 def _refuse_many_cells(name: str, rows: Sequence[CsvRecord]) -> None:
-    """Refuse a table that would take minutes to read; empty cells cost nothing and do not count.
+    """Refuse a table that would take minutes to read; rows without any text do not count.
 
     Raises:
         DatasetError: It has too many cells.
     """
-    cells, most = sum(sum(map(bool, row.cells)) for row in rows), int(_MOST_CELLS * LIMITS.get())
+    cells, most = sum(len(row.cells) for row in rows if not row.blank), int(_MOST_CELLS * LIMITS.get())
     if cells > most:
         raise DatasetError(
             f"{name} has {len(rows):,} rows with {cells:,} cells, and a table has at most {most:,} cells; the usual cause is "

@@ -353,6 +353,14 @@ def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting
     assert "Traceback" not in done.stderr
 
 
+def test_flags_that_would_end_the_process_in_words_of_xla_are_refused(run, refuse, monkeypatch, bench):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false --nonsense")
+    assert "XLA_FLAGS in the environment holds '--nonsense', and flags of XLA begin with --xla_;" in refuse("identify", bench)
+    assert run("identify", "--help")[0] == 0
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false")
+    assert run("identify", bench)[0] in (0, 3)
+
+
 def test_a_watched_loop_that_is_interrupted_says_how_to_go_on(tmp_path, monkeypatch):
     (tmp_path / "chain.checkpoint").touch()
     requested = threading.Event()

@@ -323,12 +323,15 @@ def test_of_a_wide_table_few_columns_are_listed_and_a_very_wide_one_is_refused(r
     assert code == 2 and "a.csv has rows of 10,000 cells, and a table has at most 2,000 columns" in err
 
 
-def test_a_table_that_would_take_minutes_to_read_is_refused_and_empty_cells_do_not_count(tmp_path, monkeypatch):
+def test_a_table_that_would_take_minutes_to_read_is_refused_and_blank_rows_do_not_count(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "_MOST_CELLS", 40)
-    rows = [f"{10 + i},{7 + 0.7 * i:.2f},,,," for i in range(18)]
-    (tmp_path / "a.csv").write_text("\n".join(["input_force_N,output_force_N", *rows]) + "\n")
+    rows = [f"{10 + i},{7 + 0.7 * i:.2f}" for i in range(18)]
+    (tmp_path / "a.csv").write_text("\n".join(["input_force_N,output_force_N", *rows]) + "\n,," * 21 + "\n")
     assert bf.read(tmp_path / "a.csv", wrap_angle=(180, "deg")).measurements
     (tmp_path / "a.csv").write_text("\n".join(["input_force_N,output_force_N", *rows, *rows]) + "\n")
     with pytest.raises(bf.DatasetError, match=r"a\.csv has 37 rows with 74 cells, and a table has at most 40 cells; .* logger"):
         bf.read(tmp_path / "a.csv", wrap_angle=(180, "deg"))
     assert bf.read(tmp_path / "a.csv", wrap_angle=(180, "deg"), reading_limit=4).measurements
+    (tmp_path / "a.csv").write_text("\n".join(["input_force_N,output_force_N", *rows]) + "\n" * 90)
+    with pytest.raises(bf.DatasetError, match=r"a\.csv has 108 lines, and a table has at most 40, blank ones and remarks too"):
+        bf.read(tmp_path / "a.csv", wrap_angle=(180, "deg"))

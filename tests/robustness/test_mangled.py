@@ -1,13 +1,22 @@
 """Valid tables, descriptions, options and files mangled at random: each is read, or refused in sentences; never anything else.
 
-By default some 1,000 cases; with the marker `slow` 50,000 others.
+Usually some 1,000 cases; with the marker `slow` 100,000 others. `./scripts/test -m slow tests/robustness --cases 500
+--first-case 90000` tries 500 new ones of each kind.
 """
 
 import resource
 
 import pytest
 from attempts import Attempts
-from fuzzing import DATASETS, read_mangled_data_set, read_mangled_file, run_mangled_options, valid_files
+from fuzzing import (
+    DATASETS,
+    check_strange_data_set,
+    read_mangled_data_set,
+    read_mangled_file,
+    run_mangled_options,
+    try_cases,
+    valid_files,
+)
 from fuzzing_folders import FOLDERS, read_mangled_folder
 from recorded_files import WRITERS
 
@@ -56,6 +65,12 @@ def test_mangled_data_sets_are_read_or_refused_in_sentences(tmp_path, name):
     assert 0.2 * count < refused < count
 
 
+@pytest.mark.parametrize("name", [path.name for path in DATASETS])
+def test_strange_data_sets_are_checked_or_refused_in_sentences(tmp_path, name):
+    count = 2 if name == "synthetic-recordings" else 10
+    try_cases(range(count), lambda number: check_strange_data_set(tmp_path, name, number))
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_mangled_files_of_every_kind_are_read_or_refused_in_sentences(tmp_path, valid, name):
     outcomes = [read_mangled_file(tmp_path, valid, name, number) for number in range(25)]
@@ -77,27 +92,30 @@ def test_mangled_options_are_taken_or_refused_in_sentences(tmp_path, attempts):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [path.name for path in DATASETS])
-def test_many_more_mangled_data_sets(tmp_path, name):
-    numbers = range(OF_TABLES.get(name, 50), 2000 if name == "synthetic-recordings" else 7000)
-    refused = sum(read_mangled_data_set(tmp_path, name, number).refused for number in numbers)
-    assert 0.2 * len(numbers) < refused < len(numbers)
+def test_many_more_mangled_data_sets(tmp_path, cases, name):
+    numbers = cases(range(OF_TABLES.get(name, 50), 2000 if name == "synthetic-recordings" else 7000))
+    try_cases(numbers, lambda number: read_mangled_data_set(tmp_path, name, number))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [path.name for path in DATASETS])
+def test_many_more_strange_data_sets(tmp_path, cases, name):
+    numbers = cases(range(10, 200 if name == "synthetic-recordings" else 5000))
+    try_cases(numbers, lambda number: check_strange_data_set(tmp_path, name, number))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
-def test_many_more_mangled_files(tmp_path, valid, name):
-    for number in range(1000, 2000):
-        read_mangled_file(tmp_path, valid, name, number)
+def test_many_more_mangled_files(tmp_path, valid, cases, name):
+    try_cases(cases(range(1000, 2000)), lambda number: read_mangled_file(tmp_path, valid, name, number))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLDERS)
-def test_many_more_mangled_devices_studies_and_fleets(tmp_path, name):
-    for number in range(1000, 3000):
-        read_mangled_folder(tmp_path, name, number)
+def test_many_more_mangled_devices_studies_and_fleets(tmp_path, cases, name):
+    try_cases(cases(range(1000, 3000)), lambda number: read_mangled_folder(tmp_path, name, number))
 
 
 @pytest.mark.slow
-def test_many_more_mangled_options(tmp_path, attempts):
-    for number in range(120, 4000):
-        run_mangled_options(options_of(attempts, tmp_path), number)
+def test_many_more_mangled_options(tmp_path, attempts, cases):
+    try_cases(cases(range(120, 4000)), lambda number: run_mangled_options(options_of(attempts, tmp_path), number))

@@ -1,36 +1,29 @@
 """Results folders that somebody forged: a numbered case changes something, and mostly writes all checksums anew.
 
-    python tests/support/forging.py FOLDER --seed 1 --seconds 600
-
-tries every verb that reads a finished fit, each case in a copy of FOLDER, and prints how these end.
+Every verb that reads a finished fit meets them, each case in a copy of a folder.
 """
 
-import argparse
 import contextlib
-import faulthandler
 import io
 import json
-import os
 import random
 import resource
 import shutil
-import signal
 import sys
-import tempfile
 import time
-from collections import Counter
 from pathlib import Path
 from zlib import crc32
 
 import h5py
 import numpy as np
+from fuzzing import SLOWEST, Outcome, Wrong, ended_in_time
 from fuzzing_results import ODD_ARRAYS, other_json
 from sealed import sealed
 
 from bowdenfit import cli
 from bowdenfit.results.answer_cache import file_checksum
 
-SLOWEST, LARGEST = 20, 2 << 20  # seconds, and kB
+LARGEST = 2 << 20  # kB that this process may hold
 ODD_DRAWS = (*ODD_ARRAYS, np.zeros((4, 5), dtype=np.float16), np.full((4, 5), np.inf))
 WAYS = ("fit", "fit", "fit", "answers", "answers", "draws", "draws", "figures", "text", "bytes", "gone", "deep")
 TEXTS = ("summary.txt", "details.txt", "summary.json")
@@ -141,47 +134,31 @@ def ask(folder: Path, verb: tuple[str, ...]) -> tuple[int, str]:
     return 0, err.getvalue()
 
 
-def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("whole", type=Path)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=600)
-    request = parser.parse_args()
-    ends, wrong, number, start = Counter[str](), 0, request.first, time.process_time()
-    whole = request.whole.resolve()
-    with tempfile.TemporaryDirectory() as place_name:
-        place = Path(place_name)
-        (place / "work").mkdir()
-        os.chdir(place / "work")
-        while time.process_time() - start < request.seconds:
-            chance = random.Random(f"{request.seed} {number}")
-            folder = place / "fit"
-            shutil.copytree(whole, folder)
-            what, verb = forge(chance, folder), chance.choice(VERBS)
-            before, began = contents(place, folder), time.process_time()
-            signal.setitimer(signal.ITIMER_PROF, 3 * SLOWEST)
-            faulthandler.register(signal.SIGPROF)
+def ask_forged_folder(place: Path, whole: Path, number: int) -> Outcome:
+    """Ask something of a folder that is forged; nothing but an answer or a refusal may come of it, nor may files be left.
+
+    Args:
+        place: The current folder, which is empty.
+        whole: The folder of a fit.
+        number: Of the case.
+
+    Raises:
+        Wrong: Something else did.
+    """
+    chance = random.Random(f"forged {number}")
+    folder = shutil.copytree(whole, place / "fit")
+    try:
+        what, verb = forge(chance, folder), chance.choice(VERBS)
+        before, start = contents(place, folder), time.process_time()
+        with ended_in_time():
             code, printed = ask(folder, verb)
-            signal.setitimer(signal.ITIMER_PROF, 0)
-            took, memory = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-            (place / "work" / "x.csv").unlink(missing_ok=True)
-            left = [str(p) for p in folder.rglob("*") if p.name.endswith(".partial") or p.name == ".lock"]
-            faults = [code not in (0, 2, 3), took > SLOWEST, memory > LARGEST, bool(left), contents(place, folder) != before]
-            ends[f"{verb[0]}: exit {code}"] += 1
-            ends["all"] += 1
-            if any(faults):
-                wrong += 1
-                case = f"WRONG {number} {what}, {' '.join(verb)}: exit {code}, {took:.0f} s, {memory >> 10} MB, {left}"
-                print(case, printed[-1500:], flush=True)
-            shutil.rmtree(folder)
-            number += 1
-    for end, count in sorted(ends.items()):
-        print(end, count)
-    print(f"{wrong} of {ends['all']} went wrong, up to number {number}")
-    sys.exit(wrong > 0)
-
-
-if __name__ == "__main__":
-    main()
+        seconds, memory = time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        (place / "x.csv").unlink(missing_ok=True)
+        left = [path.name for path in folder.rglob("*") if path.name.endswith(".partial") or path.name == ".lock"]
+        wrong = code not in (0, 2, 3) or seconds > SLOWEST or memory > LARGEST or left or contents(place, folder) != before
+    finally:
+        shutil.rmtree(folder)
+    if wrong:
+        case = f"forged {number}, {what}, {' '.join(verb)}: exit code {code}, {seconds:.0f} s, {memory >> 10} MB, left {left}"
+        raise Wrong(f"{case}, {printed[-1500:]}")
+    return Outcome(code == 2, printed)

@@ -6,15 +6,17 @@ A case is its name and its number, so that any can be had again: `read_mangled_f
 import io
 import random
 import shutil
+import signal
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 from byte_mangling import mangled
 from mangling import DESCRIPTIONS, ODD_CELLS, ODD_VALUES, TABLES
+from mangling_more import BYTES, MORE_DESCRIPTIONS, MORE_TABLES, replace_file
 from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf
@@ -44,6 +46,43 @@ class Outcome:
     said: str = ""
 
 
+@contextmanager
+def ended_in_time() -> Iterator[None]:
+    """End what takes far too long, as far as Python is asked meanwhile."""
+
+    def end(*_: object) -> None:
+        raise Wrong(f"takes more than {2 * SLOWEST:g} s")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, 2 * SLOWEST)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def try_cases(numbers: Sequence[int], case: Callable[[int], Outcome]) -> int:
+    """Return how many of the cases are refused.
+
+    Args:
+        numbers: Of the cases.
+        case: Tries one.
+
+    Raises:
+        Wrong: What went wrong in any of them, when all are tried.
+    """
+    refused, wrong = 0, []
+    for number in numbers:
+        try:
+            refused += case(number).refused
+        except Wrong as error:
+            wrong.append(str(error)[:1000])
+    if wrong:
+        raise Wrong("\n".join([f"{len(wrong)} of {len(numbers)} went wrong:", *wrong[:30]]))
+    return refused
+
+
 def meet(case: str, meets: Callable[[], object], *names: str) -> Outcome:
     """What comes of a case: the input is read, or refused in sentences that name it, in time and without other words.
 
@@ -57,7 +96,7 @@ def meet(case: str, meets: Callable[[], object], *names: str) -> Outcome:
     """
     out, err, start = io.StringIO(), io.StringIO(), time.process_time()
     try:
-        with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
+        with ended_in_time(), redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # as the command line does
             meets()
         outcome = Outcome(False)
@@ -98,10 +137,45 @@ def read_mangled_data_set(place: Path, name: str, number: int) -> Outcome:
         text = chance.choice(DESCRIPTIONS if file.endswith(".toml") else TABLES)(chance, text) or "\n"
     (folder / file).write_text(text, encoding="utf-8", errors="surrogatepass")
     before = set(place.rglob("*"))
-    outcome = meet(f"{name} {number}, {file}", lambda: bf.read(folder))
-    if set(place.rglob("*")) != before:
-        raise Wrong(f"{name} {number}: files were written")
-    shutil.rmtree(folder)
+    try:
+        outcome = meet(f"{name} {number}, {file}", lambda: bf.read(folder))
+        if set(place.rglob("*")) != before:
+            raise Wrong(f"{name} {number}: files were written")
+    finally:
+        shutil.rmtree(folder)
+    return outcome
+
+
+def check_strange_data_set(place: Path, name: str, number: int) -> Outcome:
+    """A case of a data set that is odd in more ways, or of which a file is something else, checked as `check` does.
+
+    Args:
+        place: Folder to work in.
+        name: Of the data set.
+        number: Of the case.
+    """
+    source, chance = ROOT / name, random.Random(f"strange {name} {number}")
+    folder = shutil.copytree(source, place / "cable", ignore=shutil.ignore_patterns("*.md", "recordings"))
+    for path in source.glob("recordings/*"):
+        (folder / "recordings").mkdir(exist_ok=True)
+        (folder / "recordings" / path.name).symlink_to(path)
+    path = chance.choice(sorted(path for path in folder.iterdir() if path.suffix in {".csv", ".toml"}))
+    ways = (*DESCRIPTIONS[:3], *MORE_DESCRIPTIONS) if path.suffix == ".toml" else (*TABLES[:3], *MORE_TABLES)
+    changes = [chance.choice(ways) for _ in range(chance.choice((1, 1, 2)))]
+    text = path.read_text()
+    for change in changes:
+        text = change(chance, text) or "\n"
+    path.write_bytes(text.encode(errors=BYTES))
+    case = f"strange {name} {number}, {path.name}: {', '.join(change.__name__ for change in changes)}"
+    if chance.random() < 0.05:
+        case += f", {replace_file(chance, path)}"
+    before = set(place.rglob("*"))
+    try:
+        outcome = meet(case, lambda: str(bf.check(folder)))
+        if set(place.rglob("*")) != before:
+            raise Wrong(f"{case}: files were written")
+    finally:
+        shutil.rmtree(folder)
     return outcome
 
 

@@ -140,8 +140,10 @@ def read_mangled_folder(place: Path, name: str, number: int) -> Outcome:
         text = chance.choice(ways)(chance, text) or "\n"
     file.write_text(text, encoding="utf-8", errors="surrogatepass")
     before = set(place.rglob("*"))
-    outcome = meet(f"{name} {number}, {file.name}", lambda: meets(folder))
-    if set(place.rglob("*")) != before:
-        raise Wrong(f"{name} {number}: files were written")
-    shutil.rmtree(folder)
+    try:
+        outcome = meet(f"{name} {number}, {file.name}", lambda: meets(folder))
+        if set(place.rglob("*")) != before:
+            raise Wrong(f"{name} {number}: files were written")
+    finally:
+        shutil.rmtree(folder)
     return outcome

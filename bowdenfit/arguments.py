@@ -94,7 +94,7 @@ def _read_declaration(parameter: Stated) -> Declared:
     type_, *marks = get_args(parameter.annotation) if is_annotated else (parameter.annotation,)
     type_ = type_.__forward_arg__ if isinstance(type_, ForwardRef) else type_
     reader = next((mark for mark in marks if isinstance(mark, Reader)), None)
-    default = () if reader is TEXTS else parameter.default
+    default = () if reader in (TEXTS, CODES) else parameter.default
     option = Parameter.combine(*(mark for mark in marks if isinstance(mark, Parameter)))
     return Declared(parameter.replace(annotation=type_, default=default), reader, option)
 
@@ -262,6 +262,14 @@ def _read_texts(value: Any, name: str) -> Sequence[str]:
     return texts
 
 
+def _read_codes(value: Any, name: str) -> Sequence[str]:
+    """Return codes as texts; numbers are codes too."""
+    codes = [value] if isinstance(value, str) or not isinstance(value, Iterable) else list(value)
+    if isinstance(value, Mapping) or not all(isinstance(code, str | Number) and not isinstance(code, bool) for code in codes):
+        raise UsageError(f"{name} = {shown(value)} must be a list of codes, such as [-9999].")
+    return tuple(map(str, codes))
+
+
 def _read_path(value: Any, name: str) -> Any:
     """Return a path, or what was read from one, which is nothing that Python itself has."""
     if isinstance(value, Number | bytes | list | tuple | dict | NoneType):
@@ -288,7 +296,7 @@ def as_pair(quantity: Quantity | None) -> NumberWithUnit | None:
     return quantity
 
 
-LENGTHS, TEXTS = Reader(_read_lengths, list[str]), Reader(_read_texts, list[str])
+LENGTHS, TEXTS, CODES = (Reader(read, list[str]) for read in (_read_lengths, _read_texts, _read_codes))
 PATH = Reader(_read_path, Path)  # a path, or what was read from it
 FIT, FITS = Reader(_read_fit, Path), Reader(_read_fits, list[Path])  # of which the command line names the results folders
 HIDDEN = Parameter(parse=False)  # for programs alone

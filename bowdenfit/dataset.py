@@ -18,7 +18,13 @@ from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds import KINDS, iterate_tables
-from bowdenfit.kinds.descriptions import add_columns, load_description, order_groups, parse_description
+from bowdenfit.kinds.descriptions import (
+    add_columns,
+    add_missing_codes,
+    load_description,
+    order_groups,
+    parse_description,
+)
 from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
@@ -60,6 +66,7 @@ def load_folder_or_file(
     overrides: Sequence[str],
     channels: Sequence[str],
     columns: Sequence[str],
+    missing: Sequence[str],
     wrap_angle: tuple[float, str] | None,
     reading_limit: float,
 ) -> Dataset:
@@ -70,6 +77,7 @@ def load_folder_or_file(
         overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
         channels: Channels of recordings as the command line names them, such as `input_force=ai0:lbf`.
         columns: Columns of tables, likewise.
+        missing: Missing-value codes, such as "-9999".
         wrap_angle: The angle of a lone file and its unit; None where its rows have their own.
         reading_limit: So many times the usual memory and time may be taken to read a binary file.
 
@@ -80,8 +88,8 @@ def load_folder_or_file(
     channel_sources, column_sources = parse_channels(channels), parse_sources(columns, "--column")
     with limits_times(reading_limit):
         if wrap_angle is not None or is_lone_file(path):
-            return single_file_dataset(path, wrap_angle, overrides, channel_sources, column_sources)
-        return load_dataset(path, overrides, channel_sources, column_sources)
+            return single_file_dataset(path, wrap_angle, overrides, channel_sources, column_sources, missing=missing)
+        return load_dataset(path, overrides, channel_sources, column_sources, missing)
 
 
 def load_dataset(
@@ -89,6 +97,7 @@ def load_dataset(
     overrides: Sequence[str] = (),
     channels: Mapping[str, ColumnSource] | None = None,
     columns: Mapping[str, ColumnSource] | None = None,
+    missing: Sequence[str] = (),
 ) -> Dataset:
     """Read a folder with `cable.toml` and tables, or the `cable.toml` itself.
 
@@ -97,6 +106,7 @@ def load_dataset(
         overrides: Settings that replace those of the description, such as `friction.mu1.fixed=0.1`.
         channels: Channels of recordings named on the command line.
         columns: Columns of tables named there.
+        missing: Missing-value codes stated there.
 
     Raises:
         DescriptionError: The description is missing or wrong.
@@ -106,7 +116,7 @@ def load_dataset(
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
     is_file = path.suffix.lower() == ".toml" and not path.is_dir()
     file, faults = path if is_file else path / DESCRIPTION_FILE, Faults()
-    description = load_description(file, overrides, columns, faults)
+    description = load_description(file, overrides, columns, faults, missing)
     return read_dataset(description, file.parent, {file.name: _sha256(file)}, channels, faults)
 
 
@@ -124,6 +134,7 @@ def single_file_dataset(
     channels: Mapping[str, ColumnSource] | None = None,
     columns: Mapping[str, ColumnSource] | None = None,
     kind: str = "",
+    missing: Sequence[str] = (),
 ) -> Dataset:
     """Read a data set that is one table or recording of a cable with one contact.
 
@@ -134,6 +145,7 @@ def single_file_dataset(
         channels: Channels of a recording named on the command line.
         columns: Columns of a table named there.
         kind: Name of the kind of measurement; by the file if omitted.
+        missing: Missing-value codes stated there.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
@@ -154,7 +166,7 @@ def single_file_dataset(
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": glob.escape(path.name)}},
     }
-    described = add_columns(override(raw, overrides), columns or {})
+    described = add_missing_codes(add_columns(override(raw, overrides), columns or {}), missing)
     return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)
 
 

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, PATH, TEXTS, Quantity, as_pair, number_with_unit, read_first, whole_number
+from bowdenfit.arguments import (
+    CODES,
+    DATASET,
+    PATH,
+    TEXTS,
+    Quantity,
+    as_pair,
+    number_with_unit,
+    read_first,
+    whole_number,
+)
 from bowdenfit.errors import UsageError
 from bowdenfit.frames import is_frame, write_frame
 from bowdenfit.stages import announce_stage
@@ -29,6 +39,8 @@ class Reading(TypedDict, total=False):
         columns: Which column of a table is input_force, output_force, stroke or another quantity, such as
             input_force='Force input (N)'; a unit that the heading lacks follows a colon, as in input_force=F1:N; may be
             repeated.
+        missing: What stands in a cell whose reading is missing, such as -9999 (rows without their forces are
+            left out); may be repeated.
         noise: How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull
             the fit.
         friction: How friction depends on load, stroke and speed: capstan, or drag (a hidden tension D, which costs
@@ -44,6 +56,7 @@ class Reading(TypedDict, total=False):
     settings: Annotated[Sequence[str], Parameter("--set", metavar="KEY=VALUE"), TEXTS]
     channels: Annotated[Sequence[str], Parameter("--channel", metavar="QUANTITY=CHANNEL:UNIT"), TEXTS]
     columns: Annotated[Sequence[str], Parameter("--column", metavar="QUANTITY=COLUMN:UNIT"), TEXTS]
+    missing: Annotated[Sequence[str], Parameter(metavar="CODE"), CODES]
     noise: Annotated[Literal["normal", "student"] | None, Parameter(show_default="as in cable.toml, else normal")]
     friction: Annotated[str | None, Parameter(metavar="MODEL", show_default="as in cable.toml, else capstan")]
     geometry: Annotated[
@@ -96,6 +109,7 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
         changed_settings(reading),
         reading.get("channels", ()),
         reading.get("columns", ()),
+        reading.get("missing", ()),
         as_pair(reading.get("wrap_angle")),
         reading.get("reading_limit") or 1,
     )

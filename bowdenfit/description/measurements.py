@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from bowdenfit.description.values import Finite, Frozen, Name, QuantityValue
+from bowdenfit.description.values import Code, Finite, Frozen, Name, QuantityValue
 from bowdenfit.units import ChannelSource, ColumnSource, conversion_factor
 
 MOST_FILES = 1000  # judged: of a table, or recordings of a cable; each takes some 20 ms or more to read
@@ -12,6 +12,8 @@ MOST_FILES = 1000  # judged: of a table, or recordings of a cable; each takes so
 
 class TableSettings(Frozen):
     """What all that stands under [tables] has in common."""
+
+    missing: tuple[Code, ...] = ()
 
     @property
     def fits_offsets(self) -> bool:

@@ -30,6 +30,8 @@ Choice = Annotated[str, Field(max_length=200)]
 """A word of ours, or several with signs between them, such as those of a model of friction."""
 Text = Annotated[str, Field(max_length=10_000)]
 """Free text, which every report repeats; a page has some 3,000 characters."""
+Code = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, strict=True)] | Text
+"""What stands in a cell whose reading is missing."""
 
 
 class Frozen(BaseModel):

@@ -86,6 +86,7 @@ class Cell:
         decimals: How its column writes decimals.
         measured: The number without its unit and error where these stand in the cell too; else None.
         unit: The unit that stands in the cell; empty without one.
+        is_code: Whether it holds what the user states as the code of a missing reading.
     """
 
     file: str
@@ -95,6 +96,7 @@ class Cell:
     decimals: Decimals = Decimals()
     measured: str | None = None
     unit: str = ""
+    is_code: bool = False
 
     def refuse(self, what: str) -> DatasetError:
         """Return an error that names this cell."""
@@ -109,8 +111,8 @@ class Cell:
 
     @property
     def blank(self) -> bool:
-        """Whether nothing was written here (or one of the usual marks for nothing)."""
-        return self.text.strip().lower() in BLANK
+        """Whether nothing was written here (or one of the usual marks for nothing, or a stated code)."""
+        return self.is_code or self.text.strip().lower() in BLANK
 
     def number(self) -> float:
         """Return the number in this cell.
@@ -119,7 +121,8 @@ class Cell:
             DatasetError: The cell is blank, is text, or is not finite.
         """
         if self.blank:
-            raise self.refuse("the cell is blank; fill in the value or delete the row.")
+            what = f"{self.shown} is stated as a missing-value code" if self.is_code else "the cell is blank"
+            raise self.refuse(f"{what}; fill in the value or delete the row.")
         return self._parse(self._number)
 
     @property
@@ -133,7 +136,11 @@ class Cell:
             DatasetError: It holds such a number.
         """
         if _MISSING_CODE.fullmatch(_normalize(self._number)):
-            raise self.refuse(f"{self.shown} is a code that programs write where a reading is missing; {remedy}.")
+            code = self._number.strip()
+            raise self.refuse(
+                f"{self.shown} is a code that programs write where a reading is missing; {remedy}, or state the code: "
+                f"--missing {code} (in cable.toml missing = [{code.replace(',', '.')}] beside the file)."
+            )
 
     def percentage(self) -> float | None:
         """Return the number where the cell itself carries a percent sign ("78.5 %"), else None."""

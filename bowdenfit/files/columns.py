@@ -236,9 +236,9 @@ def read_unused_columns(table: RawTable, columns: Mapping[str, Column]) -> dict[
     for heading, unit, cells in zip(table.header, table.units, zip(*table.rows, strict=True), strict=False):
         if heading and heading not in used:
             values: list[str] | list[float] = [" ".join(cell.text.split()) for cell in cells]
-            if all(is_plain_number(cell.text) for cell in cells):
+            if all(cell.is_code or is_plain_number(cell.text) for cell in cells):
                 with suppress(DatasetError):  # numbers that can be read in two ways stay texts
-                    values = [cell.number() for cell in cells]
+                    values = [nan if cell.is_code else cell.number() for cell in cells]
             unused[f"{heading} ({unit})" if unit else heading] = np.array(values)
     return unused
 

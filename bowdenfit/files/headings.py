@@ -45,11 +45,13 @@ class Quantity:
         dimension: Kind of quantity (`units.INTERNAL_UNITS`), "route" for the route variable, "speed" for the velocity of
             the rope or of the motor, "text" for labels.
         to: Unit to convert to; the internal one if omitted.
+        optional: Whether cells of the column may be blank.
     """
 
     name: str
     dimension: str
     to: str | None = None
+    optional: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Where the rows of a file went: every one is read, holds headings, or is left out for a reason."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bowdenfit.words import few, shown
 
@@ -50,6 +50,7 @@ class RowAccount:
         headings: The rows that hold headings and their units.
         left_out: All others.
         beside: Row and text of remarks in rows that are read, beside the table.
+        note: What else is said of its cells, as a clause; empty without.
     """
 
     file: str
@@ -58,6 +59,7 @@ class RowAccount:
     headings: tuple[int, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     beside: tuple[tuple[int, str], ...] = ()
+    note: str = ""
 
     @property
     def accounted(self) -> int:
@@ -68,13 +70,23 @@ class RowAccount:
     def remarks(self) -> list[str]:
         """What is said of rows whose loss may matter, in sentences."""
         sentences = [f"{self.file}, {group.words}; not used." for group in self.left_out if group.why not in _USUAL]
-        return sentences + [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
+        sentences += [f"{self.file}, {self.beside_in_words}; not used."] * bool(self.beside)
+        return sentences + [f"{self.file}: {self.note}."] * bool(self.note)
 
     @property
     def beside_in_words(self) -> str:
         """What stands beside the table."""
         texts = few([f"{shown(text)} in row {row}" for row, text in self.beside], _TEXTS)
         return f"beside the table: {texts}"
+
+    def without_rows(self, reasons: Mapping[int, str]) -> "RowAccount":
+        """Return the account where some of the rows that are read are left out after all.
+
+        Args:
+            reasons: Why each of them is, by its number.
+        """
+        left_out = _group_by_reason({row: (why, "") for row, why in reasons.items()})
+        return replace(self, read=self.read - len(reasons), left_out=(*self.left_out, *left_out))
 
 
 def make_account(
@@ -89,6 +101,12 @@ def make_account(
         reasons: Why a row is not read, and what it says; by its number.
         beside: Row and text of remarks beside the table.
     """
+    over = tuple(headings)
+    return RowAccount(file, rows, rows - len(over) - len(reasons), over, _group_by_reason(reasons), tuple(beside))
+
+
+def _group_by_reason(reasons: Mapping[int, tuple[str, str]]) -> tuple[LeftOut, ...]:
+    """Return the rows that are not read by reason, from why each is not and what it says."""
     ranges: dict[str, list[tuple[int, int]]] = {}
     texts: dict[str, list[str]] = {}
     for row in sorted(reasons):
@@ -100,6 +118,4 @@ def make_account(
             of_reason.append((row, row))
         if text and len(of_texts) < _TEXTS:
             of_texts.append(text)
-    left_out = tuple(LeftOut(why, tuple(ranges[why]), tuple(texts[why])) for why in ranges)
-    over = tuple(headings)
-    return RowAccount(file, rows, rows - len(over) - len(reasons), over, left_out, tuple(beside))
+    return tuple(LeftOut(why, tuple(ranges[why]), tuple(texts[why])) for why in ranges)

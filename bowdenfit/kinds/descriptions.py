@@ -30,6 +30,7 @@ def load_description(
     overrides: Sequence[str] = (),
     columns: Mapping[str, ColumnSource] | None = None,
     faults: Faults | None = None,
+    missing: Sequence[str] = (),
 ) -> Description:
     """Read `cable.toml`.
 
@@ -38,12 +39,13 @@ def load_description(
         overrides: Settings from the command line, such as `friction.mu1.fixed=0.1`.
         columns: Columns of tables named on the command line.
         faults: Takes what is wrong with keys that no table asks for, so that the tables can be looked at too.
+        missing: Missing-value codes of all tables and recordings, from the command line.
 
     Raises:
         DescriptionError: The file is missing or no TOML, keys are unknown, or values are impossible or left from the template.
     """
     text, stated = read_toml(path, overrides)
-    raw, wrong = add_columns(stated, columns or {}), Faults()
+    raw, wrong = add_missing_codes(add_columns(stated, columns or {}), missing), Faults()
     placeholders = find_placeholders(raw, text, path.name)
     wrong.faults += placeholders.values()
     try:
@@ -125,6 +127,17 @@ def add_columns(raw: dict[str, Any], columns: Mapping[str, ColumnSource]) -> dic
         settings = raw["tables"][table or tables[0]]
         settings["columns"] = {**settings.get("columns", {}), quantity: source.model_dump(exclude_none=True)}
     return raw
+
+
+def add_missing_codes(raw: dict[str, Any], codes: Sequence[str]) -> dict[str, Any]:
+    """Add the missing-value codes that the user states to all tables and recordings of a description's plain data."""
+    if not codes:
+        return raw
+    tables = _add_recordings(raw).get("tables")
+    for name, settings in tables.items() if isinstance(tables, dict) else ():
+        if name in KINDS and isinstance(settings, dict) and isinstance(settings.setdefault("missing", []), list):
+            settings["missing"] = [*settings["missing"], *codes]
+    return {**raw, "tables": tables} if tables else raw
 
 
 def _has_columns(name: str, settings: Any) -> bool:

@@ -144,10 +144,15 @@ def read_angle(cell: Cell, column: Column) -> float:
     return angle
 
 
-def shared_columns(route: Route | None, contacts: Sequence[str]) -> tuple[Quantity, ...]:
-    """Return the columns that efficiency and force tables share: the route variable, own wrap angles and their sd."""
-    angles = [Quantity(name + suffix, "angle") for name in contacts for suffix in ("", "_sd")]
-    return (*([route_column(route)] if route else []), *angles)
+def shared_columns(description: Description) -> tuple[Quantity, ...]:
+    """Return the columns that efficiency and force tables share: the route variable, own wrap angles and their sd.
+
+    An angle may be blank where its contact has a curve.
+    """
+    curved, route = {contact.wrap_angle.column for contact in description.curved}, description.route
+    angles = [Quantity(name, "angle", optional=name in curved) for name in description.angle_columns]
+    sds = [Quantity(f"{name}_sd", "angle", optional=True) for name in description.angle_columns]
+    return (*([route_column(route)] if route else []), *angles, *sds)
 
 
 def read_route(table: RawTable, columns: Mapping[str, Column], route: Route | None) -> Vector:

@@ -9,8 +9,10 @@ from typing import Any, Generic, TypeVar
 
 from bowdenfit.description import MOST_FILES, Description
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.files.headings import Quantity
+from bowdenfit.files.columns import Column, Quantity, find_columns
+from bowdenfit.files.missing_codes import MissingCodes, leave_out_coded_rows
 from bowdenfit.files.row_account import RowAccount
+from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.inputs import match_files
 from bowdenfit.units import ColumnSource
 
@@ -77,6 +79,24 @@ class Source:
     def columns(self) -> dict[str, ColumnSource]:
         """Columns that do not have the usual names."""
         return self.settings.columns
+
+    def read_table(
+        self, path: Path, wanted: tuple[Quantity, ...], unused: tuple[str, ...] = ()
+    ) -> tuple[RawTable, dict[str, Column]]:
+        """Return one of the tables and the wanted quantities that it has, without rows that a stated code marks as missing.
+
+        Args:
+            path: The file.
+            wanted: What to look for.
+            unused: Names that the user may give a column although nothing reads it.
+
+        Raises:
+            DatasetError: See `read_table`; or every row holds a code.
+        """
+        codes = MissingCodes(self.settings.missing)
+        table = codes.mark(read_table(path))
+        columns = find_columns(table, wanted, self.columns, unused)
+        return leave_out_coded_rows(table, columns, wanted, codes)
 
     def name_of(self, path: Path) -> str:
         """Return a file's path as seen from the folder."""

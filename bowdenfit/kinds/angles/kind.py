@@ -11,8 +11,7 @@ from bowdenfit.cable.registry import CURVES
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.file import Stated
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings
 from bowdenfit.kinds.plausibility import compare_without_runs, describe_copies
@@ -62,9 +61,8 @@ class AngleKind(PlannedKind[AngleTable]):
         assert route is not None  # a description has angles only with a route
         contacts = [c.wrap_angle.column for c in source.description.curved if c.wrap_angle.column]
         detection_limit = stated.to("angle") if stated else None
-        table = read_table(path)
         wanted = (route_column(route), *(Quantity(c, "angle") for c in contacts))
-        columns = find_columns(table, wanted, source.columns)
+        table, columns = source.read_table(path, wanted)
         lengths = require_column(table, columns, route.variable, f"{route.variable}_{route.unit}")
         angle_columns = [require_column(table, columns, name, f"{name}_deg") for name in contacts]
         cells = [c.read_cells(partial(_angle_or_limit, c, detection_limit), (np.nan, np.nan)) for c in angle_columns]

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.errors import DatasetError, combine_errors
-from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.tables import RawTable, read_csv
+from bowdenfit.files.columns import Column, Quantity, require_column
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.displacement.table import ZERO, DisplacementTable, follow_motor, history_of_sliding_rope
 from bowdenfit.kinds.rows import (
     OwnAngles,
@@ -55,13 +55,13 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
             reading and nobody stated where its displacement begins.
     """
     path, route, contacts = source.file, source.description.route, source.description.angle_columns
-    settings, table = source.settings, read_csv(path)
+    settings = source.settings
     ends = [
         Quantity(name, what) for names, what in zip(_NAMES.values(), ("force", "length"), strict=True) for name in names
     ]
     others = (Quantity("run", "text"), Quantity("stroke", "text"))
-    wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(route, contacts))
-    columns = find_columns(table, wanted, source.columns, _UNUSED)
+    wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(source.description))
+    table, columns = source.read_table(path, wanted, _UNUSED)
     check_spelling(table, columns, others)
     force_column, x_column = (
         _require_either_name(table, columns, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))

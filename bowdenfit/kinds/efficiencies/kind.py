@@ -12,12 +12,10 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import (
     Column,
     Quantity,
-    find_columns,
     read_unused_columns,
     remark_on_errors_in_cells,
     require_column,
 )
-from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
 from bowdenfit.kinds.plausibility import (
@@ -101,10 +99,10 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             DatasetError: See `read_table` and `find_columns`; or an efficiency is not positive, or above 1 beyond its error.
         """
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
-        table = read_table(path)
-        names = (Quantity("efficiency", "ratio"), Quantity("efficiency_sd", "ratio"), LOSS, Quantity("loss_sd", "ratio"))
+        sds = [Quantity(f"{name}_sd", "ratio", optional=True) for name in ("efficiency", "loss")]
+        names = (Quantity("efficiency", "ratio"), LOSS, *sds)
         labels = (Quantity("run", "text"), Quantity("stroke", "text"))
-        columns = find_columns(table, (*names, *labels, *shared_columns(route, contacts)), source.columns)
+        table, columns = source.read_table(path, (*names, *labels, *shared_columns(source.description)))
         is_loss = "efficiency" not in columns and LOSS.name in columns
         name = LOSS.name if is_loss else "efficiency"
         column = require_column(table, columns, name, "efficiency (0 to 1) or efficiency_percent")

@@ -15,12 +15,11 @@ from bowdenfit.files.columns import (
     Column,
     Quantity,
     describe_paired_headings,
-    find_columns,
     read_unused_columns,
     remark_on_errors_in_cells,
 )
 from bowdenfit.files.row_account import RowAccount
-from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.forces.mountings import (
     GROUP,
     NO_GROUP,
@@ -53,7 +52,7 @@ _MOST_LOADS = 25  # loads that are counted
 _APART = 3.0  # smallest gap between loads over the largest within one
 _SAME = 0.002  # relative difference of equal readings, the last digit of a display
 _ONE_LOAD = 0.03  # relative width of readings at one load
-_SDS = (Quantity("input_force_sd", "force"), Quantity("output_force_sd", "force"))  # a remark says that these are not used
+_SDS = tuple(Quantity(f"{end}_force_sd", "force", optional=True) for end in ("input", "output"))
 _FEWEST_ALIKE = 4  # loads beyond the first of each run and stroke, from which their noise is looked at; a judgement
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
@@ -186,9 +185,9 @@ def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
 
 
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
-    table, route, contacts = read_table(path), source.description.route, source.description.angle_columns
-    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed"), GROUP)
-    columns = find_columns(table, (*ENDS, *_SDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+    route, contacts = source.description.route, source.description.angle_columns
+    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed", optional=True), GROUP)
+    table, columns = source.read_table(path, (*ENDS, *_SDS, *others, *shared_columns(source.description)), _UNUSED)
     nothing = np.full(len(table.rows), np.nan)
     read = partial(_read_tensions, table, columns, source.description)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)

@@ -11,9 +11,9 @@ from bowdenfit.description import Description, Finite, Table
 from bowdenfit.description.stated_parameters import PRELOAD
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, combine_errors
-from bowdenfit.files.columns import Column, Quantity, find_columns
+from bowdenfit.files.columns import Column, Quantity
 from bowdenfit.files.headings import meanings
-from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
@@ -104,9 +104,8 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 is larger than the input while moving forward.
         """
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
-        table = read_table(path)
-        others = (Quantity("stroke", "text"), Quantity("preload", "force"))
-        columns = find_columns(table, (*ENDS, *others, *shared_columns(route, contacts)), source.columns, _UNUSED)
+        others = (Quantity("stroke", "text"), Quantity("preload", "force", optional=True))
+        table, columns = source.read_table(path, (*ENDS, *others, *shared_columns(source.description)), _UNUSED)
         check_spelling(table, columns, others)
         nothing = np.full(len(table.rows), np.nan)
         input_force, output_force = table.faults.read_all(

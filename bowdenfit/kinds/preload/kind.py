@@ -7,8 +7,7 @@ from typing_extensions import override
 
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
-from bowdenfit.files.columns import Quantity, find_columns, require_column
-from bowdenfit.files.tables import read_table
+from bowdenfit.files.columns import Quantity, require_column
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import is_within_factor
@@ -68,9 +67,8 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
             DatasetError: See `read_table` and `find_columns`; or a preload is negative.
         """
         path = source.file
-        table = read_table(path)
         wanted = (Quantity("preload", "force"), Quantity("wrap_angle", "angle"))
-        columns = find_columns(table, wanted, source.columns, _UNUSED)
+        table, columns = source.read_table(path, wanted, _UNUSED)
         angles = require_column(table, columns, "wrap_angle", "wrap_angle_deg")
         preloads = require_column(table, columns, "preload", "preload_N")
         rows = PreloadTable(

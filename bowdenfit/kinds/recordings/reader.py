@@ -14,6 +14,7 @@ from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_nam
 from bowdenfit.files import read_channels
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.files.headings import Quantity
+from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
@@ -210,7 +211,8 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     unit, loop = next(iter(units), ""), description.cable.kind == "loop"
     recordings = Recordings(description.angle_columns, items, unit, delay_sd, loop)
     _check_locations(recordings, description)
-    remarks = [remark for r in items for remark in (*r.account.remarks, *r.strokes.remarks)]
+    remarks = [remark for file in files for remark in file.remarks]
+    remarks += [remark for r in items for remark in (*r.account.remarks, *r.strokes.remarks)]
     accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
     return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
 
@@ -225,6 +227,7 @@ class _File:
     delay_sd: float
     velocity_unit: str
     account: RowAccount | None
+    remarks: tuple[str, ...]
 
 
 def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
@@ -309,7 +312,7 @@ def _read_file(description: Description, path: Path, entry: RecordingFile, chann
         | _check_channel_names(entry.channels, description)
         | dict(channels)
     )
-    file = read_channels(path)
+    file, remarks = MissingCodes(table.missing).blank_samples(read_channels(path))
     rows = rows_where(file, entry.where)
     raw, unit = to_recording(
         rows, _recording_name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
@@ -323,7 +326,7 @@ def _read_file(description: Description, path: Path, entry: RecordingFile, chann
     stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
-    return _File(raw, entry, page, stated or 0.0, unit, file.account)
+    return _File(raw, entry, page, stated or 0.0, unit, file.account, remarks)
 
 
 def _only_stated_angle(description: Description, entry: RecordingFile) -> float | None:

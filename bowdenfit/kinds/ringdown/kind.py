@@ -13,8 +13,8 @@ from bowdenfit.description.file import Stated
 from bowdenfit.description.values import QuantityValue
 from bowdenfit.display import Part
 from bowdenfit.errors import DatasetError
-from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.files.columns import Column, Quantity, require_column
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.rows import FileRows, RowOrigin, number_names, origin_of_rows
 from bowdenfit.kinds.table_files import RUN, InitQuestions, Source, TableFromFiles, WantedColumn
@@ -86,10 +86,9 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
             little is seen of it.
     """
     path = source.file
-    table = read_table(path)
     ends = Quantity("angle", "angle"), Quantity("torque", "torque")
     others = Quantity("run", "text"), Quantity("added_inertia", "inertia")
-    columns = find_columns(table, (Quantity("time", "time"), *ends, *others), source.columns, _UNUSED)
+    table, columns = source.read_table(path, (Quantity("time", "time"), *ends, *others), _UNUSED)
     if ("angle" in columns) == ("torque" in columns):
         raise DatasetError(
             f"{table.file} needs the angle of the joint (angle_deg), or the torque in the rope (torque_N_m), and has "

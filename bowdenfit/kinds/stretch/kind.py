@@ -10,8 +10,8 @@ from typing_extensions import override
 from bowdenfit.description import Description, Finite
 from bowdenfit.description.values import Frozen
 from bowdenfit.files.cells import Cell
-from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
-from bowdenfit.files.tables import RawTable, read_table
+from bowdenfit.files.columns import Column, Quantity, require_column
+from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
 from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor, split_by_group
@@ -59,10 +59,9 @@ def read_stretch(source: Source) -> TableFromFiles[StretchTable]:
         DatasetError: See `read_table` and `find_columns`; or a load is negative, or stretch falls with load.
     """
     path = source.file
-    table = read_table(path)
     wanted = (Quantity("load", "force"), Quantity("wrap_angle", "angle"), Quantity("stretch", "length"))
     optional = (Quantity("branch", "text"), Quantity("cycle", "text"))
-    columns = find_columns(table, (*wanted, *optional), source.columns, _UNUSED)
+    table, columns = source.read_table(path, (*wanted, *optional), _UNUSED)
     check_spelling(table, columns, optional)
     loads, angles, stretches = (
         require_column(table, columns, name, f"{name}_{unit}")

@@ -213,6 +213,7 @@ def describe_row_account(account: RowAccount, file: str = "") -> list[str]:
     held = "holds a reading" if account.read == 1 else "hold readings"
     lines = [f"{before} {counted(account.rows, 'row')} {account.read} {held}{over if account.headings else ''}."]
     unused = [row.words for row in account.left_out] + [account.beside_in_words] * bool(account.beside)
+    lines += [f"{account.note[:1].upper()}{account.note[1:]}."] * bool(account.note)
     return [*map(kept_narrow, lines), *(filled(f"Not used: {words}.", "  " if file else "") for words in unused)]
 
 

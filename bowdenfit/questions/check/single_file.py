@@ -18,6 +18,7 @@ from bowdenfit.files.apart import limits_times
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.clocks import is_clock
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, parse_sources
+from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds import KINDS, iterate_tables
 from bowdenfit.kinds.file_kind import FileKind, columns_of_kind, guess_file_kind, is_angle_table
@@ -79,8 +80,8 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
     channels, named = reading.get("channels", ()), parse_sources(reading.get("columns", ()), "--column")
     file = guess_file_kind(path, bool(channels), tuple(named))
     if KINDS[file.kind].takes_channels and not file.other:
-        return _describe_recording(path, file, channels)
-    raw = read_table(path)
+        return _describe_recording(path, file, channels, reading.get("missing", ()))
+    raw = MissingCodes(reading.get("missing", ())).mark(read_table(path))
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if file.other:
         backwards = _backward_clock(path)
@@ -136,17 +137,23 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
     """Return the command with what the user has set besides columns."""
     stated = [f"--set {shlex.quote(setting)}" for setting in reading.get("settings", ())]
     stated += [f"--{name} {value}" for name in _CHOICES if (value := reading.get(name))]
-    return replace(command, text=" ".join([command.text, *stated]))
+    return _with_missing(replace(command, text=" ".join([command.text, *stated])), reading.get("missing", ()))
 
 
-def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str]) -> tuple[str, bool]:
+def _with_missing(command: FitCommand, codes: Sequence[str]) -> FitCommand:
+    """Return the command with the missing-value codes."""
+    return replace(command, text=" ".join([command.text, *(f"--missing {shlex.quote(code)}" for code in codes)]))
+
+
+def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str], missing: Sequence[str]) -> tuple[str, bool]:
     """Describe a recording alone; and return whether it can be fitted as it stands."""
-    file = read_channels(path)
+    file, notes = MissingCodes(tuple(missing)).blank_samples(read_channels(path))
+    file = replace(file, remarks=(*file.remarks, *notes))
     angle = _measured_angle(file, channels)
-    recordings, obstacle = _read_recording(file, channels, angle)
+    recordings, obstacle = _read_recording(file, channels, angle, missing)
     backwards = describe_backward_clock(file) if obstacle and "backwards" not in obstacle else ""
     obstacle = "\n".join(filter(None, [obstacle, backwards]))
-    command = _recording_command(path, file, channels, angle)
+    command = _with_missing(_recording_command(path, file, channels, angle), missing)
     usable = not obstacle or (not channels and "--channel" in command.text and not backwards)
     return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
 
@@ -195,7 +202,7 @@ def _recording_command(path: Path, file: ChannelFile, channels: Sequence[str], a
 
 
 def _read_recording(
-    file: ChannelFile, channels: Sequence[str] = (), angle: AngleChannel | None = None
+    file: ChannelFile, channels: Sequence[str] = (), angle: AngleChannel | None = None, missing: Sequence[str] = ()
 ) -> tuple[Recordings | None, str]:
     """Read the recording that the channels of a file make, prepared and cut into strokes.
 
@@ -203,13 +210,14 @@ def _read_recording(
         file: The channels.
         channels: Which channel is what, such as "input_force=ai0:lbf".
         angle: The channel that says at which wrap angle it was made.
+        missing: Missing-value codes.
 
     Returns:
         The recording, None where they make none; and why not, in a sentence.
     """
     stated = _ANY_ANGLE if angle is None else (angle.angle, "rad")
     try:
-        data = single_file_dataset(file.path, stated, (), parse_channels(channels), kind="recordings")
+        data = single_file_dataset(file.path, stated, (), parse_channels(channels), kind="recordings", missing=missing)
     except DatasetError as error:
         return None, str(error)
     return data.measurements.table(Recordings), ""
@@ -241,9 +249,10 @@ def describe_table_file(
     lines = [filled(title), "", _column_table(raw, columns_of_kind(file.kind), named)]
     if data is not None:
         lines += ["", *describe_first_and_last_rows(data)]
-    lines += ["", *describe_row_account(raw.lines)]
+    account = data.accounts[0] if data is not None else raw.lines
+    lines += ["", *describe_row_account(account)]
     if data is not None:
-        lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in raw.lines.remarks]
+        lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
         lines += [filled(f"Warning: {sentence}") for sentence in describe_copied_readings(data)]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]

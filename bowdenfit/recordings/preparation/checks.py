@@ -88,8 +88,8 @@ def _refuse_missing_code(file: str, name: str, force: Vector, low: float, high: 
     if count > 1 and others > 0 and abs(extreme) > _MISSING_CODE * others:
         raise DatasetError(
             f"{file}: {count} samples of {name} are exactly {extreme:.6g} N, and all others are below {others:.4g} N; the "
-            "usual cause is a code that a logger writes where a sample is missing. Leave those cells blank, or replace the "
-            "code by NaN."
+            "usual cause is a code that a logger writes where a sample is missing. State the code as the file has it, such as "
+            "--missing -9999 (in cable.toml missing = [-9999]), or leave those cells blank."
         )
 
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.files.columns import Quantity, find_columns, require_column
-from bowdenfit.files.tables import read_csv
+from bowdenfit.files.columns import Quantity, require_column
 from bowdenfit.kinds.kind import Kind, Readings
 from bowdenfit.kinds.table_files import TableFromFiles
 from bowdenfit.types import Vector
@@ -28,9 +27,9 @@ class LossKind(Kind[LossTable]):
 
     def read(self, source):
         path = source.file
-        table = read_csv(path)
-        found = find_columns(table, (Quantity("input_force", "force"), Quantity("loss", "force")), source.columns)
-        force, loss = (np.array(require_column(table, found, name, f"{name}_N").numbers()) for name in ("input_force", "loss"))
+        table, columns = source.read_table(path, (Quantity("input_force", "force"), Quantity("loss", "force")))
+        ends = [require_column(table, columns, name, f"{name}_N") for name in ("input_force", "loss")]
+        force, loss = (np.array(column.numbers()) for column in ends)
         return TableFromFiles(LossTable(force, loss), {path.name: path}, accounts=(table.account,))
 
     def describe(self, table, description):

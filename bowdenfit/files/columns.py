@@ -201,10 +201,12 @@ def _check_known_units(
 ) -> None:
     """Refuse a heading that names a quantity and then says what is not understood: the column would be passed over."""
     names = {plain_name(quantity.name): quantity for quantity in wanted if quantity.dimension != "text"}
+    names_of_wanted = {quantity.name for quantity in wanted}
     for heading, _ in headings:
         name, bracket, behind = heading.partition("[" if "[" in heading else "(")
         quantity = names.get(plain_name(name))
-        if not bracket or quantity is None or quantity.name in sources or meanings(heading, wanted):
+        known = meanings(heading, wanted) or ((spelling := parse_heading(heading)) and spelling.quantity in names_of_wanted)
+        if not bracket or quantity is None or quantity.name in sources or known:
             continue
         with table.faults.collect():
             raise DatasetError(

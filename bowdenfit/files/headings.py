@@ -178,6 +178,7 @@ def meanings(heading: str, wanted: tuple[Quantity, ...]) -> list[tuple[Quantity,
     """Return every quantity that the heading can mean, with the unit written in it; exact names win over name and unit."""
     if len(heading) > _LONGEST_HEADING:
         return []
+    heading = heading.replace("±", " sd ")
     name, unit = split_brackets(heading)
     exact = [(q, unit or _unit_suffix(name, q.name)) for q in wanted if plain_name(name) == plain_name(q.name)]
     whole = [(q, None) for q in wanted if plain_name(heading) == plain_name(q.name)]

@@ -71,6 +71,11 @@ _ENDS = {"mot": "motor", "act": "actuator", "ent": "entrada", "sal": "salida", "
 _COMPOUND = re.compile(r"(?P<end>\w{3,}?)s?(?P<of>kraft|spannung|seite|seitig)")
 _BRACKETED = re.compile(r"[\[(](?P<unit>[^\[\]()]+)[\])]")
 _PREPOSITION = re.compile(r"^(?P<name>.*\S)\s+(?:in|en)\s+(?P<unit>\S+)$", re.IGNORECASE)
+_SPREAD = re.compile(  # standard deviations alone: an error or an uncertainty may be several of them, or a bound
+    r"±|\+/?-|(?<![^\W_])(?:sd|s\.d\.|std|stdev|std\.? ?dev\.?|standard[ _]deviation|standardabweichung|stabw|"
+    r"[eé]cart[- ]type|desviaci[oó]n est[aá]ndar|deviazione standard|sigma)(?![^\W_])",
+    re.IGNORECASE,
+)
 _NUMBERED = re.compile(r"[tf]_?(?P<number>[12])|tension ?(?P<of>[12])")
 
 
@@ -97,6 +102,10 @@ def parse_heading(heading: str, unit: str = "") -> Spelling | None:
         heading: As written, with or without its unit.
         unit: Unit that the file gives elsewhere, as in a row below the headings.
     """
+    if _SPREAD.search(heading):
+        of = parse_heading(_SPREAD.sub(" ", heading), unit)
+        is_force = of is not None and of.quantity in ("input_force", "output_force") and not of.pair
+        return Spelling(f"{of.quantity}_sd", of.unit) if of is not None and is_force else None
     for name, written in _divided(heading, unit):
         plain = " ".join(_words(name))
         if quantity := _QUANTITIES.get(plain) or _GUESSES.get(plain):

@@ -16,6 +16,7 @@ from bowdenfit.files.headings import Quantity, find_candidates, heading_of
 from bowdenfit.files.spellings import parse_heading, without_accents
 from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table
 from bowdenfit.files.text_file import first_bytes, first_lines
+from bowdenfit.kinds.forces.stated_noise import FORCE_SDS
 from bowdenfit.kinds.forces.table import count_loads
 from bowdenfit.units import conversion_factor, dimension_of, is_unit
 from bowdenfit.words import shown
@@ -48,6 +49,7 @@ BESIDE_FORCES = (
     Quantity("wrap_angle", "angle"),
     Quantity("wrap_angle_sd", "angle"),
     Quantity("efficiency_sd", "ratio"),
+    *FORCE_SDS,
 )
 COLUMNS = (*FORCES, *BESIDE_FORCES)
 """Columns that a table without a description may have."""

@@ -9,7 +9,8 @@ adds to a log ratio, to second order,
 
 .. math:: E[\log(F_\text{in}/F_\text{out})] - \log(k^{-1}) = \tfrac{\sigma^2}{2} (F_\text{out}^{-2} - \rho^2 F_\text{in}^{-2}),
 
-is estimated too, with sigma from the distances.
+is estimated too, with sigma from the distances. Where a standard deviation is stated for each reading, the line is that of York
+(1966), in which every point has errors of its own in both coordinates.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ from jaxtyping import Float
 
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import Labels, Matrix, Vector
 
 ROW_ARRAYS = ("route", "own", "is_own", "known_variance", "noisy", "group")
 
@@ -30,6 +31,7 @@ _FEWEST_TO_BEND = 6  # readings of a group from which a parabola is looked for; 
 _FAR_BEYOND = 10.0  # F(3, n - 3) of the parabola: noise exceeds it in 1 group of 2000 of n = 20, 1 of 22 of n = 6
 _FAR_OFF = 0.2  # distance of a log ratio from the line beyond which a small group is taken as it was read; a judgement
 _LEAST_FREEDOM = 4  # degrees of freedom from which distances estimate the noise; a judgement
+_YORK_STEPS = 20  # of a fixed-point iteration that gains a digit or more in each; a judgement
 _MEDIAN = 0.6745  # median size of a standard normal deviate
 STROKE, SPEED, ORDER, ZERO = "Stroke", "Speed", "Order", "Zero"
 _MOST = 4000  # readings that are tested one by one; neighbors of more are joined, to bound the time. A judgement
@@ -97,6 +99,7 @@ def expected_forces(
     noise_ratio: float,
     noise: float | None,
     offsets: bool = False,
+    sd: Matrix | None = None,
 ) -> ExpectedForces:
     """Return the forces that the readings of each group together estimate.
 
@@ -106,25 +109,33 @@ def expected_forces(
         noise_ratio: rho, noise of the input over that of the output; 0 where a weight hangs there.
         noise: Standard deviation of an output's reading as stated [N]; None where the distances estimate it.
         offsets: Whether the cells may show a force where there is none, so that the line need not go through the origin.
+        sd: Standard deviations of each input and output as stated [N], which take the place of the other two.
     """
-    slope = _slopes(input_force, output_force, group, noise_ratio)[group]
-    across = 1 + noise_ratio**2 * slope**2
+    slope = _slopes(input_force, output_force, group, noise_ratio)
+    in_variance: Vector | float = noise_ratio**2
+    out_variance: Vector | float = 1.0
+    if sd is not None:
+        in_variance, out_variance = sd[:, 0] ** 2, sd[:, 1] ** 2
+        slope, noise = _york_slopes(input_force, output_force, group, slope, (sd[:, 0] ** 2, sd[:, 1] ** 2)), 1.0
+    slope = slope[group]
+    across = out_variance + in_variance * slope**2
     distance = output_force - slope * input_force
     bend, freedom = np.zeros(len(distance)), float(len(distance) - np.max(group, initial=-1) - 1)
-    along = input_force + noise_ratio**2 * slope * distance / across
+    along = input_force + in_variance * slope * distance / across
+    roots = np.sqrt(np.broadcast_to(across, distance.shape))
     few = np.zeros(len(distance), dtype=bool)
     for rows in np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1]):
         if offsets and len(rows) >= _FEWEST_TO_SHIFT:
-            bend[rows], more = _fit_straight_line(along[rows], distance[rows])
+            bend[rows], more = _fit_straight_line(along[rows], distance[rows], roots[rows])
             freedom -= more
         elif len(rows) >= _FEWEST_TO_BEND:
-            bend[rows], more = _fit_parabola(along[rows], distance[rows])
+            bend[rows], more = _fit_parabola(along[rows], distance[rows], roots[rows])
             freedom -= more
         elif np.any(np.abs(np.log(output_force[rows] / (slope * input_force)[rows])) > _FAR_OFF):
             few[rows] = True
     left = np.where(few, 0.0, distance - bend)
-    expected_in = input_force + noise_ratio**2 * slope * left / across
-    expected_out = output_force - left / across
+    expected_in = input_force + in_variance * slope * left / across
+    expected_out = output_force - out_variance * left / across
     if noise is None:
         sizes, freedom = np.abs(left)[~few] / np.sqrt(across[~few]), freedom - np.sum(few)
         noise = float(np.median(sizes) / _MEDIAN * np.sqrt(len(sizes) / freedom)) if freedom >= _LEAST_FREEDOM else 0.0
@@ -133,9 +144,8 @@ def expected_forces(
         np.where(possible, expected, read)
         for expected, read in ((expected_in, input_force), (expected_out, output_force))
     )
-    return ExpectedForces(
-        expected_in, expected_out, noise**2 / 2 * (1 / expected_out**2 - noise_ratio**2 / expected_in**2)
-    )
+    bias = noise**2 / 2 * (out_variance / expected_out**2 - in_variance / expected_in**2)
+    return ExpectedForces(expected_in, expected_out, bias)
 
 
 def _slopes(
@@ -153,24 +163,45 @@ def _slopes(
     return np.asarray(np.where(difference < 0, steep, flat))
 
 
-def _fit_straight_line(along: Vector, distance: Vector) -> tuple[Vector, int]:
-    """Return a straight line through the distances, and the number of its further coefficients."""
+def _york_slopes(
+    input_force: Vector,
+    output_force: Vector,
+    group: Labels,
+    start: Float[np.ndarray, " groups"],
+    variances: tuple[Vector, Vector],
+) -> Float[np.ndarray, " groups"]:
+    """Return the slope of each group's line through the origin where each reading has variances of its own [N^2].
+
+    References:
+        York, Least-squares fitting of a straight line, Can. J. Phys. 44 (1966), 1079.
+    """
+    slope, (of_input, of_output) = start, variances
+    for _ in range(_YORK_STEPS):
+        at = slope[group]
+        weight = 1 / (of_output + of_input * at**2)
+        along = input_force + of_input * at * weight * (output_force - at * input_force)
+        slope = np.bincount(group, weight * along * output_force) / np.bincount(group, weight * along * input_force)
+    return np.asarray(slope)
+
+
+def _fit_straight_line(along: Vector, distance: Vector, sd: Vector) -> tuple[Vector, int]:
+    """Return a straight line through distances of standard deviations `sd`, and the number of its further coefficients."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
         return np.zeros(len(along)), 0
     columns = np.vander((along - along.mean()) / spread, 2)
-    return columns @ np.linalg.lstsq(columns, distance, rcond=None)[0], 1
+    return columns @ np.linalg.lstsq(columns / sd[:, None], distance / sd, rcond=None)[0], 1
 
 
-def _fit_parabola(along: Vector, distance: Vector) -> tuple[Vector, int]:
-    """Return a parabola through the distances, and its further coefficients; zeros where it may be noise."""
+def _fit_parabola(along: Vector, distance: Vector, sd: Vector) -> tuple[Vector, int]:
+    """Return a parabola through such distances, and its further coefficients; zeros where it may be noise."""
     spread = np.ptp(along)
     if spread <= 1e-9 * np.max(along):
         return np.zeros(len(along)), 0
     columns = np.vander((along - along.mean()) / spread, 3)
-    fitted = columns @ np.linalg.lstsq(columns, distance, rcond=None)[0]
-    noise = np.sum((distance - fitted) ** 2) / (len(along) - 3)
-    return (fitted, 2) if np.sum(fitted**2) > 3 * _FAR_BEYOND * noise else (np.zeros(len(along)), 0)
+    fitted = columns @ np.linalg.lstsq(columns / sd[:, None], distance / sd, rcond=None)[0]
+    noise = np.sum(((distance - fitted) / sd) ** 2) / (len(along) - 3)
+    return (fitted, 2) if np.sum((fitted / sd) ** 2) > 3 * _FAR_BEYOND * noise else (np.zeros(len(along)), 0)
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.displacement.term import DisplacementTerms
 from bowdenfit.kinds.efficiencies.term import EfficiencyTerms
+from bowdenfit.kinds.forces.stated_noise import STATED_NOISE
 from bowdenfit.kinds.forces.term import ForceTerms
 from bowdenfit.kinds.kind import FrictionKind, RopeKind
 from bowdenfit.kinds.loop.term import LOOP_MOUNTING, LoopTerms
@@ -66,7 +67,7 @@ TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in _ALL}
 
 _ORDER = (
     *(STIFFNESS, BEDDING_STRETCH, BEDDING_LOAD, LENGTHENING, STRETCH_ZERO, STRETCH_FRICTION, REFERENCE_PRELOAD),
-    *(LOOP_MOUNTING, ANGLE_NOISE, RUN_SCATTER, FORCE_NOISE, BLOCK_NOISE, STRETCH_NOISE, PRELOAD_NOISE),
+    *(LOOP_MOUNTING, ANGLE_NOISE, RUN_SCATTER, FORCE_NOISE, STATED_NOISE, BLOCK_NOISE, STRETCH_NOISE, PRELOAD_NOISE),
     *(GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, DELAY_ERROR),
 )  # in z, which what a seed draws depends on; those of other kinds come after these
 

@@ -100,7 +100,7 @@ def test_an_error_behind_a_wrap_angle_or_an_efficiency_is_its_standard_deviation
     assert any("is taken for one standard deviation" in remark for remark in data.measurements.remarks)
 
 
-def test_errors_of_forces_are_said_not_to_be_used(tmp_path):
+def test_errors_of_one_force_alone_are_said_not_to_be_used(tmp_path):
     in_cells = write(tmp_path, "input_force_N,output_force_N", "20,15 ± 0.2", "40,31 ± 0.2", "60,44 ± 0.3")
     remarks = bf.read(in_cells, wrap_angle="180deg").measurements.remarks
     assert any("'output_force_N ±' are not used" in remark for remark in remarks)

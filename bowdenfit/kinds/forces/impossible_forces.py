@@ -19,6 +19,7 @@ import numpy as np
 
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
+from bowdenfit.kinds.forces.stated_noise import log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import GAIN_ERROR
 from bowdenfit.recordings.rope_strokes import OPPOSED
@@ -66,7 +67,7 @@ class LogGains:
     Args:
         log_gain: Logarithm of what each gains: output over input while pulling, input over output while returning [1].
         load: A load whose error has nothing to do with that, such as the sum of both forces where friction is small [N].
-        weight: One over the variance of the log gain, for a noise of 1 N [N^2].
+        weight: One over the variance of the log gain, for a noise of 1 N [N^2]; for the stated one where it is stated.
         cell: Number of each reading's run and stroke.
     """
 
@@ -82,7 +83,7 @@ def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tupl
     Args:
         excess: What each reading gains beyond what load cells explain [1].
         readings: All sliding readings of a table.
-        stated: Noise of a force reading as stated [N]; None where scatter estimates it.
+        stated: Noise of a force reading as stated [N], 1 where the weights have it; None where scatter estimates it.
     """
     log_gain, weight, cell = readings.log_gain, readings.weight, readings.cell
     n, total = len(excess), np.bincount(cell, weight)
@@ -275,7 +276,8 @@ def find_gains(table: ForceTable, description: Description) -> ForceGains | None
     excess = readings.log_gain - _allowed_gain(table.input_force[rows], table.output_force[rows], description)
     if not np.any(excess > 0):
         return None
-    single, together = flag_gains(excess, readings, description.sensors.largest_force_noise)
+    stated = description.sensors.largest_force_noise if table.sd is None else 1.0
+    single, together = flag_gains(excess, readings, stated)
     force_in, force_out = table.input_force[rows], table.output_force[rows]
     large = np.abs(force_out - force_in) > _LARGE_GAIN * max(force_in.max(), force_out.max())
     single |= (excess > np.log(_ANY_GAIN)) & large
@@ -286,7 +288,7 @@ def _log_gains(table: ForceTable, description: Description) -> tuple[Labels, Log
     """Return the numbers of the sliding rows, and what each gains."""
     rows = np.flatnonzero(table.stroke != 0)
     force_in, force_out, stroke = table.input_force[rows], table.output_force[rows], table.stroke[rows]
-    weight = 1 / ((description.sensors.noise_ratio / force_in) ** 2 + 1 / force_out**2)
+    weight = 1 / log_ratio_variance(table.noises(description.sensors.noise_ratio)[rows], force_in, force_out)
     cell = np.unique(np.column_stack([table.run[rows], stroke]), axis=0, return_inverse=True)[1].ravel()
     return rows, LogGains(-stroke * np.log(force_in / force_out), force_in + force_out, weight, cell)
 

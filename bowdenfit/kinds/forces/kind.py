@@ -13,6 +13,7 @@ from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
 from bowdenfit.kinds.forces.mountings import ForceSettings
+from bowdenfit.kinds.forces.stated_noise import describe_scatter, log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiency_readings
 from bowdenfit.kinds.plausibility import (
@@ -164,7 +165,8 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     @override
     def warnings(self, table: ForceTable, description: Description, measurements: Measurements) -> list[str]:
         """Warn of what cannot be separated from friction: gains of the load cells, and the only mounting of a group."""
-        return _warn_of_gains(table, description) + _warn_of_single_mountings(table, description)
+        of_groups = _warn_of_single_mountings(table, description)
+        return _warn_of_gains(table, description) + of_groups + _warn_of_stated_noise(table)
 
     @override
     def copied_readings(self, table: ForceTable) -> list[str]:
@@ -187,7 +189,9 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
 
     @override
     def coarse_readings(self, table: ForceTable) -> CoarseReadings | None:
-        """Check the output force; the input force may be set."""
+        """Check the output force, where its standard deviation is not stated; the input force may be set."""
+        if table.sd is not None:
+            return None
         stroke = table.stroke.astype(float)
         settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
         return find_coarse_readings(listed(table.origin.files), settings, table.output_force, "N")
@@ -218,6 +222,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         measured = np.isfinite(table.own.angle).any(axis=0)
         angles = np.rad2deg(table.own.angle[:, measured])
         inputs, outputs = format_fixed(table.input_force, 3), format_fixed(table.output_force, 3)
+        sds = [] if table.sd is None else [format_fixed(column, 3) for column in table.sd.T if np.all(column > 0)]
         rows = [
             [
                 *route_cells(table.route[i], description),
@@ -226,11 +231,13 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
                 STROKE_NAMES.get(int(table.stroke[i]), "hold"),
                 inputs[i],
                 outputs[i],
+                *(column[i] for column in sds),
             ]
             for i in range(len(table.run))
         ]
         names = [f"{name}_deg" for name, there in zip(table.own.names, measured, strict=True) if there]
-        return [*route_heading(description), *names, "run", "stroke", "input_force_N", "output_force_N"], rows
+        of_sds = [f"{end}_force_sd_N" for end in ("input", "output")][2 - len(sds) :]
+        return [*route_heading(description), *names, "run", "stroke", "input_force_N", "output_force_N", *of_sds], rows
 
     @override
     def design_contradiction(self, design: ForceDesign, description: Description) -> str:
@@ -272,6 +279,19 @@ def _warn_of_gains(table: ForceTable, description: Description) -> list[str]:
         "and no interval says so. State input_gain_error_sd and output_gain_error_sd under [sensors] (0 where one cell read "
         "both ends), or read the other stroke too."
     ]
+
+
+def _warn_of_stated_noise(table: ForceTable) -> list[str]:
+    """Warn where readings of one run scatter otherwise than their standard deviations say."""
+    slides = table.stroke != 0
+    if table.sd is None or not slides.any():
+        return []
+    force_in, force_out = table.input_force[slides], table.output_force[slides]
+    settings = np.column_stack([table.run, table.stroke, np.nan_to_num(table.route), np.nan_to_num(table.own.angle)])[slides]
+    group = np.unique(settings, axis=0, return_inverse=True)[1].ravel()
+    variance = log_ratio_variance(table.sd[slides], force_in, force_out)
+    ratio = table.stroke[slides] * np.log(force_in / force_out)
+    return describe_scatter(listed(table.origin.files), ratio, variance, force_in + force_out, group)
 
 
 def _warn_of_single_mountings(table: ForceTable, description: Description) -> list[str]:

@@ -21,6 +21,7 @@ from bowdenfit.kinds.candidate import (
     Situation,
     choose_loads,
 )
+from bowdenfit.kinds.forces.stated_noise import STATED_NOISE
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.recordings.blocks import effective_counts, is_under_tension
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
@@ -28,7 +29,7 @@ from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import RowConditions
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.recording import Recordings
-from bowdenfit.types import Vector
+from bowdenfit.types import Matrix, Vector
 from bowdenfit.words import significant
 
 _MOST = 12  # forces of each stroke; more readings are joined, since a straight line needs no more points. A judgement
@@ -45,14 +46,16 @@ class RunDesign:
         stroke: +1 pulling, -1 return.
         velocity: Velocity as in the tables; NaN where it is not known.
         n_effective: How many independent readings each stands for [1].
-        noise: Parameter that is the standard deviation of one reading.
+        noise: Parameter that the standard deviation of one reading is in proportion to.
+        sd: Stated standard deviations of the input and the output, over that parameter [N]; None where none are stated.
     """
 
     input_force: Vector
     stroke: Vector
     velocity: Vector
     n_effective: Vector
-    noise: str = FORCE_NOISE
+    noise: str
+    sd: Matrix | None = None
 
 
 def typical_run(measurements: Measurements) -> RunDesign | None:
@@ -69,8 +72,10 @@ def _run_of_table(table: ForceTable) -> RunDesign:
     sliding = table.stroke != 0
     runs, counts = np.unique(table.run[sliding], return_counts=True)
     rows = sliding & (table.run == runs[np.argsort(counts, kind="stable")[len(runs) // 2]])
-    n_effective = np.ones(int(rows.sum()))
-    return _join_readings(table.input_force[rows], table.stroke[rows], table.velocity[rows], n_effective, FORCE_NOISE)
+    n_effective, noise, sd = np.ones(int(rows.sum())), FORCE_NOISE, None
+    if table.sd is not None:
+        noise, sd = STATED_NOISE, table.sd[rows]
+    return _join_readings(table.input_force[rows], table.stroke[rows], table.velocity[rows], n_effective, noise, sd)
 
 
 def _run_of_recordings(recordings: Recordings) -> RunDesign | None:
@@ -85,7 +90,9 @@ def _run_of_recordings(recordings: Recordings) -> RunDesign | None:
     return _join_readings(blocks.input_force[where], stroke[where], blocks.velocity[where], n_effective, BLOCK_NOISE)
 
 
-def _join_readings(force: Vector, stroke: Any, velocity: Vector, n_effective: Vector, noise: str) -> RunDesign:
+def _join_readings(
+    force: Vector, stroke: Any, velocity: Vector, n_effective: Vector, noise: str, sd: Matrix | None = None
+) -> RunDesign:
     """Join readings of like force, stroke by stroke."""
     groups = []
     for way in (1, -1):
@@ -94,7 +101,8 @@ def _join_readings(force: Vector, stroke: Any, velocity: Vector, n_effective: Ve
         groups += [part for part in np.array_split(order, _MOST) if len(part)]
     means = [[np.average(v[g], weights=n_effective[g]) for g in groups] for v in (force, velocity)]
     ways, total = [float(stroke[g[0]]) for g in groups], [n_effective[g].sum() for g in groups]
-    return RunDesign(np.array(means[0]), np.array(ways), np.array(means[1]), np.array(total), noise)
+    sds = None if sd is None else np.array([np.sqrt(np.mean(sd[g] ** 2, axis=0)) for g in groups])
+    return RunDesign(np.array(means[0]), np.array(ways), np.array(means[1]), np.array(total), noise, sds)
 
 
 def set_load_and_stroke(design: RunDesign, load: float, stroke: int) -> RunDesign:
@@ -132,10 +140,10 @@ def make_run_simulator(
         mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
         shift = mounted[:, None] * cable.friction.rate(values, velocity)
         output = cable.friction.output_force(values, force, shift, stroke)
+        ratios = (cable.description.sensors.noise_ratio, 1.0) if design.sd is None else design.sd.T
         cells, noise = LoadCells.of(values), values[design.noise] / jnp.sqrt(jnp.asarray(design.n_effective))
-        of_weight = noise * cable.description.sensors.noise_ratio
-        read_in = cells.shown_input(force) + of_weight * jax.random.normal(of_input, output.shape)
-        read_out = cells.shown_output(output) + noise * jax.random.normal(of_output, output.shape)
+        read_in = cells.shown_input(force) + noise * ratios[0] * jax.random.normal(of_input, output.shape)
+        read_out = cells.shown_output(output) + noise * ratios[1] * jax.random.normal(of_output, output.shape)
         least = cable.friction.conditions.least_force
         ratio = jnp.log(jnp.maximum(read_in, least) / jnp.maximum(read_out, least))
         return ((stroke * ratio) @ fit).ravel()
@@ -155,6 +163,7 @@ def _straight_line(cable: Cable, design: RunDesign) -> np.ndarray:
     if cable.friction.depends_on_rate and np.ptp(speed) > np.log(_SPREAD):
         columns.append(speed)
     weight = np.sqrt(design.n_effective) * design.input_force  # the noise of a log ratio falls with the force
+    weight = weight if design.sd is None else weight / design.sd[:, 1]
     lines = np.column_stack(columns)
     lines[:, 1:] -= np.average(lines[:, 1:], axis=0, weights=weight**2)
     return np.asarray(np.linalg.pinv(lines * weight[:, None]) * weight).T

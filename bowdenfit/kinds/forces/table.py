@@ -28,6 +28,7 @@ from bowdenfit.kinds.forces.mountings import (
     remark_on_one_row_runs,
     remark_on_reused_labels,
 )
+from bowdenfit.kinds.forces.stated_noise import FORCE_SDS, concatenate_sds, read_force_sds, remark_on_large_sds
 from bowdenfit.kinds.plausibility import NO_NOISE
 from bowdenfit.kinds.rows import (
     ENDS,
@@ -43,16 +44,15 @@ from bowdenfit.kinds.rows import (
 )
 from bowdenfit.kinds.strokes import read_strokes_by_loss
 from bowdenfit.kinds.table_files import Source, TableFromFiles
-from bowdenfit.types import Labels, Vector
+from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
-from bowdenfit.words import listed, shown
+from bowdenfit.words import listed
 
 # How readings fall together at loads: judgements, which a sentence and the guess of a file's kind rest on, and no fit.
 _MOST_LOADS = 25  # loads that are counted
 _APART = 3.0  # smallest gap between loads over the largest within one
 _SAME = 0.002  # relative difference of equal readings, the last digit of a display
 _ONE_LOAD = 0.03  # relative width of readings at one load
-_SDS = tuple(Quantity(f"{end}_force_sd", "force", optional=True) for end in ("input", "output"))
 _FEWEST_ALIKE = 4  # loads beyond the first of each run and stroke, from which their noise is looked at; a judgement
 _UNUSED = ("time", "position")  # columns that a force table may have and that nothing reads
 
@@ -74,6 +74,7 @@ class ForceTable(Part):
         velocity_unit: Which of the two; empty without velocities.
         group: Group of each row, such as "new rope"; empty without groups.
         unused: Numbers or texts of columns that nothing reads, by heading; NaN in files that lack one.
+        sd: Stated standard deviations of the input and the output force of each row [N]; None where they are not stated.
     """
 
     route: Vector
@@ -88,6 +89,15 @@ class ForceTable(Part):
     velocity_unit: str = ""
     group: tuple[str, ...] = ()
     unused: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
+    sd: Matrix | None = None
+
+    def noises(self, noise_ratio: float) -> Matrix:
+        """Return the noise of each input and output force: as stated [N], or over that of an output [1].
+
+        Args:
+            noise_ratio: Noise of an input over that of an output, where they are not stated.
+        """
+        return np.tile([noise_ratio, 1.0], (len(self.run), 1)) if self.sd is None else self.sd
 
 
 def read_forces(source: Source) -> TableFromFiles[ForceTable]:
@@ -135,6 +145,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         _common_velocity_unit(tables),
         _concatenate_groups(tables),
         _concatenate_unused(tables),
+        concatenate_sds([t.sd for t in tables], paths),
     )
     remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
     remarks |= dict.fromkeys(_remark_on_missing_noise(merged))
@@ -187,9 +198,10 @@ def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     route, contacts = source.description.route, source.description.angle_columns
     others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed", optional=True), GROUP)
-    table, columns = source.read_table(path, (*ENDS, *_SDS, *others, *shared_columns(source.description)), _UNUSED)
+    table, columns = source.read_table(path, (*ENDS, *FORCE_SDS, *others, *shared_columns(source.description)), _UNUSED)
     nothing = np.full(len(table.rows), np.nan)
     read = partial(_read_tensions, table, columns, source.description)
+    sd, sd_remarks = read_force_sds(table, columns, source.description)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
     own = read_own_angles(table, columns, contacts)
     route_values = read_route(table, columns, route)
@@ -197,13 +209,15 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     group, remarks = tuple[str, ...](), list[str]()
     with table.faults.collect():
         group, remarks = read_groups(columns, table.file, *groups)
-    remarks += describe_paired_headings(table, columns, source.columns) + _remark_on_errors(table, columns)
+    remarks += describe_paired_headings(table, columns, source.columns) + sd_remarks
+    remarks += remark_on_errors_in_cells(table, columns)
     if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, stroke_remarks = read_strokes_by_loss(columns, np.log(input_force / output_force))
     remarks, origin = remarks + stroke_remarks, origin_of_rows(table)
     velocity, unit = _read_velocities(columns.get("velocity"), len(table.rows))
     table.faults.refuse()
+    remarks += remark_on_large_sds(table.file, sd, np.column_stack([input_force, output_force]))
     run, run_names, run_remarks = _assign_runs(columns.get("run"), source, route_values, own, origin, group)
     remarks += run_remarks
     if held := int(np.sum(strokes == 0)):
@@ -213,21 +227,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
         )
     parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
     unused = read_unused_columns(table, columns)
-    return ForceTable(*parts, unused), remarks, table.account
-
-
-def _remark_on_errors(table: RawTable, columns: Mapping[str, Column]) -> list[str]:
-    """Return remarks on stated errors of readings: those of wrap angles are used, those of forces are not."""
-    unused = {name: columns[name] for name in (quantity.name for quantity in _SDS) if name in columns}
-    used = {name: column for name, column in columns.items() if name not in unused}
-    remarks = remark_on_errors_in_cells(table, used)
-    if unused:
-        names = listed([shown(column.heading) for column in unused.values()])
-        remarks.append(
-            f"{table.file}: the errors of single readings in {names} are not used. The noise of the load cells is estimated "
-            "from how readings scatter; where it is known, state it in cable.toml: [sensors] force_noise."
-        )
-    return remarks
+    return ForceTable(*parts, unused, sd), remarks, table.account
 
 
 def _read_velocities(column: Column | None, n_rows: int) -> tuple[Vector, str]:

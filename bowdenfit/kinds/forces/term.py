@@ -16,6 +16,7 @@ from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells, noise_l
 from bowdenfit.description import Description
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.next_run import ForceRunCandidates
+from bowdenfit.kinds.forces.stated_noise import STATED_NOISE, log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.plausibility import choose_unused_columns
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
@@ -25,6 +26,7 @@ from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offse
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth
+from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import Labels, Vector
 
@@ -40,9 +42,10 @@ class HeldForcesTerm:
               s^2 = \tau^2 + \sigma_F^2 (\rho^2 g'(F_\text{in})^2 + g'(F_\text{out})^2)
 
     with g the scale on which friction is a shift, log F for the capstan equation, and rho the noise of the input over that of
-    the output. It is a bound, not a measurement: where
-    inside the band a force comes to rest is not modeled, so a coefficient that rests on held readings alone has a posterior
-    that is its prior above the largest of them, and its intervals must not be read as those of a measured value.
+    the output; standard deviations that are stated stand in the place of :math:`\rho \sigma_F` and :math:`\sigma_F`. It is a
+    bound, not a measurement: where inside the band a force comes to rest is not modeled, so a coefficient that rests on held
+    readings alone has a posterior that is its prior above the largest of them, and its intervals must not be read as those of a
+    measured value.
 
     With Student noise Phi is the distribution function of a Student-t: one wrong reading far outside the band then hardly
     moves the bound.
@@ -51,6 +54,7 @@ class HeldForcesTerm:
         cable: The cable.
         data: Arrays, one entry a row.
         labels: Each row in words.
+        reading_noise: Parameter in units of which the noise of each reading is given.
     """
 
     cable: Cable = field(repr=False)
@@ -59,6 +63,7 @@ class HeldForcesTerm:
     name: str = "held_ratio"
     unit: str = "1"
     noise: str = RUN_SCATTER
+    reading_noise: str = FORCE_NOISE
 
     @property
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
@@ -72,10 +77,10 @@ class HeldForcesTerm:
         friction, cells, least = self.cable.friction, LoadCells.of(values), self.cable.friction.conditions.least_force
         input_force = cells.true_input(data["input_force"], least)
         output_force = cells.true_output(data["output_force"], least)
-        of_input = self.cable.description.sensors.noise_ratio * friction.slope(values, input_force)
-        slopes = of_input**2 + friction.slope(values, output_force) ** 2
+        of_input = data["input_noise"] * friction.slope(values, input_force)
+        slopes = of_input**2 + (data["output_noise"] * friction.slope(values, output_force)) ** 2
         difference = friction.scaled(values, input_force) - friction.scaled(values, output_force)
-        return difference, slopes * values[FORCE_NOISE] ** 2
+        return difference, slopes * values[self.reading_noise] ** 2
 
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
@@ -131,6 +136,17 @@ def _number_groups(cable: Cable, table: ForceTable) -> Labels:
     return group_numbers(cable.friction.groups, table.group, len(table.run))
 
 
+def name_noise(table: ForceTable) -> str:
+    """Return the parameter that the noise of each reading of a table is in proportion to."""
+    return FORCE_NOISE if table.sd is None else STATED_NOISE
+
+
+def _declare_noise_factor() -> Parameter:
+    """Return the factor on standard deviations that each reading states: it is known."""
+    meaning = "factor on the standard deviations that are stated with each force"
+    return Parameter(STATED_NOISE, "$f$", meaning, "noise", HalfCauchy(1.0), fixed=1.0, prior_words="fixed (as stated)")
+
+
 def make_sliding_rows(
     description: Description, table: ForceTable, rows: Mapping[str, np.ndarray], used: np.ndarray
 ) -> SlidingRows:
@@ -183,6 +199,7 @@ def _expect_forces(
     )
     keys = np.column_stack([np.where(single, -1 - named, runs), keys[:, 1:]])
     stated = None if sensors.force_noise is None else sensors.force_noise.to("force")
+    noises = table.noises(sensors.noise_ratio)[used]
     expected = ExpectedForces(table.input_force[used].copy(), table.output_force[used].copy(), np.zeros(len(used)))
     weight = np.zeros(len(used))
     for rows, noise in ((~single, stated), (single, stated or 0.0)):
@@ -190,8 +207,9 @@ def _expect_forces(
             continue
         together = np.unique(keys[rows], axis=0, return_inverse=True)[1].ravel()
         forces = table.input_force[used][rows], table.output_force[used][rows]
-        part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets)
-        weight[rows] = 1 / (sensors.noise_ratio**2 / part.input_force**2 + 1 / part.output_force**2)
+        sd = None if table.sd is None else table.sd[used][rows]
+        part = expected_forces(*forces, together, sensors.noise_ratio, noise, description.fits_offsets, sd)
+        weight[rows] = 1 / log_ratio_variance(noises[rows], part.input_force, part.output_force)
         for name, values in vars(part).items():
             if not single[rows].any() or name == "log_ratio_error":
                 getattr(expected, name)[rows] = values
@@ -230,23 +248,29 @@ class ForceTerms(TermKind[ForceTable]):
         """Return a term of the sliding rows by run, and one of the held rows one by one."""
         rows = collect_row_angles(cable.description, table, angles).data | {"group": _number_groups(cable, table)}
         terms: list[RunsTerm | HeldForcesTerm] = []
+        noises = table.noises(cable.description.sensors.noise_ratio)
         sliding, held = np.flatnonzero(table.stroke != 0), np.flatnonzero(table.stroke == 0)
         if len(sliding):
             readings = make_sliding_rows(cable.description, table, rows, sliding)
             labels = tuple(_run_label(cable, table, int(run)) for run in np.unique(readings.run))
-            terms.append(RunsTerm(cable, sum_runs(cable, readings), labels, rows=readings))
+            noise = name_noise(table)
+            terms.append(RunsTerm(cable, sum_runs(cable, readings), labels, reading_noise=noise, rows=readings))
         if len(held):
             data = {name: rows[name][held] for name in ROW_ARRAYS} | {
                 "input_force": table.input_force[held],
                 "output_force": table.output_force[held],
+                "input_noise": noises[held, 0],
+                "output_noise": noises[held, 1],
             }
-            terms.append(HeldForcesTerm(cable, data, tuple(table.origin.describe_row(int(i)) for i in held)))
+            words = tuple(table.origin.describe_row(int(i)) for i in held)
+            terms.append(HeldForcesTerm(cable, data, words, reading_noise=name_noise(table)))
         return tuple(terms)
 
     @override
     def parameters(self, table: ForceTable, at: Circumstances) -> list[Parameter]:
         """Return scatter, noise and offsets; inside a run readings are normal, whatever the noise of mountings."""
-        return [declare_run_scatter(at), declare_force_noise(at), *declare_offsets(at)]
+        noise = declare_force_noise(at) if table.sd is None else _declare_noise_factor()
+        return [declare_run_scatter(at), noise, *declare_offsets(at)]
 
     @override
     def draw(self, table: ForceTable, truth: Truth) -> dict[str, Array]:
@@ -262,14 +286,14 @@ class ForceTerms(TermKind[ForceTable]):
         exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
         stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
         output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)
-        cells, noise, slides = LoadCells.of(values), scale * values[FORCE_NOISE], table.stroke != 0
-        of_weight = noise * cable.description.sensors.noise_ratio
-        read = cells.shown_input(force) + of_weight * jax.random.normal(of_input, force.shape)
+        cells, slides = LoadCells.of(values), table.stroke != 0
+        noises = scale * values[name_noise(table)] * table.noises(cable.description.sensors.noise_ratio).T
+        read = cells.shown_input(force) + noises[0] * jax.random.normal(of_input, force.shape)
         return {
             "input_force": jnp.where(slides, read, force),
             "output_force": jnp.where(
                 slides,
-                cells.shown_output(output) + noise * jax.random.normal(of_output, force.shape),
+                cells.shown_output(output) + noises[1] * jax.random.normal(of_output, force.shape),
                 table.output_force,
             ),
             "slipped": self._draw_slips(table, truth, jax.random.fold_in(truth.key, 5)),

@@ -81,7 +81,7 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
     file = guess_file_kind(path, bool(channels), tuple(named))
     if KINDS[file.kind].takes_channels and not file.other:
         return _describe_recording(path, file, channels, reading.get("missing", ()))
-    raw = MissingCodes(reading.get("missing", ())).mark(read_table(path))
+    raw = MissingCodes(tuple(reading.get("missing", ()))).mark(read_table(path))
     headings = {source.name: quantity.rpartition(".")[2] for quantity, source in named.items()}
     if file.other:
         backwards = _backward_clock(path)

@@ -6,10 +6,11 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from bowdenfit.cable.sensors import FORCE_NOISE, RUN_SCATTER, LoadCells
+from bowdenfit.cable.sensors import RUN_SCATTER, LoadCells
 from bowdenfit.inference.interval import NORMAL_90
 from bowdenfit.kinds.forces.mountings import group_numbers
 from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.kinds.forces.term import name_noise
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.plots.curves import choose_evenly, support
@@ -41,7 +42,7 @@ def collect_forces(fit: Record) -> ForcesData | None:
         _collect_forces_at_bend(table, rows, group == i, label, load, draws, i, i in shown) for i, label in enumerate(labels)
     ]
     fit_verdict = assess_fit(fit)
-    spread = _estimate_spread(fit, load, draws) if fit.sampled is not None else np.zeros(0)
+    spread = _estimate_spread(fit, table, load, draws) if fit.sampled is not None else np.zeros(0)
     count = len(table.run) if len(rows) < len(table.run) else 0
     reason = next(iter(fit_verdict.reasons), "")
     model = fit.dataset.description.friction_model
@@ -113,13 +114,14 @@ def _collect_forces_at_bend(
     return ForcesAtBend(label, force_in, force_out, stroke, off, apparent, *lines, np.rad2deg(bend))
 
 
-def _estimate_spread(fit: Record, load: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+def _estimate_spread(fit: Record, table: ForceTable, load: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return how far single readings scatter from the law, by their mountings and by the noise of the load cells."""
     values = {name: float(np.median(sampled)) for name, sampled in fit.draws().values.items()}
     fixed = {p.name: float(p.fixed or 0.0) for p in fit.model.space.fixed}
-    tau, noise = ((values | fixed)[name] for name in (RUN_SCATTER, FORCE_NOISE))
-    ratio, output = fit.dataset.description.sensors.noise_ratio, np.median(draws["law"][:, :, 0], axis=(0, 1))
-    return np.asarray(100 * NORMAL_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + 1 / output**2)))
+    tau, noise = ((values | fixed)[name] for name in (RUN_SCATTER, name_noise(table)))
+    ratio, share = np.median(table.noises(fit.dataset.description.sensors.noise_ratio), axis=0)
+    output = np.median(draws["law"][:, :, 0], axis=(0, 1))
+    return np.asarray(100 * NORMAL_90 * np.sqrt(tau**2 + noise**2 * (ratio**2 / load**2 + share**2 / output**2)))
 
 
 def collect_sampled_quantities(fit: Record, roles: tuple[str, ...] = ()) -> list[SampledQuantity]:

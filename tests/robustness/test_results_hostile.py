@@ -16,7 +16,7 @@ import bowdenfit as bf
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
 from bowdenfit.questions.fleet.store import PIECES_FOLDER
 from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
-from bowdenfit.results.netcdf import read_groups, write_groups
+from bowdenfit.results.netcdf import read_groups, read_groups_isolated, write_groups
 from bowdenfit.results.serialization import read_arrays
 
 pytestmark = pytest.mark.extended
@@ -70,6 +70,15 @@ def test_draws_lie_in_their_file_and_are_no_larger(tmp_path, way):
         way(file["posterior"], "mu", path)
     with pytest.raises(ValueError, match=r"lies in|larger than its file"):  # of which loading a fit makes a sentence
         read_groups(path)
+
+
+def test_draws_are_opened_in_a_process_of_their_own(tmp_path, monkeypatch):
+    """HDF5 goes in circles for ever over some damaged files, and only a process can be ended then."""
+    write_groups(tmp_path / "posterior.nc", {"posterior": {"mu": np.ones((2, 50))}}, {}, {}, {})
+    folder = begun_fleet(tmp_path / "fleet")
+    monkeypatch.setattr(h5py, "File", lambda *_: pytest.fail("opened here"))
+    assert list(read_groups_isolated(tmp_path / "posterior.nc")["posterior"]) == ["mu"]
+    assert set(read_fleet_draws(folder).values) == {"mu", "tau"}
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from bowdenfit.reading import read
     from bowdenfit.run.verb import fit
 
+    __version__: str
+
 _WHERE = {
     "Fit": "bowdenfit.finished_fit",
     "calibrate": "bowdenfit.questions.calibrate.verb",
@@ -103,6 +105,10 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
         """Load a public name when it is first used."""
         from importlib import import_module
 
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("bowdenfit")
         if name in _WHERE:
             return getattr(import_module(_WHERE[name]), name)
         raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}")

@@ -51,6 +51,10 @@ class Display:
         frame.attrs["units"] = dict(units)
         return frame
 
+    def to_dataframe(self) -> "DataFrame":
+        """Return the same as `to_frame`, by the name that it has elsewhere."""
+        return self.to_frame()
+
     def to_csv(self) -> str:
         """Return the table as CSV; units stand behind the names of the columns, or in a column where rows have their own."""
         rows, units = self._table()

@@ -26,10 +26,13 @@ from bowdenfit.questions.summary.verdict import Verdict, assess_fit, verdict_tex
 from bowdenfit.results.along_route import Efficiencies
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
-from bowdenfit.results.store import save
+from bowdenfit.results.store import make_data_tree, save
 from bowdenfit.words import listed
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import DataTree
+
     from bowdenfit.plots.layout import Figure
 import numpy as np
 
@@ -88,6 +91,23 @@ class Fit(Record):
     def groups(self) -> Groups | None:
         """Groups of readings that have coefficients of their own, with their contrasts; None without such, or without draws."""
         return contrast_groups(self)
+
+    @property
+    def idata(self) -> "DataTree":
+        """Draws, predictions and log-likelihoods as ArviZ takes them, with the groups and labels of posterior.nc.
+
+        Raises:
+            UsageError: The fit has no draws.
+        """
+        return make_data_tree(self)
+
+    def correlation(self) -> "DataFrame":
+        """Return the correlations of the draws of all parameters, as a square table.
+
+        Raises:
+            UsageError: The fit has no draws.
+        """
+        return self.posterior.to_frame()[[p.name for p in self.model.space.free]].corr()
 
     def summary(self) -> Summary:
         """Return everything on one page, for programs (the contents of summary.json)."""

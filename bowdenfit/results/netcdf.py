@@ -35,12 +35,28 @@ def write_groups(
 
     Args:
         path: The file.
+        groups, labels, attributes, variable_attributes: See `make_netcdf`.
+    """
+    contents = make_netcdf(groups, labels, attributes, variable_attributes)  # HDF5 does not survive a disk that is full
+    with replace_atomically(path) as temporary:
+        temporary.write_bytes(contents.getbuffer())
+
+
+def make_netcdf(
+    groups: Groups,
+    labels: Coordinates,
+    attributes: Mapping[str, str],
+    variable_attributes: Mapping[str, Mapping[str, str]],
+) -> io.BytesIO:
+    """Return the contents of posterior.nc, in memory.
+
+    Args:
         groups: Arrays by group and name; draws have chains first, then the draws of each, then readings.
         labels: Labels of the readings, by table.
         attributes: Attributes of the file.
         variable_attributes: Unit, symbol and meaning by variable.
     """
-    in_memory = io.BytesIO()  # HDF5 does not survive a disk that is full
+    in_memory = io.BytesIO()
     with h5netcdf.File(in_memory, "w") as file:
         file.attrs.update(attributes)
         for name, variables in groups.items():
@@ -49,8 +65,8 @@ def write_groups(
                 attached = variable_attributes.get(variable, {}) if name in ("posterior", "prior", DERIVED) else {}
                 of_readings = labels.get(variable.removeprefix(EXPECTED))
                 _write(group, _key(variable), np.asarray(values), of_readings, attached)
-    with replace_atomically(path) as temporary:
-        temporary.write_bytes(in_memory.getbuffer())
+    in_memory.seek(0)
+    return in_memory
 
 
 def _write(

@@ -100,6 +100,24 @@ def test_the_posterior_file_opens_in_arviz(saved):
         assert json.loads(tree.attrs["provenance"])["seed"] == fit.provenance.seed
 
 
+def test_a_fit_in_memory_gives_arviz_the_same_as_its_file(saved):
+    import xarray
+
+    fit, folder = saved
+    with xarray.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+        xarray.testing.assert_identical(fit.idata, tree.load())
+
+
+def test_correlations_are_those_of_the_draws(saved):
+    fit, _ = saved
+    table = fit.correlation()
+    names = [p.name for p in fit.model.space.free]
+    assert list(table.index) == list(table.columns) == names
+    draws = [fit.posterior.values[name].ravel() for name in ("mu1", "mu3")]
+    assert table.loc["mu1", "mu3"] == pytest.approx(np.corrcoef(*draws)[0, 1])
+    assert fit.to_dataframe().equals(fit.to_frame())
+
+
 def test_the_log_posterior_in_the_file_is_that_of_the_draws(saved):
     import jax
     import xarray

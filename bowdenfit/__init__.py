@@ -12,6 +12,7 @@ TYPE_CHECKING = False  # typing's, unloaded: until the command line listens, an 
 if TYPE_CHECKING:
     from typing import Any
 
+    from bowdenfit.cable_model import model
     from bowdenfit.errors import (
         BowdenfitError,
         ConvergenceError,
@@ -54,6 +55,7 @@ _WHERE = {
     "identify": "bowdenfit.questions.identify.verb",
     "load": "bowdenfit.finished_fit",
     "metabolic": "bowdenfit.questions.metabolic.verb",
+    "model": "bowdenfit.cable_model",
     "next_measurement": "bowdenfit.questions.next.verb",
     "plot": "bowdenfit.questions.summary.verb",
     "pool": "bowdenfit.questions.pool.verb",
@@ -87,6 +89,7 @@ __all__ = [
     "identify",
     "load",
     "metabolic",
+    "model",
     "next_measurement",
     "plot",
     "pool",

@@ -36,7 +36,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.descriptions import make_design, parse_description
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import why_implausible
 from bowdenfit.questions.fleet.fitting import SETTINGS
 from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet

@@ -43,7 +43,7 @@ from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable, Measurements
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.next.variance_reduction import explained_share, simulate_readings
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 from bowdenfit.results.along_route import make_optimizer

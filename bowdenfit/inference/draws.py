@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 BATCH = 1024  # draws that a compiled program takes at a time
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running

@@ -26,7 +26,7 @@ from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.kinds.plausibility import MOST_LEVELS
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 # Probability that a fit of a correct model is reported not to describe its readings; `tests/inference/test_lack_of_fit.py`.
 FALSE_ALARM = 0.003

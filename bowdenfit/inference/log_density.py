@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 
 @dataclass(frozen=True)

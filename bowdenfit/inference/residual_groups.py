@@ -9,7 +9,7 @@ import numpy as np
 from bowdenfit.kinds.covariates import RUN, Covariates
 from bowdenfit.kinds.sliding_rows import ORDER, STROKE, InsideRuns
 from bowdenfit.kinds.term import Term
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 _LEAST_FREEDOM = 0.5  # degrees of freedom below which the scatter of readings is not known
 _SINGULAR = 1e-8  # relative singular value, and size of a residual, that counts as zero

@@ -16,7 +16,7 @@ from bowdenfit.description import Description, Route
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.draws import DrawFunction, curves_at, for_each_draw
 from bowdenfit.inference.interval import Interval
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.results.optimal_length import OptimalLength, find_best_window, is_at_edge, rank_choices
 
 GRID_POINTS = 201  # an odd number, so that the middle is one; a judgement: curves of wrap angles are wider than many steps

@@ -18,7 +18,7 @@ from bowdenfit.kinds.kind import FrictionKind
 from bowdenfit.kinds.row_angles import ROUNDING, RowAngles, collect_row_angles, find_measured_angle, resolve_angles
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.words import listed
 
 MOST_LENGTHS = 10_000  # judged: a metre of cable by tenths of a millimetre; takes minutes

@@ -19,7 +19,7 @@ from bowdenfit.inference.draws import DrawFunction, derived_units, efficiency_at
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import LeastSquares
 from bowdenfit.inference.sampler_agreement import SamplerAgreement
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import (
     Efficiencies,
     RouteDraws,

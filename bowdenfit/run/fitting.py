@@ -24,7 +24,7 @@ from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.resources import refuse_shortage
 from bowdenfit.inference.sampler_agreement import SAMPLER_NAMES, SamplerDraws, compare_samplers
 from bowdenfit.inference.walkers import compile_walkers
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined

@@ -9,7 +9,7 @@ from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.inference.identifiability import UNINFORMED, analyze_covariance
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 _MOST_UNDETERMINED = 20  # judged: with fewer such combinations of coefficients a fit takes seconds, and says which they are
 _MOST_STATES, _MOST_DRAWS = 4 << 30, 8 << 30  # bytes; judged: far more than a fit by default settings takes

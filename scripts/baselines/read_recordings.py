@@ -71,7 +71,7 @@ def steps(folder: Path) -> dict[str, float]:
     start = time.perf_counter()
     import jax
 
-    from bowdenfit.model import build_model
+    from bowdenfit.models import build_model
 
     seconds["import JAX"] = time.perf_counter() - start
     start = time.perf_counter()

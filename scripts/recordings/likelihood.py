@@ -17,7 +17,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import load_description
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from recordings.simulated import SEED, Simulated
 from recordings.timing import milliseconds
 

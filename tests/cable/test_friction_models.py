@@ -15,7 +15,7 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.forces.term import HeldForcesTerm
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, play_operator, rate_factor
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
@@ -336,7 +336,7 @@ def test_readings_simulated_inside_the_band_are_inside_it_for_the_likelihood():
 @pytest.mark.parametrize("option", ["drag", "load-dependent"])
 def test_a_dependence_on_load_is_refused_where_no_load_was_measured(option, on_body):
     import bowdenfit as bf
-    from bowdenfit.model import build_model
+    from bowdenfit.models import build_model
 
     with pytest.raises(DescriptionError, match=f"{option}.*efficiencies alone say nothing about it"):
         build_model(bf.read(on_body, friction=option))

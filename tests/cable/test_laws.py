@@ -13,7 +13,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.tables import StretchTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.next.answer import choose_target
 from bowdenfit.questions.simulate.tables import draw_true_values

@@ -12,7 +12,7 @@ from elastic_cables import TRUTH, bench, elastic_cable
 from bowdenfit.cable.sensors import DELAY_ERROR, GAIN_ERROR, INPUT_OFFSET, OUTPUT_OFFSET, LoadCells
 from bowdenfit.dataset import Dataset
 from bowdenfit.kinds import KINDS
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 ERRORS = {INPUT_OFFSET: 0.7, OUTPUT_OFFSET: -0.4, GAIN_ERROR: 0.03, DELAY_ERROR: 0.002}
 LEAST_FORCE = 1e-3

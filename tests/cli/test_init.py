@@ -13,7 +13,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.errors import BowdenfitError, UsageError
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.start.describe import format_toml, write_description
 from bowdenfit.questions.start.folder import find_examples, new_folder
 from bowdenfit.questions.start.question import coefficient_name_question, quantity_question

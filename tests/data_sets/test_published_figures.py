@@ -18,7 +18,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.physics.geometry import log_quadratic_coefficients
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.units import conversion_factor

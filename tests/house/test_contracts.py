@@ -168,7 +168,7 @@ def test_every_public_name_is_documented():
 def test_inner_functions_refuse_32_bit_floats(on_body):
     from bowdenfit.dataset import load_dataset
     from bowdenfit.inference.log_density import LogDensity
-    from bowdenfit.model import build_model
+    from bowdenfit.models import build_model
 
     model = build_model(load_dataset(on_body))
     with jax.enable_x64(False), pytest.raises(RuntimeError, match="64-bit"):

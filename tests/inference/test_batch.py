@@ -15,7 +15,7 @@ from bowdenfit.inference import compilation
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS
 
 pytestmark = pytest.mark.extended

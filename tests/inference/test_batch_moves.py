@@ -25,7 +25,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.coordinates import Conditional, value_map
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.moves import fitted_t
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

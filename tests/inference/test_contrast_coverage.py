@@ -12,7 +12,7 @@ from scipy import stats
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import BatchFitter, replace_data
 
 pytestmark = pytest.mark.extended

@@ -11,7 +11,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.minimum import find_rivals, range_of_minima
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.descriptions import make_design, parse_description
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.bends.words import describe_products_with_preload
 from bowdenfit.questions.check.data_set_words import collect_warnings
 from bowdenfit.questions.summary.details import details_text

@@ -27,7 +27,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.tables import AngleTable, Measurements, StretchTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 pytestmark = pytest.mark.extended

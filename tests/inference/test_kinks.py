@@ -13,7 +13,7 @@ from bowdenfit.inference.minimum import find_lowest_minimum
 from bowdenfit.inference.objective import Problem, make_objective, sum_of_squares
 from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.inference.solver import QUICK
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.summary.details import details_text
 
 pytestmark = pytest.mark.extended

@@ -23,7 +23,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.sliding_rows import ORDER, STROKE
 from bowdenfit.kinds.tables import StretchTable
 from bowdenfit.kinds.term import LOAD, WRAP_ANGLE
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

@@ -13,7 +13,7 @@ from bowdenfit.inference.batch.laplace import StudentMixture, start_mixture
 from bowdenfit.inference.batch.programs import BatchPrograms
 from bowdenfit.inference.batch.weights import BLOCK, LearntProposal, MaximaProposal, ProposedPoints, learn_proposal
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, _compilation_key
 
 pytestmark = pytest.mark.extended

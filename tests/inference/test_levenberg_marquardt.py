@@ -15,7 +15,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.solver import minimize
 from bowdenfit.kinds.term import round_up_count
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 
 def _counted(evaluate):

@@ -13,7 +13,7 @@ from densities import draws, over_rows
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 
 
 def _models() -> dict[str, Model]:

@@ -15,7 +15,7 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.resources import linear_algebra_in_one_thread
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 FEW = ("sampler.n_ensembles=2", "sampler.n_walkers=32", "sampler.max_steps=200", "sampler.target_ess=100")
 

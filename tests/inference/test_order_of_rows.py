@@ -12,7 +12,7 @@ from densities import over_rows
 
 import bowdenfit as bf
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

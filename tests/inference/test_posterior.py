@@ -21,7 +21,7 @@ from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.store import posterior_page
 

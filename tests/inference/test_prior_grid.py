@@ -6,7 +6,7 @@ import numpy as np
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.coordinates import NODES, PriorGrid, make_prior_grid
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 DIMENSIONS = 5
 CHART = PriorGrid(DIMENSIONS, np.array([1, 4]), np.stack([np.exp(0.5 * NODES), np.sinh(NODES)], axis=1))

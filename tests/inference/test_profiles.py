@@ -17,7 +17,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Objective, make_objective
 from bowdenfit.inference.profiles import compute_profile, find_crossing, find_interval_ends, satterthwaite_freedom
 from bowdenfit.inference.solver import minimize, orthogonalize
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

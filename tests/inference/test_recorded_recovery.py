@@ -28,7 +28,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.kinds.recordings.reader import RecordingsTable, _File, _make_recording, _prepare_files
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,
     BenchSettings,

@@ -16,7 +16,7 @@ from slow_cases import some_slow
 
 import bowdenfit as bf
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.summary.verdict import NOT_DESCRIBED
 
 DATASETS = Path(__file__).parents[2] / "datasets"

@@ -11,7 +11,7 @@ from hand_bench import BENDS, Readings, pull, write
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

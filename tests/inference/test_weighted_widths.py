@@ -9,7 +9,7 @@ from bowdenfit.description import PriorDefaults, SamplerSettings
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchSettings
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

@@ -14,7 +14,7 @@ from bowdenfit.kinds.recordings.term import make_recordings_term, replace_forces
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.recordings.preparation.hysteresis import play, smooth_input
 from bowdenfit.recordings.recording import Recordings
 

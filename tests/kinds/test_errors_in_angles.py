@@ -20,7 +20,7 @@ from bowdenfit.inference.least_squares import LeastSquares, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 pytestmark = pytest.mark.extended
 

@@ -10,7 +10,7 @@ from hand_bench import Readings, pull, write
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.sliding_rows import expected_forces
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 EFFICIENCY, ROWS = 0.6, 200_000
 LOADS = {"one load": (50.0,), "three loads": (35.0, 50.0, 80.0), "six loads": tuple(np.linspace(30.0, 90.0, 6))}

@@ -9,7 +9,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 TRUE = {"new rope": 0.1, "old": 0.2}
 BY_GROUP = 'friction_model = "by-group"\n'

@@ -20,7 +20,7 @@ from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.tables import Measurements
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 
 VALUES = {"mu": 0.15, "tau": 0.03, "sigma_F": 0.7}
 

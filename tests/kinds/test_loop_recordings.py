@@ -13,7 +13,7 @@ from scipy import integrate, stats
 from bowdenfit.cable.drive import LoopDrive
 from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.recordings.whole_recordings import LoopRecordingsTerm
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.recordings.loop_strokes import loop_limits
 
 pytestmark = pytest.mark.extended

@@ -11,7 +11,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.covariates import route_values
 from bowdenfit.kinds.forces.table import ForceTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 ALONG = {"lengths": (LENGTHS, "cable_length_mm"), "bends": (BENDS, "wrap_angle_deg")}
 

@@ -12,7 +12,7 @@ import bowdenfit
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import round_up_count
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.tables import resimulate
 
 pytestmark = pytest.mark.extended

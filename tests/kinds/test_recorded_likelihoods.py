@@ -25,7 +25,7 @@ from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.sliding_rows import SlidingRows
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import make_measured_cable
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.physics.friction import rate_factor
 from bowdenfit.questions.simulate.bench import (
     BenchFriction,

@@ -12,7 +12,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.kinds.recordings.term import make_recordings_term, number_shared_errors, replace_forces
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recordings
 

@@ -13,7 +13,7 @@ from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.least_squares import find_maximum_posterior
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS
 
 pytestmark = pytest.mark.extended

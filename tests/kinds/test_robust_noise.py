@@ -22,7 +22,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import Measurements, PreloadTable
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.physics.distributions import (
     log_student_cdf,
     log_student_density,

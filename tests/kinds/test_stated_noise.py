@@ -14,7 +14,7 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.runs import RunsTerm
 from bowdenfit.kinds.term import Truth
 from bowdenfit.kinds.terms import TERMS
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 HEAD = "wrap_angle_deg,run,stroke,input_force_N,output_force_N"
 SDS = ",input_force_sd_N,output_force_sd_N"

@@ -10,7 +10,7 @@ from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.kind import FrictionKind, Kind, PlannedKind, RopeKind
 from bowdenfit.kinds.term import TermKind
 from bowdenfit.kinds.terms import TERMS
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 READINGS = [(name, readings) for name, kind in KINDS.items() for readings in kind.readings]
 

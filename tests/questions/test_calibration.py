@@ -30,7 +30,7 @@ from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.recordings.term import refuse_saturated
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.kinds.terms import draw_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.questions.calibrate import coverage_figure, ranks_figure, sharpness_figure
 from bowdenfit.questions.calibrate.answer import Calibration, QuantityLabel

@@ -29,7 +29,7 @@ from bowdenfit.inference.prior_sensitivity import (
 )
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import AngleTable, StretchTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.questions.check import answer as check_answer

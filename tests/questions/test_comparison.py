@@ -24,7 +24,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.psis import Affine, find_best_map, match_moments, reliable_k
 from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.compare import comparison_figure
 from bowdenfit.questions.compare.answer import Comparison
 from bowdenfit.questions.compare.common_readings import CommonReadings, OmittedReadings, match_events

@@ -22,7 +22,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.kinds import KINDS
 from bowdenfit.kinds.tables import LoopTable
 from bowdenfit.kinds.terms import draw_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.physics.loop import loop_output_force
 from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.questions.figures import collect_figure_data

@@ -14,7 +14,7 @@ from slow_cases import some_slow
 import bowdenfit as bf
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import output_force_at
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
 from bowdenfit.reading import read
 

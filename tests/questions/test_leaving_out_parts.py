@@ -18,7 +18,7 @@ from bowdenfit.inference.leave_one_out import LooDensity
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.run_parts import split_runs
 from bowdenfit.kinds.runs import sum_runs
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.compare.words import comparison_text
 
 pytestmark = pytest.mark.extended

@@ -30,7 +30,7 @@ from bowdenfit.kinds.forces.next_run import typical_run
 from bowdenfit.kinds.kind import Design
 from bowdenfit.kinds.rows import OwnAngles, RowOrigin
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.next import verb
 from bowdenfit.questions.next.candidates import describe_candidate, format_candidate, list_candidates, parse_candidates
 from bowdenfit.questions.next.ranking import rank_measurements

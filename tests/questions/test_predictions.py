@@ -13,7 +13,7 @@ from bowdenfit.dataset import load_dataset
 from bowdenfit.inference import draws
 from bowdenfit.inference.draws import compile_replicator, efficiency_at, for_each_draw, for_each_value, value_function
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import make_optimizer, route_grid
 from bowdenfit.results.optimal_length import find_best_window, is_at_edge, rank_choices
 

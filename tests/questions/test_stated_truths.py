@@ -7,7 +7,7 @@ from conftest import ROOT
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import UsageError
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate import rank_tests
 from bowdenfit.questions.calibrate.answer import QuantityLabel
 from bowdenfit.questions.calibrate.plan import StatedTruth, parse_truths, read_truths

@@ -10,7 +10,7 @@ from loop_benches import HALF_TURN, PRELOAD, RATE, folder_of, motor, output_of, 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.description import Phase
 from bowdenfit.errors import DatasetError, DescriptionError
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.recordings.loop_strokes import LoopStrokes
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.recordings.strokes import find_strokes

@@ -500,7 +500,7 @@ def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
     """The blocks of one recording are all taken for flagged, as a wrong tare makes them."""
     import jax
 
-    from bowdenfit.model import build_model
+    from bowdenfit.models import build_model
 
     folder = on_body.parent / "synthetic-recordings"
     data = load_dataset(folder, [f'tables.recordings.likelihood="{likelihood}"'])

@@ -8,7 +8,7 @@ import pytest
 
 import bowdenfit as bf
 from bowdenfit.inference.least_squares import MaximumPosterior
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 
 CONTACT = '[[contact]]\nname = "c{0}"\nfriction = "mu{0}"\nwrap_angle = {{ value = 1{0}, unit = "deg" }}\n'

@@ -9,7 +9,7 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.kinds.kind import Design
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 ROUTE = {"variable": "cable_length", "unit": "mm", "range": [400, 600]}

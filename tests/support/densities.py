@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from bowdenfit.inference.compilation import compile_program
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 
 
 def over_rows(function, z: np.ndarray, data):

@@ -7,7 +7,7 @@ import jax
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description
 from bowdenfit.kinds.descriptions import make_design, parse_description
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
 
 HOUSING: dict[str, Any] = {

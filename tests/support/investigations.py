@@ -9,7 +9,7 @@ from laboratories import Laboratory
 import bowdenfit as bf
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
 from bowdenfit.questions.calibrate.replicator import replace_data
 from bowdenfit.results.along_route import make_optimizer

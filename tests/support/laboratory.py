@@ -18,7 +18,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.kind import Design
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
 from bowdenfit.questions.calibrate.replicator import CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.tables import empty_tables

@@ -11,7 +11,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import draw_readings, iterate_replaced_tables
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 
 
 def measured_again(folder: Path, count: int, changes: list[str] | None = None, **values: float) -> Iterator[Dataset]:

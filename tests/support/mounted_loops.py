@@ -6,7 +6,7 @@ import numpy as np
 from bowdenfit.dataset import load_dataset
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.log_density import LogDensity
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import RANK_SETTINGS, replace_data
 from bowdenfit.results.record import Draws, Provenance, Record
 

@@ -24,7 +24,7 @@ from bowdenfit.inference.draws import derived_units, shown_values
 from bowdenfit.inference.engines import refuse_other_versions
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import Term
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from bowdenfit.cable.elasticity import LENGTHENING, PRELOAD, STIFFNESS, STRETCH_FRICTION, Elasticity
 from bowdenfit.errors import UsageError
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.physics.loop import (
     Rope,
     free_motion_loss,

@@ -25,7 +25,7 @@ from bowdenfit.inference.scalar_priors import value_at, z_at
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.terms import iterate_term_kinds
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.questions.calibrate.answer import QuantityLabel
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH

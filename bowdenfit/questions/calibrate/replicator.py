@@ -33,7 +33,7 @@ from bowdenfit.inference.scalar_priors import z_at
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import Readings, any_slipped, draw_readings, iterate_replaced_tables
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.calibrate.plan import CalibrationPlan
 from bowdenfit.questions.calibrate.replications import RankedTruth, Replication, rank_truth
 from bowdenfit.results.along_route import make_optimizer

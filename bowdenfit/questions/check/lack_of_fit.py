@@ -23,7 +23,7 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import GROUP, LOAD, WRAP_ANGLE
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.parameters.priors import Normal
 from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.results.record import Record, cached_per_fit

@@ -14,7 +14,7 @@ from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.covariates import collect_covariates
 from bowdenfit.kinds.term import Term
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.questions.check import prior_figure
 from bowdenfit.questions.check.answer import collect_readings
 from bowdenfit.questions.check.prior_figure import PriorPredictive, PriorTable

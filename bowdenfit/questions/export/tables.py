@@ -16,7 +16,7 @@ from bowdenfit.cable.drive import LEAST_EXPONENT
 from bowdenfit.cable.friction import DRAG, LOAD_EXPONENT, STRIBECK, STRIBECK_SPEED, VISCOUS, FrictionModel
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.physics.friction import force_scale
 from bowdenfit.questions.bends.answer import elastic_answers
 from bowdenfit.questions.bends.bent_cable import BentCable, find_bent_contact, has_stretch

@@ -22,7 +22,7 @@ from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.engines import JOBS_FOLDER, Engine, installed_versions, open_engine
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.resources import keep_compiled_programs
-from bowdenfit.model import Model, build_model
+from bowdenfit.models import Model, build_model
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
 from bowdenfit.questions.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable

@@ -12,7 +12,7 @@ from bowdenfit.inference.identifiability import PRIOR_DOMINATED, Combination, Co
 from bowdenfit.inference.least_squares import UNDETERMINED, MaximumPosterior
 from bowdenfit.inference.profiles import Profile
 from bowdenfit.inference.scalar_priors import value_at
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.questions.identify.answer import GROUPS, Identifiability, describe_precision
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.words import listed, significant

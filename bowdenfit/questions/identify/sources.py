@@ -17,7 +17,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.profiles import compute_profile
 from bowdenfit.inference.scalar_priors import value_at
 from bowdenfit.inputs import read_toml_file
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.identify.judgment import assess_identifiability, identifiability_at_maximum
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, read_bench, simulate_design

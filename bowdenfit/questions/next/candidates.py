@@ -13,7 +13,7 @@ from bowdenfit.kinds.candidate import STROKE_WORDS, Candidate, CandidateKind, Si
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.term import Term
 from bowdenfit.kinds.terms import candidate_kinds, find_term_kind
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, dimension_of, route_conversion_factor
 from bowdenfit.words import listed, significant

@@ -25,7 +25,7 @@ from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.kinds.terms import candidate_kinds
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.questions.next.candidates import build_situation
 
 GROUPS = 64  # of draws: what is learned on all but one is judged on that one; a judgement

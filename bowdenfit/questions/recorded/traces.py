@@ -21,7 +21,7 @@ from bowdenfit.kinds.recordings.blocks import RECORDED, pad_columns
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.model import Model
+from bowdenfit.models import Model
 from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recording, Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values, thinned_parameter_values

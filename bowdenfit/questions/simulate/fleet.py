@@ -23,7 +23,7 @@ from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.kinds.terms import draw_readings, replace_table_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.simulate.tables import (
     TRUTH_FILE,

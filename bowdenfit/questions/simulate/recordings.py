@@ -19,7 +19,7 @@ from bowdenfit.cable.sensors import FORCE_NOISE, GAIN_ERROR, INPUT_OFFSET, OUTPU
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.descriptions import design_without_recordings
 from bowdenfit.kinds.tables import AngleSettings, AngleTable, Measurements
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.questions.simulate.bench import SimulatedRecording, simulate_recording
 from bowdenfit.questions.simulate.recordings_plan import (
     RPM,

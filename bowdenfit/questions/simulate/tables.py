@@ -28,7 +28,7 @@ from bowdenfit.kinds.kind import Design, PlannedKind
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Truth
 from bowdenfit.kinds.terms import Readings, draw_readings, replace_table_readings
-from bowdenfit.model import build_model
+from bowdenfit.models import build_model
 from bowdenfit.outputs import write_text
 from bowdenfit.results.folder import fill_folder_atomically
 from bowdenfit.words import shown

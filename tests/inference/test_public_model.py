@@ -1,0 +1,116 @@
+"""`bf.model`: the same density, predictions and priors as a fit has, as functions that JAX differentiates and vectorizes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.inference.log_density import LogDensity
+
+TABLE = "wrap_angle_deg,input_force_N,output_force_N\n" + "".join(
+    f"{angle},{force},{force * np.exp(-0.12 * np.deg2rad(angle)) * (1 + 0.01 * wave):.4f}\n"
+    for angle, force, wave in zip(np.repeat([45, 90, 180], 3), np.tile([20, 40, 60], 3), np.cos(np.arange(9.0)), strict=True)
+)
+
+
+@pytest.fixture(autouse=True)
+def _in_64_bits():
+    with jax.enable_x64(True):
+        yield
+
+
+@pytest.fixture(scope="module")
+def model(on_body):
+    with jax.enable_x64(True):
+        return bf.model(on_body)
+
+
+@pytest.fixture(scope="module")
+def z(model):
+    return jnp.asarray(0.3 * np.random.default_rng(1).standard_normal(len(model.names)))
+
+
+def test_the_density_is_that_of_a_fit_and_the_sum_of_its_parts(model, z):
+    parameters = model.constrain(z)
+    density = LogDensity(model._model)
+    assert float(model.log_density(z)) == pytest.approx(float(density.log_density(z, density.data)), rel=1e-12)
+    # The density of the parameters is that of z times the slope of z, which is one over what log_prior divides by.
+    slope = jax.jacfwd(lambda at: jnp.stack(list(model.constrain(at).values())))(z)
+    volume = jnp.log(jnp.abs(jnp.linalg.det(slope)))
+    parts = model.log_likelihood(parameters) + model.log_prior(parameters) + volume
+    assert float(parts) == pytest.approx(float(model.log_density(z)), rel=1e-9)
+    np.testing.assert_allclose(model.unconstrain(parameters), z, atol=1e-9)
+
+
+def test_a_prior_in_its_units_integrates_to_one(tmp_path):
+    (tmp_path / "t.csv").write_text(TABLE)
+    model = bf.model(tmp_path / "t.csv", settings=["prior.tau.fixed=0.01", "prior.sigma_F.fixed=0.2"])
+    assert model.names == ("mu",)
+    grid = jnp.exp(jnp.linspace(-14.0, 9.0, 4001))
+    density = jnp.exp(jax.vmap(lambda mu: model.log_prior({"mu": mu}))(grid))
+    assert float(jnp.trapezoid(density, grid)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_gradients_are_differences_and_functions_are_vectorized(model, z):
+    gradient, step = jax.grad(model.log_density)(z), 1e-6
+    for i in range(len(z)):
+        up, down = (float(model.log_density(z.at[i].add(sign * step))) for sign in (1, -1))
+        assert float(gradient[i]) == pytest.approx((up - down) / (2 * step), rel=1e-4, abs=1e-5)
+    hessian = jax.hessian(model.log_density)(z)
+    np.testing.assert_allclose(hessian, hessian.T, rtol=1e-8, atol=1e-8)
+    many = jnp.stack([z, z + 0.1])
+    assert jax.jit(jax.vmap(model.log_density))(many).shape == (2,)
+    assert jax.vmap(lambda at: model.efficiency(model.constrain(at), [440.0, 470.0]))(many).shape == (2, 2)
+
+
+def test_readings_expectations_and_residuals_belong_together(model, z):
+    parameters = model.constrain(z)
+    assert {name: part.shape for name, part in model.expected(parameters).items()} == {
+        name: part.shape for name, part in model.readings.items()
+    }
+    assert np.isfinite(model.residuals(parameters)).all()
+
+
+def test_least_squares_of_ones_own_finds_the_coefficient(tmp_path):
+    from scipy.optimize import least_squares
+
+    (tmp_path / "t.csv").write_text(TABLE)
+    model = bf.model(tmp_path / "t.csv", settings=["prior.tau.fixed=0.01", "prior.sigma_F.fixed=0.2"])
+    solution = least_squares(lambda at: np.asarray(model.residuals({"mu": at[0]})), [0.3])
+    fit = bf.fit(tmp_path / "t.csv", mcmc=False, settings=["prior.tau.fixed=0.01", "prior.sigma_F.fixed=0.2"])
+    assert solution.x[0] == pytest.approx(fit.least_squares.estimates["mu"].value, rel=1e-4)
+
+
+def test_what_cannot_be_is_refused_in_sentences(model, tmp_path):
+    with pytest.raises(bf.UsageError, match=r"there is no free parameter mu_1.*did you mean 'mu1'"):
+        model.log_prior({"mu_1": 0.1})
+    with pytest.raises(bf.UsageError, match="missing; the free parameters are mu1"):
+        model.expected({})
+    (tmp_path / "t.csv").write_text(TABLE)
+    with pytest.raises(bf.UsageError, match="has no route"):
+        lone = bf.model(tmp_path / "t.csv")
+        lone.efficiency(lone.constrain(jnp.zeros(len(lone.names))), 450.0)
+    with jax.enable_x64(False), pytest.raises(bf.UsageError, match="jax_enable_x64"):
+        bf.model(tmp_path / "t.csv")
+
+
+@pytest.mark.extended
+def test_a_sampler_of_ones_own_agrees_with_the_fit(tmp_path):
+    """Metropolis steps by NumPy. With some 2000 effective draws of each, medians differ by 0.05 sd; five times that fails."""
+    (tmp_path / "t.csv").write_text(TABLE)
+    model = bf.model(tmp_path / "t.csv")
+    density, rng = jax.jit(jax.vmap(model.log_density)), np.random.default_rng(5)
+    z = 0.1 * rng.standard_normal((400, len(model.names)))
+    at, kept = np.asarray(density(z)), []
+    for step in range(3000):
+        moved = z + rng.choice([0.1, 0.4, 1.2]) * rng.standard_normal(z.shape)
+        there = np.asarray(density(moved))
+        accepted = np.log(rng.random(len(z))) < there - at
+        z, at = np.where(accepted[:, None], moved, z), np.where(accepted, there, at)
+        if step >= 1500 and step % 15 == 0:
+            kept.append(z)
+    mu = np.asarray(jax.vmap(model.constrain)(jnp.asarray(np.concatenate(kept)))["mu"])
+    interval = bf.fit(tmp_path / "t.csv", seed=2).parameter("mu")
+    assert np.median(mu) == pytest.approx(interval.median, abs=0.25 * interval.sd)
+    assert np.quantile(mu, 0.05) == pytest.approx(interval.q05, abs=0.5 * interval.sd)

@@ -2,6 +2,7 @@
 
 import glob
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from bowdenfit.kinds.descriptions import (
     order_groups,
     parse_description,
 )
-from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind
+from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind, require_recordings
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.named_channels import parse_channels
@@ -69,6 +70,7 @@ def load_folder_or_file(
     missing: Sequence[str],
     wrap_angle: tuple[float, str] | None,
     reading_limit: float,
+    join: Path | None = None,
 ) -> Dataset:
     """Read a folder with `cable.toml`, the `cable.toml` itself, or a lone table or recording.
 
@@ -80,15 +82,23 @@ def load_folder_or_file(
         missing: Missing-value codes, such as "-9999".
         wrap_angle: The angle of a lone file and its unit; None where its rows have their own.
         reading_limit: So many times the usual memory and time may be taken to read a binary file.
+        join: File of a second logger with the output force.
 
     Raises:
         DescriptionError, DatasetError: What is wrong, in a sentence.
     """
     refuse_special(path)
     channel_sources, column_sources = parse_channels(channels), parse_sources(columns, "--column")
+    if join is not None and not is_lone_file(path):
+        raise DescriptionError(
+            f"--join joins {join.name} to a single file, and {path} is none; in cable.toml write output_file = "
+            f'"{join.name}" below the file of the [[recording]] with the input force.'
+        )
     with limits_times(reading_limit):
         if wrap_angle is not None or is_lone_file(path):
-            return single_file_dataset(path, wrap_angle, overrides, channel_sources, column_sources, missing=missing)
+            return single_file_dataset(
+                path, wrap_angle, overrides, channel_sources, column_sources, missing=missing, join=join
+            )
         return load_dataset(path, overrides, channel_sources, column_sources, missing)
 
 
@@ -135,6 +145,7 @@ def single_file_dataset(
     columns: Mapping[str, ColumnSource] | None = None,
     kind: str = "",
     missing: Sequence[str] = (),
+    join: Path | None = None,
 ) -> Dataset:
     """Read a data set that is one table or recording of a cable with one contact.
 
@@ -146,10 +157,14 @@ def single_file_dataset(
         columns: Columns of a table named there.
         kind: Name of the kind of measurement; by the file if omitted.
         missing: Missing-value codes stated there.
+        join: File of a second logger with the output force, where the first has the input force alone.
 
     Raises:
         DescriptionError, DatasetError: The angle, a setting or the file is wrong.
     """
+    if join is not None:
+        require_recordings((path, join), bool(channels), tuple(columns or ()))
+        kind = "recordings"
     kind = kind or require_one_kind(path, bool(channels), tuple(columns or ()))
     if has_own_angles(path, kind, tuple(columns or ()), wrap_angle is not None):
         angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
@@ -166,6 +181,9 @@ def single_file_dataset(
         "contact": [{"name": "cable", "friction": "mu", "wrap_angle": angle}],
         "tables": {kind: {"files": glob.escape(path.name)}},
     }
+    if join is not None:
+        recording = {"file": path.name, "output_file": Path(os.path.relpath(join, path.parent)).as_posix()}
+        raw |= {"tables": {kind: {}}, "recording": [recording]}
     described = add_missing_codes(add_columns(override(raw, overrides), columns or {}), missing)
     return read_dataset(parse_description(described, "--wrap-angle"), path.parent, {}, channels)
 

@@ -50,6 +50,7 @@ class Reading(TypedDict, total=False):
             the on-body paper has them.
         undetected: How angles too small to detect enter.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
+        join: File of a second logger with the output force, where the file of the data set has the input force alone.
         reading_limit: So many times the memory and time that are usual for a binary file of its size may be taken to read it.
     """
 
@@ -66,6 +67,7 @@ class Reading(TypedDict, total=False):
         Literal["censored", "zero", "dropped"] | None, Parameter(show_default="as in cable.toml, else censored")
     ]
     wrap_angle: Annotated[Quantity | None, Parameter(metavar="ANGLE"), number_with_unit("180deg")]
+    join: Annotated["str | Path | None", Parameter(metavar="FILE"), PATH]
     reading_limit: Annotated[int | None, Parameter(metavar="TIMES", show_default="1"), whole_number(1, 1000)]
 
 
@@ -112,7 +114,16 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
         reading.get("missing", ()),
         as_pair(reading.get("wrap_angle")),
         reading.get("reading_limit") or 1,
+        _joined_path(reading),
     )
+
+
+def _joined_path(reading: Reading) -> Path | None:
+    """Return the file of a second logger."""
+    join = reading.get("join")
+    if join is not None and not isinstance(join, str | PathLike):
+        raise UsageError(f"join is a {type(join).__name__}; name the file of the second logger, such as join=\"output.csv\".")
+    return None if join is None else Path(join)
 
 
 def changed_settings(reading: Reading) -> list[str]:

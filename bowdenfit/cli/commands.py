@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from inspect import Parameter as Stated
@@ -118,7 +118,8 @@ def describe_error(error: CycloptsError) -> str:
     """Return what to say of a command that cannot be understood."""
     see = f"See {' '.join(['bowdenfit', *(error.command_chain or ())])} --help."
     if isinstance(error, UnusedCliTokensError):
-        return f"Unexpected argument {listed(error.unused_tokens or [])}. {see}"
+        extra = error.unused_tokens or []
+        return f"Unexpected argument {listed(extra)}. {_suggest_join(error.command_chain or (), extra)}{see}"
     if isinstance(error, RepeatArgumentError):
         return f"{error.token.keyword} is given twice, and only one can count; leave one out. {see}"
     if isinstance(error, MissingArgumentError) and error.argument is not None and error.argument.index is not None:
@@ -126,6 +127,13 @@ def describe_error(error: CycloptsError) -> str:
         dots, many = ("...", "some") if get_origin(error.argument.hint) is tuple else ("", "one")
         return f"Missing argument '{name}{dots}'. Name {many}, {words[:1].lower()}{words[1:]}"
     return f"{error} {see}"
+
+
+def _suggest_join(command: Sequence[str], extra: Sequence[str]) -> str:
+    """Return how a second file is joined, where a command that reads recordings was given one; else empty."""
+    if not {"check", "fit"} & {*command} or len(extra) != 1 or not Path(extra[0]).is_file():
+        return ""
+    return f"If a second logger recorded the output force in it, join it: --join {extra[0]}. "
 
 
 def _run(verb: Verb, options: dict[str, Any], form: str) -> int:

@@ -113,10 +113,13 @@ class Phase(Frozen):
 class RecordingFile(Frozen):
     """One recording: its file, what it was made at, and what its channels are called.
 
-    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }.
+    `where` picks the rows of a file that holds several recordings one below the other, such as { run = 3 }. The file of
+    a second logger with the output force is `output_file`; `clock_shift` is added to its times, so that both clocks agree.
     """
 
     file: str
+    output_file: str | None = None
+    clock_shift: Literal["estimated"] | QuantityValue | None = None
     name: Name | None = None
     run: Name | None = None
     at: Finite | None = None
@@ -131,4 +134,13 @@ class RecordingFile(Frozen):
     def _named(self) -> "RecordingFile":
         if not self.file:
             raise ValueError('the name of the file is empty; write file = "name.csv"')
+        if self.output_file == "":
+            raise ValueError('the name of the output_file is empty; write output_file = "name.csv", or leave it out')
+        if self.output_file == self.file:
+            raise ValueError("output_file is the same as file; leave it out where one file has both forces")
+        if self.clock_shift is not None and self.output_file is None:
+            raise ValueError(
+                'clock_shift is the shift between the clocks of two files; name the second, output_file = "name.csv", or state '
+                "how much later the output channel is by prepare = { delay = ... }"
+            )
         return self

@@ -38,6 +38,8 @@ class Channel:
         values: Samples, NaN where a sample is missing; in the unit of the file.
         time: Time of each sample [s], where the file has a clock for this channel; else None.
         clock: Name of the channel or setting that the time comes from; empty without one.
+        start: Unix time at which `time` is 0, or a clock's `values` are [s]; since midnight where a clock has times of day;
+            None where the file does not date the samples.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Channel:
     values: Vector
     time: Vector | None = None
     clock: str = ""
+    start: float | None = None
 
     @property
     def rate(self) -> float:

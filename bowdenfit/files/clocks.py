@@ -37,8 +37,9 @@ _EPOCH_UNITS = (
     (1e14, 1e-6),
     (1e11, 1e-3),
 )  # no recording lasts 3000 years: these are dates in ns, us, ms
-_YEARS = 1e8  # [s], three years: no recording lasts so long, so such numbers are dates
+YEARS = 1e8  # [s], three years: no recording lasts so long, so such numbers are dates
 _HALF_DAY, _DAY = 43200.0, 86400.0
+_COUNTED_FROM_ZERO = 60.0  # [s]; judged: nobody starts a bench in the first minute after midnight
 _DATE = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?(?:[ T].*)?|\d\d?[./-]\d\d?[./-]\d{4}(?: .*)?")
 _HALF = r"(?P<half>[AaPp])\.?\s?[Mm]\.?"  # AM or PM
 _TIME_OF_DAY = re.compile(rf"\d{{1,3}}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:\s*{_HALF})?")
@@ -84,7 +85,7 @@ def assign_clocks(
     """
     own = [next(iter(groups(channel.name)), "") for channel in channels]
     clocks = [i for i, c in enumerate(channels) if is_clock(replace(c, name=c.name.removeprefix(own[i])))]
-    seconds = {i: clock_seconds(channels[i]) for i in clocks}
+    seconds = {i: dated_seconds(channels[i]) for i in clocks}
 
     def timed(position: int, channel: Channel) -> Channel:
         if channel.time is not None or position in clocks:
@@ -94,7 +95,8 @@ def assign_clocks(
         nearest = max((i for i in fitting if i < position), default=fitting[0] if fitting else None)
         if nearest is None:
             return channel
-        return replace(channel, time=seconds[nearest], clock=channels[nearest].name)
+        time, start = seconds[nearest]
+        return replace(channel, time=time, clock=channels[nearest].name, start=start)
 
     return tuple(timed(i, channel) for i, channel in enumerate(channels))
 
@@ -113,11 +115,11 @@ def assign_only_clock(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     clocks = [c for c in channels if is_clock(replace(c, name=c.name.removeprefix(_group(c.name))))]
     if len(clocks) != 1:
         return tuple(channels)
-    (clock,), seconds = clocks, clock_seconds(clocks[0])
+    (clock,), (seconds, start) = clocks, dated_seconds(clocks[0])
     return tuple(
         channel
         if channel is clock or channel.time is not None or len(channel.values) != len(seconds)
-        else replace(channel, time=seconds, clock=clock.name)
+        else replace(channel, time=seconds, clock=clock.name, start=start)
         for channel in channels
     )
 
@@ -166,17 +168,17 @@ def names_time(heading: str) -> bool:
     return bool(ends & _TIME_WORDS) or named == ["t"] or plain == _LABVIEW
 
 
-def clock_seconds(clock: Channel) -> Vector:
-    """Return the times that a clock shows, from its first where they can only be dates [s]."""
+def dated_seconds(clock: Channel) -> tuple[Vector, float | None]:
+    """Return the times that a clock shows, from its first where they can only be dates [s]; and its `Channel.start`."""
     finite = np.isfinite(clock.values)
     lowest, highest = (float(end(clock.values, where=finite, initial=0.0)) for end in (np.min, np.max))
     largest = max(-lowest, highest)
     factor = _time_factor(clock.unit)
     if factor is None:
         factor = next((factor for bound, factor in _EPOCH_UNITS if largest > bound), 1.0)
-    if largest * factor > _YEARS:
-        return _subtract_first(clock.values) * factor
-    return clock.values if factor == 1 else clock.values * factor
+    if largest * factor > YEARS:
+        return _subtract_first(clock.values) * factor, float(clock.values[finite][0]) * factor
+    return clock.values if factor == 1 else clock.values * factor, clock.start
 
 
 def _time_factor(unit: str) -> float | None:
@@ -213,8 +215,8 @@ def is_date(text: str) -> bool:
     return bool(_DATE.fullmatch(text) or _TIME_OF_DAY.fullmatch(text))
 
 
-def parse_dates(texts: Iterable[str], source: str) -> Vector:
-    """Return seconds from the first of some dates; a time of day may pass midnight.
+def parse_dates(texts: Iterable[str], source: str) -> tuple[Vector, float | None]:
+    """Return seconds from the first of some dates, and the `Channel.start` of it; a time of day may pass midnight.
 
     Args:
         texts: Dates such as "2021-02-04 14:52:00.120", "04.02.2021 14:52:00,120", "14:52:00.120" or "2:52:00.120 PM"; blank
@@ -231,14 +233,16 @@ def parse_dates(texts: Iterable[str], source: str) -> Vector:
     first = str(next((text for text in written if text), ""))
     try:
         if _TIME_OF_DAY.fullmatch(first):
-            return _subtract_first(_unwrap_midnight(_times_of_day(written)))
+            times = _unwrap_midnight(_times_of_day(written))
+            return _subtract_first(times), _start_of_day_times(times)
         form = "ISO8601" if re.match(r"\d{4}-\d\d-\d\d", first) and first[-1:] not in {*"Mm"} else "mixed"
         dates = pandas.to_datetime(written, format=form, dayfirst="." in first[:3], utc=True)
     except ValueError as error:
         raise DatasetError(
             f"{source}: a cell is not a date or time like the others ({error}); correct it, or write the time in seconds."
         ) from None
-    return _subtract_first((dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy(dtype=float))
+    origin = dates.dropna().iloc[0]
+    return _subtract_first((dates - origin).dt.total_seconds().to_numpy(dtype=float)), origin.timestamp()
 
 
 def _times_of_day(texts: Iterable[str | None]) -> Vector:
@@ -266,6 +270,12 @@ def _unwrap_midnight(seconds: Vector) -> Vector:
     """Return times of day that go on rising past midnight: a fall by more than half a day is a new day."""
     steps = np.diff(seconds, prepend=seconds[:1])
     return seconds + _DAY * np.cumsum(steps < -_HALF_DAY)
+
+
+def _start_of_day_times(seconds: Vector) -> float | None:
+    """Return when times of day start [s]; None where they count from 0, as the time since a start does."""
+    finite = seconds[np.isfinite(seconds)]
+    return float(finite[0]) if len(finite) and finite[0] >= _COUNTED_FROM_ZERO else None
 
 
 def _subtract_first(seconds: Vector) -> Vector:

@@ -136,7 +136,7 @@ def read(path: Path) -> ChannelFile:
     plain = read_plain(path, sheet, split) if split > sheet.start else {}
     quick = (sheet.start, 0) if not plain else (split, sum(map(len, next(iter(plain.values())))))
     columns = read_columns(_rows(path, sheet, sheet.start if plain is None else split, stop, plain))
-    channels, left_out = make_channels(sheet.layout, columns.values)
+    channels, left_out = make_channels(sheet.layout, columns)
     timed, clock = assign_rate_times(channels, sheet.metadata)
     row = count_rows_before(path, stop) + 1 if cut else 0
     broken = [f"The file breaks off in row {row}; that row was left out."] if cut else []

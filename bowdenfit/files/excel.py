@@ -87,7 +87,7 @@ def _read_sheet(
     start = layout.start
     rows = SheetRows(place, layout, chain(first[start:], iterator), lambda position: start + position + 1)
     columns = read_columns(rows)
-    channels, left_out = make_channels(layout, columns.values)
+    channels, left_out = make_channels(layout, columns)
     above = {i + 1: (ABOVE if any(first[i]) else BLANK, "") for i in range(start) if i not in layout.over}
     over = [i + 1 for i in layout.over]
     account = make_account(file, start + columns.rows, over, above | columns.left_out, columns.beside)

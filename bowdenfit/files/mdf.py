@@ -139,8 +139,10 @@ def _channel(file: Any, group: int, index: int, name: str, left_out: UnreadNames
     if signal.invalidation_bits is not None:
         values = np.where(np.asarray(signal.invalidation_bits, dtype=bool), np.nan, values)
     clock = _clock(file, group)
-    time = to_floats(signal.timestamps) if clock else None
-    return Channel(name, (signal.unit or "").strip(), values, time, clock)
+    if not clock:
+        return Channel(name, (signal.unit or "").strip(), values)
+    start = file.header.start_time.timestamp()
+    return Channel(name, (signal.unit or "").strip(), values, to_floats(signal.timestamps), clock, start if start > 0 else None)
 
 
 def _clock(file: Any, group: int) -> str:

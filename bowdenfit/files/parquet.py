@@ -46,7 +46,9 @@ def read(path: Path) -> ChannelFile:
         refuse_too_large(path, rows * len(used), f" ({rows} rows of {len(used)} columns)")
         columns = [_values(pyarrow, file.read(columns=[field.name]).column(0)) for field in used]
     headings = [_heading(pyarrow, field) for field in used]
-    channels = [Channel(h.name, h.unit, values) for h, values in zip(headings, columns, strict=True)]
+    channels = [
+        Channel(h.name, h.unit, values, start=start) for h, (values, start) in zip(headings, columns, strict=True)
+    ]
     remarks = [
         f"The column {shown(field.name)} holds no numbers ({field.type}) and was left out."
         for field in fields
@@ -61,16 +63,17 @@ def _is_readable(pyarrow: Any, kind: Any) -> bool:
     return any(test(kind) for test in tests)
 
 
-def _values(pyarrow: Any, column: Any) -> Vector:
-    """Return numbers of a column, NaN where it has none; times in seconds."""
+def _values(pyarrow: Any, column: Any) -> tuple[Vector, float | None]:
+    """Return numbers of a column, NaN where it has none, times in seconds; and when dates start (`Channel.start`)."""
     kind = column.type
     if pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind):
         ticks = column.cast(pyarrow.int64())
         first = next((tick.as_py() for tick in ticks if tick.is_valid), 0)
         origin = first if pyarrow.types.is_timestamp(kind) else 0
         counted = pyarrow.compute.subtract(ticks, origin).cast(pyarrow.float64(), safe=False)
-        return counted.to_numpy() / {"s": 1, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
-    return np.array(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)
+        ticks_a_second = {"s": 1, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
+        return counted.to_numpy() / ticks_a_second, origin / ticks_a_second if origin else None
+    return np.array(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float), None
 
 
 def _heading(pyarrow: Any, field: Any) -> Heading:

@@ -17,6 +17,7 @@ from bowdenfit.files.channels import (
     refuse_damage,
     refuse_too_large,
 )
+from bowdenfit.files.clocks import YEARS
 
 MOST_ELEMENTS = 64  # judged: a longer array is an image or a scan, no set of channels
 _HEADER = "header"
@@ -147,7 +148,7 @@ def _channels(topics: list[_Topic]) -> Iterator[Channel]:
     if first and max(first.values()) - min(first.values()) < _COMPARABLE:
         first = dict.fromkeys(first, min(first.values()))
     for topic in topics:
-        time = (topic.nanoseconds - first[topic.clock]) / 1e9
+        time, start = (topic.nanoseconds - first[topic.clock]) / 1e9, first[topic.clock] / 1e9
         for leaf, column in zip(topic.leaves, topic.columns, strict=True):
             values = np.frombuffer(column, dtype=np.float64)
-            yield Channel(leaf.name(topic.name), "", values, time, topic.clock)
+            yield Channel(leaf.name(topic.name), "", values, time, topic.clock, start if start > YEARS else None)

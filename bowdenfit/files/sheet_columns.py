@@ -8,7 +8,7 @@ import math
 import re
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any
 
@@ -84,6 +84,7 @@ class SheetColumns:
         left_out: Why a row is not read, and what it says, by its number.
         beside: Row and text of remarks beside the columns.
         rows: How many rows there are from the first of data on.
+        starts: When columns of dates start, by column (`Channel.start`).
     """
 
     values: list[Vector | None]
@@ -91,15 +92,17 @@ class SheetColumns:
     left_out: dict[int, tuple[str, str]]
     beside: list[tuple[int, str]]
     rows: int
+    starts: dict[int, float] = field(default_factory=dict)
 
 
-def make_channels(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tuple[Channel, ...], list[str]]:
+def make_channels(layout: Layout, sheet_columns: SheetColumns) -> tuple[tuple[Channel, ...], list[str]]:
     """Return the channels of a sheet with their clocks, and remarks on the columns left out.
 
     Args:
         layout: Its headings.
-        columns: The numbers of each column; None for one of text.
+        sheet_columns: Its columns.
     """
+    columns = sheet_columns.values
     kept: list[Channel] = []
     remarks: list[str] = []
     nameless = [not heading.name for heading in layout.headings]
@@ -112,7 +115,7 @@ def make_channels(layout: Layout, columns: Sequence[Vector | None]) -> tuple[tup
         elif nameless[i] and layout.named and is_index(values):
             remarks.append(f"{place} has no heading, only counts the rows and was left out.")
         else:
-            kept.append(Channel(layout.name(i), heading.unit, values))
+            kept.append(Channel(layout.name(i), heading.unit, values, start=sheet_columns.starts.get(i)))
     if not layout.named:
         remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
     named = make_names_unique(kept)
@@ -143,6 +146,7 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
     dropped = [REMARKED, SPACE, REMARK] if sheet.of_text else [REMARKED, REMARK]
     kept = ~np.isin(np.array(cells.letters[:stop]), dropped)
     columns: list[Vector | None] = [None] * len(kinds)
+    starts = dict[int, float]()
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
         pieces = before.pop(i, [])
@@ -151,13 +155,13 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
         whole = np.concatenate([*pieces, remaining])
         pieces.clear()
         if i in cells.dates:
-            columns[i] = parse_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
+            columns[i], start = parse_dates(whole, f"{sheet.place}, column {shown(sheet.layout.name(i))}")
+            starts |= {} if start is None else {i: start}
         else:
             whole[~np.isfinite(whole)] = np.nan
             columns[i] = whole
-    return SheetColumns(
-        columns, _describe_left_out(sheet, cells.letters, left_out, beside, stop), left_out, beside, len(cells.letters)
-    )
+    remarks = _describe_left_out(sheet, cells.letters, left_out, beside, stop)
+    return SheetColumns(columns, remarks, left_out, beside, len(cells.letters), starts)
 
 
 def _refuse_other_headings(sheet: SheetRows, row: int, words: Sequence[str]) -> None:

@@ -104,9 +104,11 @@ def _channel(channel: Any, length: int) -> Channel:
     raw = channel[:length]
     unit = _unit(channel.properties)
     if raw.dtype.kind == "M":
-        return Channel(_name(channel), "s", _seconds(raw))
+        return Channel(_name(channel), "s", _seconds(raw), start=_unix_time(raw[0]))
     time = to_floats(channel.time_track()[:length]) if _has_waveform(channel.properties) else None
-    return Channel(_name(channel), unit, to_floats(raw), time, "" if time is None else _WAVEFORM)
+    start = channel.properties.get("wf_start_time") if time is not None else None
+    clock = "" if time is None else _WAVEFORM
+    return Channel(_name(channel), unit, to_floats(raw), time, clock, None if start is None else _unix_time(start))
 
 
 def _has_waveform(properties: Mapping[str, Any]) -> bool:
@@ -117,6 +119,12 @@ def _has_waveform(properties: Mapping[str, Any]) -> bool:
 def _unit(properties: Mapping[str, Any]) -> str:
     """Return the unit of a channel, by the first property that has one."""
     return next((str(properties[name]).strip() for name in _UNITS if properties.get(name)), "")
+
+
+def _unix_time(date: Any) -> float | None:
+    """Return the Unix time of a date [s]; None where there is none, or the epoch of LabVIEW stands for none."""
+    seconds = float((np.datetime64(date, "us") - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
+    return seconds if seconds > 0 else None
 
 
 def _seconds(dates: np.ndarray) -> np.ndarray:

@@ -235,6 +235,26 @@ def require_one_kind(path: Path, has_channels: bool, named: Sequence[str]) -> st
     return guess.kind
 
 
+def require_recordings(paths: Sequence[Path], has_channels: bool, named: Sequence[str]) -> None:
+    """Refuse files of two loggers that are no recordings.
+
+    Raises:
+        DatasetError: One is a table of readings; says how to join it.
+    """
+    if named:
+        raise DatasetError(
+            f"--column names columns of a table, and {paths[1].name} is joined to a recording, whose channels are named by "
+            "--channel; put two tables of readings into one by hand, a row for each reading."
+        )
+    for path in paths:
+        guess = guess_file_kind(path, has_channels)
+        if guess.kind != "recordings":
+            raise DatasetError(
+                f"{path.name} is a table of readings and no recording, because {guess.why}; put both forces into one table by "
+                "hand, a row for each reading with the force at both ends. Only recordings are joined by their clocks."
+            )
+
+
 def has_own_angles(path: Path, kind: str, named: Sequence[str], stated: bool) -> bool:
     """Return whether the rows of a file have wrap angles of their own.
 

@@ -1,6 +1,7 @@
 """From the channels of a file to a recording: both forces, the velocity, and the clock of each."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,11 +10,20 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
 from bowdenfit.files.headings import option_naming
 from bowdenfit.files.pieces import have_same_numbers
-from bowdenfit.recordings.named_channels import RATE, TORQUES, WANTED, converted, find_channel, stated_unit
+from bowdenfit.recordings.named_channels import (
+    OUTPUT_CLOCK,
+    RATE,
+    TORQUES,
+    WANTED,
+    converted,
+    find_channel,
+    stated_unit,
+)
 from bowdenfit.recordings.recording import RawRecording
-from bowdenfit.units import INTERNAL_UNITS, ColumnSource, speed_dimension
+from bowdenfit.units import INTERNAL_UNITS, ColumnSource, dimension_of, is_unit, speed_dimension
 from bowdenfit.words import quoted, shown
 
+_FORCES = ("input_force", "output_force")
 _FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
 _SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
@@ -21,7 +31,13 @@ _DATES = 1e8  # numbers from here on are dates, of which the unit is plain
 
 
 def to_recording(
-    file: ChannelFile, name: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys, *, is_loop: bool
+    file: ChannelFile,
+    name: str,
+    sources: Mapping[str, ColumnSource],
+    pulleys: Pulleys,
+    *,
+    is_loop: bool,
+    output_file: ChannelFile | None = None,
 ) -> tuple[RawRecording, str]:
     """Return a recording from the channels of a file.
 
@@ -32,6 +48,7 @@ def to_recording(
             be given as a rate, such as "1000 Hz"; a minus sign before a unit turns the sign.
         pulleys: By whose radii channels of torques become forces.
         is_loop: Whether the cable is a pull-pull loop; a single rope's channels are torques where they or the radius say so.
+        output_file: What was read of the file of a second logger, where that recorded the output force.
 
     Returns:
         The recording, and the unit of its velocity: "mm/s", "rad/s", or empty without one.
@@ -40,39 +57,157 @@ def to_recording(
         DatasetError: A channel is missing or named twice, or has no unit or clock, or a unit of another kind; or the radius
             of a torque's pulley is not stated.
     """
-    by_quantity = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
-    torques = _torques(file, by_quantity, sources, pulleys, is_loop)
-    by_quantity |= torques
-    for quantity in ("input_force", "output_force"):
+    if output_file is not None:
+        return _join_files(file, output_file, name, sources, pulleys, is_loop)
+    _refuse_output_clock(file, sources)
+    channels = _find_channels(file, sources, pulleys, is_loop)
+    by_quantity = channels.by_quantity
+    for quantity in _FORCES:
         if quantity not in by_quantity:
             raise _missing(file, quantity)
     _check_distinct(file, by_quantity["input_force"], by_quantity["output_force"])
-    forces = {
-        q: _from_torque(file, by_quantity[q], q, sources, pulleys)
-        if q in torques
-        else converted(file, by_quantity[q], q, sources.get(q), "force")
-        for q in ("input_force", "output_force")
-    }
-    clocks = {q: _clock(file, by_quantity[q], by_quantity.get("time"), sources.get("time")) for q in by_quantity if q != "time"}
+    read = {q: _read_force(file, channels, q, sources, pulleys) for q in _FORCES}
+    velocity, unit = _velocity(file, by_quantity.get("velocity"), sources.get("velocity"))
+    clocks = {q: time for q, (time, _) in read.items()}
+    if len(velocity):
+        clocks["velocity"] = _clock(file, by_quantity["velocity"], by_quantity.get("time"), sources.get("time"))
     known = {len(clock): clock for clock in clocks.values()}
     clocks = {q: known[len(clock)] if have_same_numbers(known[len(clock)], clock) else clock for q, clock in clocks.items()}
-    for quantity, values in forces.items():
-        _same_length(file, by_quantity[quantity], values, clocks[quantity])
-    velocity, unit = _velocity(file, by_quantity.get("velocity"), sources.get("velocity"))
     return (
         RawRecording(
             name,
             file.path.name,
             clocks["input_force"],
-            forces["input_force"],
+            read["input_force"][1],
             clocks["output_force"],
-            forces["output_force"],
+            read["output_force"][1],
             clocks.get("velocity", np.zeros(0)),
             velocity,
             is_loop,
         ),
         unit,
     )
+
+
+@dataclass(frozen=True)
+class _Channels:
+    """Channels of a file by what they are; torques stand under the force that they become.
+
+    Args:
+        by_quantity: The channels.
+        torques: Which of them are torques.
+    """
+
+    by_quantity: dict[str, Channel]
+    torques: frozenset[str]
+
+
+def _find_channels(
+    file: ChannelFile, sources: Mapping[str, ColumnSource], pulleys: Pulleys, is_loop: bool
+) -> _Channels:
+    by_quantity = {q.name: channel for q in WANTED if (channel := find_channel(file, q, sources)) is not None}
+    torques = _torques(file, by_quantity, sources, pulleys, is_loop)
+    return _Channels(by_quantity | torques, frozenset(torques))
+
+
+def _read_force(
+    file: ChannelFile, channels: _Channels, quantity: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return times [s] and forces [N] of one end."""
+    channel = channels.by_quantity[quantity]
+    if quantity in channels.torques:
+        force = _from_torque(file, channel, quantity, sources, pulleys)
+    else:
+        force = converted(file, channel, quantity, sources.get(quantity), "force")
+    time = _clock(file, channel, channels.by_quantity.get("time"), sources.get("time"))
+    _same_length(file, channel, force, time)
+    return time, force
+
+
+def _join_files(
+    file: ChannelFile,
+    output_file: ChannelFile,
+    name: str,
+    sources: Mapping[str, ColumnSource],
+    pulleys: Pulleys,
+    is_loop: bool,
+) -> tuple[RawRecording, str]:
+    """Return a recording from the files of two loggers, each force on its own clock; the velocity is that of the input's."""
+    of_input = {q: source for q, source in sources.items() if not q.startswith("output_")}
+    of_output = {q: source for q, source in sources.items() if q.startswith("output_") and q != OUTPUT_CLOCK}
+    if (clock := sources.get(OUTPUT_CLOCK, sources.get("time"))) is not None:
+        of_output["time"] = clock
+    ends = {}
+    for end, own, stated in (("input", file, of_input), ("output", output_file, of_output)):
+        channels = _find_end(own, end, stated, pulleys, is_loop)
+        start = channels.by_quantity[f"{end}_force"].start if "time" not in stated else None
+        ends[end] = channels, *_read_force(own, channels, f"{end}_force", stated, pulleys), start
+    (of_file, input_time, input_force, input_start), (_, output_time, output_force, output_start) = ends.values()
+    if have_same_numbers(input_force, output_force):
+        raise DatasetError(
+            f"{file.path.name} and {output_file.path.name} hold the same forces, as if there were no friction at all; name the "
+            "file that the logger at the output wrote."
+        )
+    velocity, unit = _velocity(file, of_file.by_quantity.get("velocity"), sources.get("velocity"))
+    velocity_time = np.zeros(0)
+    if len(velocity):
+        velocity_time = _clock(file, of_file.by_quantity["velocity"], of_file.by_quantity.get("time"), sources.get("time"))
+    raw = RawRecording(
+        name,
+        f"{file.path.name} and {output_file.path.name}",
+        input_time,
+        input_force,
+        output_time,
+        output_force,
+        velocity_time,
+        velocity,
+        is_loop,
+        input_start,
+        output_start,
+    )
+    return raw, unit
+
+
+def _find_end(
+    file: ChannelFile, end: str, sources: Mapping[str, ColumnSource], pulleys: Pulleys, is_loop: bool
+) -> _Channels:
+    """Return the channels of the logger at one end; its only channel of forces need not say that it is that.
+
+    Raises:
+        DatasetError: It has no force, several, or that of the other end.
+    """
+    wanted, other = (f"{e}_force" for e in ((end, "output") if end == "input" else (end, "input")))
+    channels = _find_channels(file, sources, pulleys, is_loop)
+    by_quantity = channels.by_quantity
+    if wanted in by_quantity and other in by_quantity:
+        raise DatasetError(
+            f"{file.path.name} has both forces, {shown(by_quantity[wanted].name)} and {shown(by_quantity[other].name)}; give "
+            "it alone, or rename the channel that is not to be read."
+        )
+    if other in by_quantity:
+        raise DatasetError(
+            f"{file.path.name} is given as the file of the {wanted}, but has the {other} ({shown(by_quantity[other].name)}); "
+            "the file with the input force comes first, and that with the output force is output_file in cable.toml, or --join."
+        )
+    if wanted in by_quantity:
+        return channels
+    forces = [channel for channel in file.channels if _is_force(channel)]
+    if len(forces) != 1:
+        raise _missing(file, wanted)
+    return _Channels(by_quantity | {wanted: forces[0]}, channels.torques)
+
+
+def _is_force(channel: Channel) -> bool:
+    return bool(channel.unit) and is_unit(channel.unit) and dimension_of(channel.unit) == "force"
+
+
+def _refuse_output_clock(file: ChannelFile, sources: Mapping[str, ColumnSource]) -> None:
+    """Refuse a clock of a second file where there is none."""
+    if OUTPUT_CLOCK in sources:
+        raise DatasetError(
+            f"{file.path.name}: {OUTPUT_CLOCK} is the clock of a second logger's file, and none is given; name that file as "
+            "output_file in cable.toml, or by --join; or name the clock of both forces as time."
+        )
 
 
 def _torques(
@@ -122,10 +257,16 @@ def _check_distinct(file: ChannelFile, one: Channel, other: Channel) -> None:
 
 
 def _missing(file: ChannelFile, quantity: str) -> DatasetError:
+    other = (
+        'If a second logger recorded it, join its file: --join FILE, or output_file = "FILE" in a [[recording]] of cable.toml.'
+        if quantity == "output_force"
+        else "If a second logger recorded it, give its file first and join this one: bowdenfit fit FILE --join "
+        f"{file.path.name}."
+    )
     return DatasetError(
         f"{file.path.name} has no channel {quantity}; it has {quoted(tuple(c.name for c in file.channels))}. Say which "
         f'it is and its unit: --channel {quantity}=NAME:N, or channels = {{ {quantity} = {{ name = "NAME", unit = '
-        '"N" } } in cable.toml.'
+        f'"N" }} }} in cable.toml. {other}'
     )
 
 

@@ -24,6 +24,7 @@ WANTED = (
     Quantity("time", "time"),
 )
 TORQUES = (Quantity("input_torque", "torque"), Quantity("output_torque", "torque"))  # of pulleys
+OUTPUT_CLOCK = "output_time"  # of the file of a second logger, where it is called otherwise than that of the first
 RATE = re.compile(r"(?P<rate>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*(?P<unit>k?Hz)", re.IGNORECASE)
 _PATH = re.compile(r"[/.]")
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^}]*))?\}")
@@ -191,7 +192,7 @@ def parse_channels(texts: Sequence[str]) -> dict[str, ColumnSource]:
     Raises:
         DatasetError: A text is not of that form, or names a quantity that recordings do not have.
     """
-    return parse_sources(texts, "--channel", [quantity.name for quantity in (*WANTED, *TORQUES)])
+    return parse_sources(texts, "--channel", [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK])
 
 
 def pattern_fields(pattern: str) -> tuple[tuple[str, str], ...]:

@@ -30,6 +30,7 @@ class RawRecording:
         velocity_time: Time of each sample of the velocity [s]; empty without one.
         velocity: Velocity of the rope, positive toward the motor [mm/s], or of the motor [rad/s]; empty without one.
         loop: Whether the forces are those of a pull-pull loop, differences of two tensions: of either sign.
+        input_start, output_start: Unix times at which the clocks are 0 [s]; None where they have no dates (`Channel.start`).
     """
 
     name: str
@@ -41,6 +42,8 @@ class RawRecording:
     velocity_time: Float[np.ndarray, " of_velocity_clock"] = field(default_factory=lambda: np.zeros(0))
     velocity: Float[np.ndarray, " of_velocity"] = field(default_factory=lambda: np.zeros(0))
     loop: bool = False
+    input_start: float | None = None
+    output_start: float | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,7 @@ class Account(Part):
         limits: Lowest and highest force taken for the ends of the range [N]; infinite where no clipping was seen.
         flagged: Samples left out.
         remarks: What a user should know, in sentences.
+        clock_shift: Of two loggers, what brings the times of the output's to those of the input's, the delay included [s].
     """
 
     counts: dict[str, int]
@@ -93,6 +97,7 @@ class Account(Part):
     limits: tuple[float, float]
     flagged: FlaggedSamples
     remarks: tuple[str, ...]
+    clock_shift: float | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -100,7 +100,7 @@ def test_a_clock_of_twelve_hours_passes_midnight_with_small_letters_and_stops():
     from bowdenfit.files.clocks import parse_dates
 
     texts = ["11:59:59.250 p.m.", "11:59:59.750 P.M.", "12:00:00.250 am", "12:00:00,750am", ""]
-    assert np.array_equal(parse_dates(texts, "log.csv")[:4], [0, 0.5, 1.0, 1.5])
+    assert np.array_equal(parse_dates(texts, "log.csv")[0][:4], [0, 0.5, 1.0, 1.5])
 
 
 def test_a_time_without_am_or_pm_among_others_is_refused(tmp_path, run):

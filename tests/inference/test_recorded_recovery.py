@@ -140,7 +140,7 @@ def prepared(description: Description, cable: Cable) -> Dataset:
     settings, delay = table.prepare, table.prepare.delay
     sd = 0.0 if isinstance(delay, str) else delay.sd_to("time") or 0.0
     files = [
-        _File(as_read(recording, entry.file), entry, settings, sd, "", None)
+        _File(as_read(recording, entry.file), entry, settings, sd, "")
         for entry, recording in zip(description.recording, cable.recorded, strict=True)
     ]
     parts, delay_sd = _prepare_files(files)

@@ -64,6 +64,7 @@ def _preparation(recording: Recording) -> dict[str, Any]:
         "tare": list(account.tare),
         "delay": account.delay,
         "delay_sd": account.delay_sd,
+        **({} if account.clock_shift is None else {"clock_shift": account.clock_shift}),
         "noise": list(account.noise),
         "blocks": phases | {"sliding": int(strokes.used_sliding.sum())},
         "phases_by_hand": strokes.by_hand,
@@ -113,6 +114,8 @@ def _describe_delay(pages: list[dict[str, Any]]) -> list[str]:
     """Describe the delay, once where all recordings share it."""
     texts = {}
     for page in pages:
+        if "clock_shift" in page:  # a remark says it, with the shift between the loggers
+            continue
         delay, sd = 1000 * page["delay"], 1000 * (page["delay_sd"] if page["delay_sd"] is not None else np.nan)
         if np.isfinite(sd):
             texts[f"{delay:.1f} ms, give or take {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
@@ -229,6 +232,8 @@ class RecordingKind(FrictionKind[Recordings]):
             ]
             if entry.velocity is not None:
                 quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
+            if isinstance(entry.clock_shift, QuantityValue):
+                quantities.append((f"{where}, clock_shift", entry.clock_shift, "time"))
             if entry.prepare is not None:
                 pages.append((f"{where}, prepare", entry.prepare))
         for where, page in pages:

@@ -9,151 +9,25 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, Route, TableSettings
+from bowdenfit.description import Description, Preparation, QuantityValue, RecordingFile, TableSettings
 from bowdenfit.errors import DatasetError, DescriptionError, Faults, suggest_name
 from bowdenfit.files import read_channels
-from bowdenfit.files.channels import ChannelFile
-from bowdenfit.files.headings import Quantity
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
+from bowdenfit.kinds.recordings.locations import locate_by_channels, location_names, parse_file_name
 from bowdenfit.kinds.rows import OwnAngles, RowConditions
 from bowdenfit.kinds.table_files import Source, TableFromFiles
-from bowdenfit.recordings.angle_channels import SAME_BEND, refuse_other_angle
+from bowdenfit.recordings.angle_channels import refuse_other_angle
 from bowdenfit.recordings.forces import to_recording
-from bowdenfit.recordings.named_channels import TORQUES, WANTED, match_name, pattern_fields, rows_where, steady_value
+from bowdenfit.recordings.named_channels import OUTPUT_CLOCK, TORQUES, WANTED, rows_where
 from bowdenfit.recordings.preparation import NO_DELAY_OF_LOOPS, average_recording, inspect_recording
 from bowdenfit.recordings.preparation.delay import COMMON_ERROR
 from bowdenfit.recordings.recording import Account, Blocks, RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import cable_of, find_strokes
+from bowdenfit.recordings.two_loggers import ClockShift, align_clocks, check_determined
 from bowdenfit.types import Vector
-from bowdenfit.units import (
-    INTERNAL_UNITS,
-    ChannelSource,
-    ColumnSource,
-    conversion_factor,
-    route_conversion_factor,
-    speed_dimension,
-)
-
-_SAME_LENGTH = 0.005  # change of a length over the range of the route; as `SAME_LENGTH` of force tables
-
-
-def parse_file_name(description: Description, pattern: str | None, path: Path, file: str) -> RecordingFile:
-    """Return what the name of a file states, by the table's pattern."""
-    if pattern is None:
-        return RecordingFile(file=file)
-    _check_pattern(description, pattern)
-    values = match_name(pattern, path)
-    angles = {
-        name: QuantityValue(value=float(text), unit=unit or "deg")
-        for name, (text, unit) in values.items()
-        if name in description.angle_columns
-    }
-    velocity = values.get("velocity")
-    return RecordingFile(
-        file=file,
-        run=values["run"][0] if "run" in values else None,
-        at=float(values["at"][0]) if "at" in values else None,
-        velocity=QuantityValue(value=float(velocity[0]), unit=velocity[1] or "mm/s") if velocity else None,
-        wrap_angles=angles,
-    )
-
-
-def _check_pattern(description: Description, pattern: str) -> None:
-    """Refuse a pattern that names what a recording does not have, or a unit of the wrong kind."""
-    known = ["at", "run", "velocity", *description.angle_columns]
-    key = "cable.toml, tables.recordings.pattern"
-    for name, unit in pattern_fields(pattern):
-        if name not in known:
-            raise DescriptionError(f"{key}: {name!r} is unknown{suggest_name(name, known)}")
-        if unit and name != "at" and name != "run":
-            dimension = speed_dimension(unit) if name == "velocity" else "angle"
-            try:
-                conversion_factor(unit, dimension)
-            except DatasetError as error:
-                raise DescriptionError(f"{key}, {{{name}:{unit}}}: {error}.") from None
-
-
-def location_names(description: Description) -> tuple[str, ...]:
-    """Return the names of the quantities that say where a recording was made."""
-    return (*description.angle_columns, *([description.route.variable] if description.route else []))
-
-
-def locate_by_channels(
-    description: Description, file: ChannelFile, entry: RecordingFile, sources: Mapping[str, ColumnSource]
-) -> RecordingFile:
-    """Complete a recording's entry with wrap angles and length from its channels, where it does not state them itself.
-
-    A channel is looked for by its name where a contact has no curve, and is that which the user names in any case.
-
-    Args:
-        description: The cable.
-        file: The rows of the recording.
-        entry: What is said of it.
-        sources: Channels that the user names.
-
-    Raises:
-        DatasetError: A channel changes during the recording, or is named beside a value.
-    """
-    angles, at = dict(entry.wrap_angles), entry.at
-    for contact in description.contact:
-        column = contact.wrap_angle.column
-        if column is None or (column not in sources and (contact.wrap_angle.curve or column in angles)):
-            continue
-        if column in angles:
-            raise _make_duplicate_error(entry, column)
-        angle = _read_steady_angle(file, column, sources.get(column))
-        if angle is not None:
-            angles[column] = QuantityValue(value=angle, unit="rad")
-    route = description.route
-    if route is not None and (route.variable in sources or at is None):
-        length = _read_steady_length(file, route, sources.get(route.variable))
-        if length is not None and at is not None:
-            raise _make_duplicate_error(entry, route.variable)
-        at = length if length is not None else at
-    return entry.model_copy(update={"wrap_angles": angles, "at": at})
-
-
-def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | None) -> float | None:
-    """Return a wrap angle from its channel [rad]; None without such a channel."""
-    steady = steady_value(file, Quantity(column, "angle"), source, lambda unit: conversion_factor(unit, "angle"))
-    if steady is None:
-        return None
-    value, low, high = steady
-    if high - low > SAME_BEND:
-        raise _make_change_error(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
-    if value < 0:
-        raise DatasetError(
-            f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so turn that of the "
-            "channel round with a negative gain."
-        )
-    return value
-
-
-def _read_steady_length(file: ChannelFile, route: Route, source: ColumnSource | None) -> float | None:
-    """Return the route value from its channel, in the route's unit; None without such a channel."""
-    quantity = Quantity(route.variable, "route", route.unit)
-    steady = steady_value(file, quantity, source, lambda unit: route_conversion_factor(unit, route.unit))
-    if steady is None:
-        return None
-    value, low, high = steady
-    if high - low > _SAME_LENGTH * abs(route.range[1] - route.range[0]):
-        raise _make_change_error(file, route.variable, low, high, route.unit)
-    return float(f"{value:.12g}")
-
-
-def _make_change_error(file: ChannelFile, name: str, low: float, high: float, unit: str) -> DatasetError:
-    return DatasetError(
-        f"{file.path.name}: {name} changes from {low:.4g} to {high:.4g} {unit} during the recording, which is of one bend; "
-        "choose its rows by where = { ... } in a [[recording]] for each, or state the value there and rename the channel."
-    )
-
-
-def _make_duplicate_error(entry: RecordingFile, name: str) -> DatasetError:
-    return DatasetError(
-        f"{entry.file}: {name} is stated in its [[recording]], and a channel is named for it too; keep one of the two."
-    )
+from bowdenfit.units import INTERNAL_UNITS, ChannelSource, ColumnSource, speed_dimension
 
 
 class RecordingsTable(TableSettings):
@@ -190,11 +64,11 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     Raises:
         DatasetError, DescriptionError: What is wrong, in a sentence.
     """
-    description, channels = source.description, source.channels
+    description = source.description
     entries = _list_entries(source)
     _check_names(entries)
     faults = Faults()
-    read = faults.read_all(lambda entry: _read_file(description, *entry, channels), entries, None)
+    read = faults.read_all(lambda entry: _read_file(source, *entry), entries, None)
     faults.refuse()
     files = [file for file in read if file is not None]
     units = {f.velocity_unit: f.raw.file for f in files if f.velocity_unit}
@@ -213,8 +87,10 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
     _check_locations(recordings, description)
     remarks = [remark for file in files for remark in file.remarks]
     remarks += [remark for r in items for remark in (*r.account.remarks, *r.strokes.remarks)]
-    accounts = dict.fromkeys(f.account for f in files if f.account is not None)  # a file may hold several recordings
-    return TableFromFiles(recordings, {entry.file: path for path, entry in entries}, tuple(remarks), tuple(accounts))
+    accounts = dict.fromkeys(account for f in files for account in f.accounts)  # a file may hold several recordings
+    paths = {entry.file: path for path, entry in entries}
+    paths |= {entry.output_file: source.folder / entry.output_file for _, entry in entries if entry.output_file}
+    return TableFromFiles(recordings, paths, tuple(remarks), tuple(accounts))
 
 
 @dataclass(frozen=True)
@@ -226,8 +102,9 @@ class _File:
     settings: Preparation
     delay_sd: float
     velocity_unit: str
-    account: RowAccount | None
-    remarks: tuple[str, ...]
+    accounts: tuple[RowAccount, ...] = ()
+    remarks: tuple[str, ...] = ()
+    shift: ClockShift | None = None
 
 
 def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]], float]:
@@ -235,13 +112,33 @@ def _prepare_files(files: Sequence[_File]) -> tuple[list[tuple[Blocks, Account]]
 
     The two channels run through the same electronics in every recording, so that what each of them says of the delay is
     put together; an error of it shifts the friction of all of them alike, in proportion to how fast the force changes.
+
+    Two loggers are started anew for each recording, which keeps its own delay. The largest standard error then stands for all:
+    errors that do not average out are the wider interval.
     """
     inspections = [inspect_recording(f.raw, f.settings) for f in files]
-    delays = [i.delay for i in inspections if i.settings.delay == "estimated" and i.delay.sd > 0]
-    if not delays:
-        return [average_recording(i) for i in inspections], max((f.delay_sd for f in files), default=0.0)
-    delay, sd = _pool_delays(np.array([d.value for d in delays]), np.array([d.sd for d in delays]))
-    return [average_recording(i, (delay, sd) if i.settings.delay == "estimated" else None) for i in inspections], sd
+    pairs = list(zip(files, inspections, strict=True))
+    delays = [i.delay for f, i in pairs if not f.shift and i.settings.delay == "estimated" and i.delay.sd > 0]
+    pooled = _pool_delays(np.array([d.value for d in delays]), np.array([d.sd for d in delays])) if delays else None
+    sds = [pooled[1]] if pooled else [f.delay_sd for f in files if not f.shift]
+    prepared = []
+    for file, inspection in pairs:
+        if file.shift is None:
+            prepared.append(average_recording(inspection, pooled if inspection.settings.delay == "estimated" else None))
+            continue
+        check_determined(file.raw, file.shift, inspection.delay)
+        blocks, account = average_recording(inspection)
+        sd = file.delay_sd or account.delay_sd
+        sds.append(sd if sd > 0 else 0.0)
+        prepared.append((blocks, _state_shift(file, account, sd or np.nan)))
+    return prepared, max(sds, default=0.0)
+
+
+def _state_shift(file: _File, account: Account, sd: float) -> Account:
+    """Return the account of two loggers' recording, with the shift between their clocks."""
+    assert file.shift is not None  # the caller asked
+    remark = file.shift.describe(file.raw, account.delay, sd)
+    return replace(account, remarks=(remark, *account.remarks), clock_shift=file.shift.value - account.delay)
 
 
 def _keep_first_loop_remark(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
@@ -272,9 +169,11 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
     """List every file with its entry; a file named in a [[recording]] is not read twice."""
     description = source.description
     entries = [(source.folder / entry.file, entry) for entry in description.recording]
-    for path, _ in entries:
+    joined = [source.folder / entry.output_file for _, entry in entries if entry.output_file]
+    stated = [*(path for path, _ in entries), *joined]
+    for path in stated:
         refuse_special(path)  # before links are followed, which may lead round in a circle
-    named = {path.resolve() for path, _ in entries}
+    named = {path.resolve() for path in stated}
     for path in source.files:
         refuse_special(path)
         if path.resolve() not in named:
@@ -303,19 +202,27 @@ def _recording_name(path: Path, entry: RecordingFile) -> str:
     return entry.name or entry.run or path.stem
 
 
-def _read_file(description: Description, path: Path, entry: RecordingFile, channels: Mapping[str, ColumnSource]) -> _File:
+def _read_file(source: Source, path: Path, entry: RecordingFile) -> _File:
+    description = source.description
     table = description.table(RecordingsTable)
     assert table is not None  # the caller asked
     page = entry.prepare or table.prepare
     sources = (
         _check_channel_names(table.channels, description)
         | _check_channel_names(entry.channels, description)
-        | dict(channels)
+        | dict(source.channels)
     )
-    file, remarks = MissingCodes(table.missing).blank_samples(read_channels(path))
-    rows = rows_where(file, entry.where)
+    paths = [path, *([source.folder / entry.output_file] if entry.output_file else [])]
+    blanked = [MissingCodes(table.missing).blank_samples(read_channels(file)) for file in paths]
+    files, remarks = [file for file, _ in blanked], tuple(remark for _, words in blanked for remark in words)
+    rows, *output_rows = (rows_where(file, entry.where) for file in files)
     raw, unit = to_recording(
-        rows, _recording_name(path, entry), sources, description.cable.pulleys, is_loop=description.cable.kind == "loop"
+        rows,
+        _recording_name(path, entry),
+        sources,
+        description.cable.pulleys,
+        is_loop=description.cable.kind == "loop",
+        output_file=output_rows[0] if output_rows else None,
     )
     sensors = description.sensors
     if (sensors.input_ratio, sensors.output_ratio) != (1.0, 1.0):
@@ -323,10 +230,15 @@ def _read_file(description: Description, path: Path, entry: RecordingFile, chann
         raw = replace(raw, input_force=forces[0], output_force=forces[1])
     entry = locate_by_channels(description, rows, entry, sources)
     refuse_other_angle(rows, sources, raw.input_force, _only_stated_angle(description, entry))
-    stated = page.delay.sd_to("time") if isinstance(page.delay, QuantityValue) else None
+    shift = None
+    if output_rows:
+        raw, shift, page = align_clocks(raw, entry.clock_shift, page)
+    stated = [value for value in (entry.clock_shift, page.delay) if isinstance(value, QuantityValue)]
+    stated_sd = max((value.sd_to("time") or 0.0 for value in stated), default=0.0)
     if entry.velocity is not None and not unit:
         unit = INTERNAL_UNITS[speed_dimension(entry.velocity.unit)]
-    return _File(raw, entry, page, stated or 0.0, unit, file.account, remarks)
+    accounts = tuple(file.account for file in files if file.account is not None)
+    return _File(raw, entry, page, stated_sd, unit, accounts, remarks, shift)
 
 
 def _only_stated_angle(description: Description, entry: RecordingFile) -> float | None:
@@ -349,7 +261,7 @@ def _make_recording(description: Description, file: _File, blocks: Blocks, accou
 
 def _check_channel_names(channels: Mapping[str, ColumnSource], description: Description) -> dict[str, ColumnSource]:
     """Return the channels of the description; refuse those of quantities that a recording does not have."""
-    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), *location_names(description)]
+    known = [*(quantity.name for quantity in (*WANTED, *TORQUES)), OUTPUT_CLOCK, *location_names(description)]
     for name in channels:
         if name not in known:
             raise DescriptionError(

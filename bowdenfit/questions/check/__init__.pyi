@@ -2,6 +2,7 @@ from .answer import check_readings as check_readings
 from .data_set_words import Report as Report
 from .data_set_words import check_data_set as check_data_set
 from .data_set_words import describe_data_set as describe_data_set
+from .joined_files import describe_joined_files as describe_joined_files
 from .prior_figure import PriorPredictive as PriorPredictive
 from .prior_predictive import check_priors as check_priors
 from .prior_predictive import describe_prior_predictive as describe_prior_predictive

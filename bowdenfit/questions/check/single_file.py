@@ -332,8 +332,23 @@ def describe_recording_file(
         usable: Whether the command can fit it as it stands.
     """
     description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"
+    title = f"{file.path.name}: {description}, because {reason} ({file.kind}, {counted(len(file.channels), 'channel')})."
+    lines = [filled(title), "", *describe_channels(file), *describe_recorded(recordings, obstacle)]
+    several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
+    return "\n".join([*lines, "", *describe_commands([command], usable), several]) + "\n"
+
+
+def describe_recorded(recordings: Recordings | None, obstacle: str) -> list[str]:
+    """Describe the preparation of a recording, or what keeps a file from being one."""
+    if recordings is None:
+        return ["", *map(filled, f"As a recording it cannot be used yet: {obstacle}".splitlines())] if obstacle else []
+    remarks = [remark for r in recordings.items for remark in (*r.account.remarks, *r.strokes.remarks)]
+    return ["", *describe_preparations(recordings), *(filled(f"Note: {remark}") for remark in remarks)]
+
+
+def describe_channels(file: ChannelFile) -> list[str]:
+    """Describe the channels of a file, one a line, its first and last sample, and how its rows were used."""
     n = len(file.channels)
-    title = f"{file.path.name}: {description}, because {reason} ({file.kind}, {n} channel{'s' if n != 1 else ''})."
     rows = [_channel_row(channel) for channel in file.channels[:_MAX_LISTED]]
     keep = [i for i, _ in enumerate(_CHANNEL_HEADS) if i in (0, 1, 2, 5, 6) or any(row[i] for row in rows)]
     listing = narrow_table(
@@ -342,16 +357,7 @@ def describe_recording_file(
     more = [f"... and {n - _MAX_LISTED} more channels."] if n > _MAX_LISTED else []
     account = describe_row_account(file.account) if file.account else []
     notes = [filled(f"Note: {remark}") for remark in file.remarks]
-    lines = [filled(title), "", listing, *more, "", *_first_and_last_samples(file), *account, *notes]
-    if recordings is not None:
-        lines += ["", *describe_preparations(recordings)]
-        lines += [
-            filled(f"Note: {remark}") for r in recordings.items for remark in (*r.account.remarks, *r.strokes.remarks)
-        ]
-    elif obstacle:
-        lines += ["", *map(filled, f"As a recording it cannot be used yet: {obstacle}".splitlines())]
-    several = "Several recordings of one cable go into a cable.toml (bowdenfit init)."
-    return "\n".join([*lines, "", *describe_commands([command], usable), several]) + "\n"
+    return [listing, *more, "", *_first_and_last_samples(file), *account, *notes]
 
 
 def _first_and_last_samples(file: ChannelFile) -> list[str]:

@@ -47,7 +47,8 @@ def describe(
         reading: Keywords of `bowdenfit.read`.
     """
     if room.is_single_file(dataset) and not reading.get("wrap_angle"):
-        text, usable = room.describe_single_file(dataset, reading)
+        describe_file = room.describe_joined_files if reading.get("join") else room.describe_single_file
+        text, usable = describe_file(dataset, reading)
         return Reply(text, exit_code=0 if usable else DatasetError.exit_code)
     report = check(dataset, **reading)
     text = room.describe_data_set(report)

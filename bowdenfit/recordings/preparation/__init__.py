@@ -5,6 +5,7 @@ The steps, one file each: `checks`, `flags`, `tare`, `delay`, `blocks`; each is 
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -204,8 +205,23 @@ def _delay(loop: bool, common: CommonClock, settings: Preparation) -> Delay:
         return Delay(settings.delay.to("time"), math.nan, math.nan)
     if loop:
         return Delay(0.0, math.nan, math.nan, NO_DELAY_OF_LOOPS)
+    return _estimate_delay(common, settings, slice(None))
+
+
+def delays_of_parts(inspected: Inspected, count: int) -> list[tuple[float, Delay]]:
+    """Return the middle [s] and the delay of so many parts of equal length of a recording."""
+    common = inspected.together
+    there = np.flatnonzero(common.fault == GOOD)
+    ends = np.linspace(common.time[there[0]], common.time[there[-1]], count + 1)
+    at = np.searchsorted(common.time, ends)
+    parts = [slice(begin, end) for begin, end in pairwise(at.tolist()) if end - begin > 1]
+    return [(float(common.time[part].mean()), _estimate_delay(common, inspected.settings, part)) for part in parts]
+
+
+def _estimate_delay(common: CommonClock, settings: Preparation, part: slice) -> Delay:
     shortest = _USUAL_BLOCK if settings.block == "auto" else _stated_block(settings)
-    return estimate_delay(common.time, common.input_force, common.output_force, common.fault == GOOD, shortest)
+    good = common.fault[part] == GOOD
+    return estimate_delay(common.time[part], common.input_force[part], common.output_force[part], good, shortest)
 
 
 def _stated_block(settings: Preparation) -> float:

@@ -28,6 +28,13 @@ def check_recording(raw: RawRecording) -> tuple[str, ...]:
         DatasetError: A channel and its clock differ in length, a channel is too short, never moves or is far too large,
             a clock runs backwards, stands still or has steps that no bench has, or the two clocks do not overlap.
     """
+    remarks = check_channels(raw)
+    _check_overlap(raw)
+    return remarks
+
+
+def check_channels(raw: RawRecording) -> tuple[str, ...]:
+    """Refuse channels that cannot be those of a recording, each by itself; see `check_recording`."""
     channels = {
         "input_force": (raw.input_time, raw.input_force),
         "output_force": (raw.output_time, raw.output_force),
@@ -39,7 +46,6 @@ def check_recording(raw: RawRecording) -> tuple[str, ...]:
         _check_clock(raw.file, name, time)
     _check_forces(raw.file, "input_force", raw.input_force)
     _check_forces(raw.file, "output_force", raw.output_force)
-    _check_overlap(raw)
     remarks = [_repeated(name, time) for name, (time, _) in channels.items()]
     return tuple(dict.fromkeys(r for r in remarks if r))
 

@@ -55,12 +55,14 @@ class Delay:
         sd: Standard error [s]; NaN where it was not estimated.
         exponent: Friction exponent that goes with it [1]; NaN where it was not estimated.
         remark: A sentence where the recording does not tell; else empty.
+        reason: Why it does not, as a clause behind "because".
     """
 
     value: float
     sd: float
     exponent: float
     remark: str = ""
+    reason: str = ""
 
 
 def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good: Flags, shortest: float) -> Delay:
@@ -102,7 +104,7 @@ def estimate_delay(time: Vector, input_force: Vector, output_force: Vector, good
 
 def _undetermined(why: str) -> Delay:
     remark = f"How much later the output channel is than the input channel cannot be known from this recording, because {why}."
-    return Delay(0.0, float("nan"), float("nan"), f"{remark} No delay was assumed; state one if it is known.")
+    return Delay(0.0, float("nan"), float("nan"), f"{remark} No delay was assumed; state one if it is known.", why)
 
 
 def _with_drag_too(segments: Segments, point: Vector) -> tuple[ChosenVector, float]:

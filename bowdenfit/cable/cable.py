@@ -13,7 +13,7 @@ from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
 from bowdenfit.cable.friction import FrictionModel, friction_options
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
-from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, coefficient_of, load_class
+from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, coefficient_of, load_class, sheath_length
 from bowdenfit.description import Contact, Description, PriorDefaults
 from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.space import Parameter
@@ -59,7 +59,9 @@ class Cable:
         return tuple(
             tuple(
                 load_class(CONTACT_LAWS[c.law])(
-                    c.name, coefficient_of(c.friction, group) if group and c.by_group else c.friction
+                    c.name,
+                    coefficient_of(c.friction, group) if group and c.by_group else c.friction,
+                    sheath_length(self.description, c),
                 )
                 for c in self.description.contact
             )
@@ -106,13 +108,40 @@ class Cable:
         values: Mapping[str, Array],
         wrap_angles: Float[Array, "rows contacts"],
         group: Int[Array, " rows"] | None = None,
+        route: Float[Array, " rows"] | float | None = None,
     ) -> Float[Array, " rows"]:
-        """Return the friction exponent [1] at wrap angles [rad], in the groups of given numbers or the one of predictions."""
+        """Return the friction exponent [1].
+
+        Args:
+            values: Values of the parameters.
+            wrap_angles: Wrap angle of each contact [rad].
+            group: Number of each row's group; that of predictions if omitted.
+            route: Route variable, where the length of a sheath follows it.
+
+        Raises:
+            DescriptionError: It does, and the route variable is not given.
+        """
 
         def total(laws: tuple[ContactLaw, ...]) -> Array:
             return jnp.sum(jnp.stack([law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(laws)]), axis=0)
 
-        return self._in_own_group(total, group)
+        return self._in_own_group(total, group) + self._exponent_of_lengths(values, route)
+
+    def _exponent_of_lengths(self, values: Mapping[str, Array], route: Array | float | None) -> Array | float:
+        """Return what lengths of sheaths add to the friction exponent [1]; their coefficients are those of all groups."""
+        total: Array | float = 0.0
+        for law in self.laws:
+            constant, by_route = law.sheath
+            if by_route and route is None:
+                raise DescriptionError(
+                    f"the length of the sheath {law.contact!r} is the route variable, and at a bend alone, as in loops, "
+                    'displacements and whole recordings, it is not known; state one length instead, length = { value = 1.2, '
+                    'unit = "m" }, or ask at a length.'
+                )
+            if constant or by_route:
+                along_route = 0.0 if route is None else by_route * route
+                total = total + law.exponent_of_length(values, constant + along_route)
+        return total
 
     def _in_own_group(self, total: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
         """Return what the laws of each row's group give."""
@@ -165,13 +194,14 @@ class Cable:
             stroke: +1 pulling, -1 return.
             mounting: Effect of the mounting on the friction exponent [1].
         """
-        return self.output_force_at_angles(values, self.wrap_angles(values, route), input_force, stroke, mounting)
+        return self.output_force_at_angles(values, self.wrap_angles(values, route), input_force, stroke, mounting, route)
 
     def output_force_at_angles(
-        self, values: Mapping[str, Array], angles: Array, input_force: Array, stroke: Array, mounting: Array | float = 0.0
+        self, values: Mapping[str, Array], angles: Array, input_force: Array, stroke: Array, mounting: Array | float = 0.0,
+        route: Array | None = None,
     ) -> Float[Array, "..."]:
         """Return the output force [N] at wrap angles [rad], contacts last; arguments as of `output_force_at`."""
-        exponent, preload = self._friction_at_angles(values, angles, mounting)
+        exponent, preload = self._friction_at_angles(values, angles, mounting, route)
         if preload is not None:
             return loop_output_force(input_force, preload, exponent, stroke, self.elasticity.loop_rope(values))
         return self.friction.output_force(values, input_force, exponent, stroke)
@@ -185,22 +215,23 @@ class Cable:
         mounting: Float[Array, ""] | float = 0.0,
     ) -> Float[Array, " rows"]:
         """Return the input force [N] that gives an output force [N], by the same arguments as `output_force_at`."""
-        return self.input_force_at_angles(values, self.wrap_angles(values, route), output_force, stroke, mounting)
+        return self.input_force_at_angles(values, self.wrap_angles(values, route), output_force, stroke, mounting, route)
 
     def input_force_at_angles(
-        self, values: Mapping[str, Array], angles: Array, output_force: Array, stroke: Array, mounting: Array | float = 0.0
+        self, values: Mapping[str, Array], angles: Array, output_force: Array, stroke: Array, mounting: Array | float = 0.0,
+        route: Array | None = None,
     ) -> Float[Array, "..."]:
         """Return the input force [N] at wrap angles [rad], contacts last; arguments as of `input_force_at`."""
-        exponent, preload = self._friction_at_angles(values, angles, mounting)
+        exponent, preload = self._friction_at_angles(values, angles, mounting, route)
         if preload is not None:
             return loop_input_force(output_force, preload, exponent, stroke, self.elasticity.loop_rope(values))
         return self.friction.input_force(values, output_force, exponent, stroke)
 
     def _friction_at_angles(
-        self, values: Mapping[str, Array], angles: Array, mounting: Array | float
+        self, values: Mapping[str, Array], angles: Array, mounting: Array | float, route: Array | None
     ) -> tuple[Array, Array | None]:
         """Return the friction exponent [1] in a mounting, and the preload of a loop [N]; None for a single rope."""
-        exponent = self.friction_exponent(values, angles) + mounting
+        exponent = self.friction_exponent(values, angles, route=route) + mounting
         return exponent, self.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1)) if self.is_loop else None
 
     def loss_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
@@ -209,7 +240,7 @@ class Cable:
 
     def exponent_at(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Return the friction exponent [1] at values of the route variable."""
-        return self.friction_exponent(values, self.wrap_angles(values, route))
+        return self.friction_exponent(values, self.wrap_angles(values, route), route=route)
 
 
 def constant_angle_name(contact: Contact) -> str:

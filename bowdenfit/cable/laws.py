@@ -27,10 +27,13 @@ class ContactLaw(ABC):
     Args:
         contact: Name of the contact.
         friction: Name of its friction coefficient.
+        sheath: Length of its sheath, where the law depends on it: what is constant of it [m], and what a unit of the route
+            variable adds [m].
     """
 
     contact: str
     friction: str
+    sheath: tuple[float, float] = (0.0, 0.0)
 
     def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
         """Return parameters of its own, beside the friction coefficient; named after the contact by `parameter_of`."""
@@ -45,6 +48,11 @@ class ContactLaw(ABC):
             values: Values of the parameters.
             wrap_angle: Wrap angle of the contact [rad].
         """
+
+    def exponent_of_length(self, values: Mapping[str, Array], length: Array | float) -> Array | float:
+        """Return what a length of the sheath [m] adds to the friction exponent beside that [1]; none usually."""
+        del values, length
+        return 0.0
 
     def slope(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
         """Return the derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""
@@ -85,6 +93,35 @@ class Wobble(ContactLaw):
     def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
         """Mu (theta + w)"""
         return values[self.friction] * (wrap_angle + values[parameter_of("wobble", self.contact)])
+
+
+class WobblePerLength(ContactLaw):
+    r"""Coulomb friction of a sheath that wanders the more, the longer it is, :math:`\mu_k \theta_k + K_k L_k`.
+
+    K is the wobble coefficient of ACI 318 (there 0.0003 to 0.0066 per metre, in ducts that are tied every metre). That of
+    Eurocode 2 is an angle per length, k = K / mu. A sheath that hangs free wanders more, so the default prior is wider.
+
+    References:
+        ACI 318-08, 18.6.2; EN 1992-1-1:2004 (Eurocode 2), 5.10.5.2, equation 5.45.
+    """
+
+    def parameters(self, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Return the wobble coefficient K."""
+        return (
+            Parameter(
+                parameter_of("wobble_per_m", self.contact), make_symbol("K", self.contact),
+                f"wobble coefficient, friction per length of the sheath, {self.contact}", "friction_model",
+                HalfNormal(defaults.wobble_per_m), "1/m",
+            ),
+        )  # fmt: skip
+
+    def exponent(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
+        """Mu theta"""
+        return values[self.friction] * wrap_angle
+
+    def exponent_of_length(self, values: Mapping[str, Array], length: Array | float) -> Array | float:
+        """K L"""
+        return values[parameter_of("wobble_per_m", self.contact)] * length
 
 
 def parameter_of(what: str, contact: str) -> str:

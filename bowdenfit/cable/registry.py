@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from bowdenfit.description import Description
+from bowdenfit.description import Contact, Description, QuantityValue
 from bowdenfit.errors import DescriptionError, suggest_name
+from bowdenfit.units import conversion_factor, dimension_of
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,12 @@ class CurveFamily:
     coefficients: int
 
 
-CONTACT_LAWS = {"capstan": "bowdenfit.cable.laws:Capstan", "wobble": "bowdenfit.cable.laws:Wobble"}
+CONTACT_LAWS = {
+    "capstan": "bowdenfit.cable.laws:Capstan",
+    "wobble": "bowdenfit.cable.laws:Wobble",
+    "wobble-per-length": "bowdenfit.cable.laws:WobblePerLength",
+}
+_OF_LENGTH = ("wobble-per-length",)
 CURVES = {
     "gaussian": CurveFamily("bowdenfit.cable.curves:GaussianCurve", 3),
     "line": CurveFamily("bowdenfit.cable.curves:LineCurve", 2),
@@ -35,10 +41,10 @@ CURVES = {
 
 
 def check_names(description: Description) -> None:
-    """Refuse contacts whose law or curve does not exist.
+    """Refuse contacts whose law or curve does not exist, or lacks a length.
 
     Raises:
-        DescriptionError: One is unknown.
+        DescriptionError: One is unknown, or lacks it.
     """
     for contact in description.contact:
         named = (("law", contact.law, list(CONTACT_LAWS)), ("curve", contact.wrap_angle.curve, list(CURVES)))
@@ -47,6 +53,46 @@ def check_names(description: Description) -> None:
                 raise DescriptionError(
                     f"cable.toml, contact {contact.name!r}: the {what} {name!r} is unknown{suggest_name(name, known)}"
                 )
+        _check_length(description, contact)
+
+
+def _check_length(description: Description, contact: Contact) -> None:
+    """Refuse a contact whose law depends on a length that is not known, and a length that its law does not depend on.
+
+    Raises:
+        DescriptionError: It is such a contact.
+    """
+    where, route = f"cable.toml, contact {contact.name!r}", description.route
+    if contact.law not in _OF_LENGTH:
+        if contact.length is not None:
+            raise DescriptionError(
+                f'{where}: length is that of the sheath, which only law = "wobble-per-length" depends on; add that, or leave '
+                "length out."
+            )
+        return
+    if contact.length is None:
+        raise DescriptionError(
+            f'{where}: the law {contact.law!r} needs the length of the sheath: length = {{ value = 1.2, unit = "m" }}, or '
+            'length = "route" where the route variable is that length.'
+        )
+    if contact.friction == description.stretch.friction:
+        raise DescriptionError(
+            f"{where}: stretch.friction {contact.friction!r} acts here, and friction per length does not act on the stretch as "
+            "friction per angle does; leave stretch.friction out, for a coefficient of its own."
+        )
+    if contact.length == "route" and (route is None or dimension_of(route.unit) != "length"):
+        raise DescriptionError(
+            f'{where}: length = "route" needs a [route] whose variable is the length of the sheath, in a unit of length.'
+        )
+
+
+def sheath_length(description: Description, contact: Contact) -> tuple[float, float]:
+    """Return the length of a contact's sheath: what is constant of it [m], and what a unit of the route variable adds [m]."""
+    if isinstance(contact.length, QuantityValue):
+        return contact.length.to("length") / 1000, 0.0
+    if contact.length == "route" and description.route is not None:
+        return 0.0, conversion_factor(description.route.unit, "length") / 1000
+    return 0.0, 0.0
 
 
 def load_class(class_path: str) -> Any:

@@ -93,6 +93,7 @@ class Contact(Frozen):
     name: Name
     friction: Name
     law: Choice = "capstan"
+    length: QuantityValue | Literal["route"] | None = None
     by_group: bool = True
     wrap_angle: WrapAngle
 

@@ -169,6 +169,7 @@ class PriorDefaults(Frozen):
     offset_share: Positive = 0.025
     drag_share: Positive = 0.05
     wobble_degrees: Positive = 30.0
+    wobble_per_m: Positive = 0.1
     stribeck: Positive = 0.3
     stroke_difference: Positive = 0.3
     viscous_at_highest_speed: Positive = 0.5

@@ -124,7 +124,7 @@ class RunsTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> "_Deviations":
         angles, variance = resolve_angles(self.cable, values, data)
-        friction = self.cable.friction_exponent(values, angles, data["group"])
+        friction = self.cable.friction_exponent(values, angles, data["group"], data["route"])
         exponent = friction * self.cable.friction.rate(values, data["velocity"])
         shown, slope, by_load = self._shown_log_ratio(values, data, exponent)
         if weights is not values:  # else a drag that makes mountings count for less would seem to fit better

@@ -175,7 +175,8 @@ def predict_forces(
         z, mounting, errors_of_draw = jnp.split(draw, [model.space.size, model.space.size + 1])
         values = model.space.constrain(z)
         bends = angles.resolve(cable, values, errors_of_draw)
-        return function(values, bends, jnp.asarray(float(force)), jnp.asarray(float(stroke)), mounting[0])
+        known = jnp.asarray(float(force)), jnp.asarray(float(stroke))
+        return function(values, bends, *known, mounting[0], jnp.asarray(angles.rows.route))
 
     errors = angles.draw_errors(len(z))
     program = for_each_draw(other_end, model.space.size + 1 + errors.shape[1])

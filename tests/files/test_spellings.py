@@ -60,8 +60,13 @@ SPELLINGS = [  # of the force at the motor and of that at the load
 ]
 NOT_FORCES = (
     "Kraft in N", "Force in N", "Force (N)", "T", "Load cell 1 (N)", "Input position (mm)", "T_in (degC)", "Motor current (A)",
-    "Target force in (N)", "Force in, sd (N)", "Input/output (N)", "Max. Kraft Eingang [N]", "Motor", "Zeit [s]",
+    "Target force in (N)", "Input/output (N)", "Max. Kraft Eingang [N]", "Motor", "Zeit [s]",
 )  # fmt: skip
+
+
+def test_a_standard_deviation_of_a_force_is_none_of_the_forces():
+    spelling = parse_heading("Force in, sd (N)")
+    assert spelling is not None and (spelling.quantity, spelling.unit) == ("input_force_sd", "N")
 
 
 def write(folder, headings, *columns, name="table.csv"):

@@ -66,7 +66,7 @@ class EfficienciesTerm:
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]
     ) -> tuple[Float[Array, " rows"], Float[Array, " rows"]]:
         angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles)
+        exponent = self.cable.friction_exponent(values, angles, route=data["route"])
         mean = LoadCells.of(values).gain_error + (
             -jnp.log(self.cable.friction.efficiency(values, exponent)) if self.cable.friction.options else exponent
         )

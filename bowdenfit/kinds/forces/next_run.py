@@ -135,7 +135,7 @@ def make_run_simulator(
     def simulate(values: Mapping[str, Array], rows: Mapping[str, Any], key: Array) -> Array:
         of_mounting, of_input, of_output = jax.random.split(key, 3)
         angles, variance = resolve_angles(cable, values, rows)
-        exponent = cable.friction_exponent(values, angles)
+        exponent = cable.friction_exponent(values, angles, route=rows["route"])
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + cable.exponent_variance(values, angles, variance))
         mounted = exponent + sd * scatter(of_mounting, exponent.shape, cable.description)
         shift = mounted[:, None] * cable.friction.rate(values, velocity)

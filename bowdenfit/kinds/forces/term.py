@@ -85,7 +85,7 @@ class HeldForcesTerm:
     def log_likelihood(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Log likelihood of each row."""
         angles, variance = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles, data["group"])
+        exponent = self.cable.friction_exponent(values, angles, data["group"], data["route"])
         difference, from_cells = self._difference(values, data)
         from_angles = self.cable.exponent_variance(values, angles, variance, data["group"])
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_angles + from_cells)
@@ -103,7 +103,7 @@ class HeldForcesTerm:
     def expected(self, values: Mapping[str, Array], data: Mapping[str, Any]) -> Float[Array, " rows"]:
         """Largest ratio of input to output force that friction can hold at the row's input force [1]."""
         angles, _ = resolve_angles(self.cable, values, data)
-        exponent = self.cable.friction_exponent(values, angles, data["group"])
+        exponent = self.cable.friction_exponent(values, angles, data["group"], data["route"])
         return data["input_force"] / self._output_force(values, data, exponent)
 
     def _output_force(
@@ -119,7 +119,7 @@ class HeldForcesTerm:
         """A ratio of input to output force anywhere in the band, with noise [1]."""
         band, noise = jax.random.split(key)
         angles, _ = resolve_angles(self.cable, values, data)
-        limit = self.cable.friction_exponent(values, angles, data["group"])
+        limit = self.cable.friction_exponent(values, angles, data["group"], data["route"])
         _, from_cells = self._difference(values, data)
         inside = limit * jax.random.uniform(band, limit.shape, minval=-1.0, maxval=1.0)
         sd = jnp.sqrt(values[RUN_SCATTER] ** 2 + from_cells)
@@ -282,7 +282,8 @@ class ForceTerms(TermKind[ForceTable]):
         of_angles = jax.random.normal(jax.random.fold_in(key, 3), (runs, bends.shape[1]))
         bends = bends + scale * jnp.sqrt(variance) * of_angles[run]
         mounting = scale * values[RUN_SCATTER] * truth.scatter(of_run, (runs,))
-        friction = cable.friction_exponent(values, bends, jnp.asarray(_number_groups(cable, table)))
+        groups, route = jnp.asarray(_number_groups(cable, table)), jnp.asarray(table.route)
+        friction = cable.friction_exponent(values, bends, groups, route)
         exponent = friction * cable.friction.rate(values, jnp.asarray(table.velocity))
         stroke, force = jnp.asarray(table.stroke, dtype=float), jnp.asarray(table.input_force)
         output = cable.friction.output_force(values, force, exponent + mounting[run], stroke)

@@ -43,15 +43,19 @@ class BentCable:
         """Stretch and preload of the cable."""
         return self.model.cable.elasticity
 
+    @property
+    def _route(self) -> Float[Array, " bends"]:
+        """The middle of the route at every bend; 0 without a route."""
+        route = self.model.description.route
+        return jnp.full_like(self.wrap_angle, route.middle if route else 0.0)
+
     def _angles(self, values: Values) -> Float[Array, "bends contacts"]:
         """Wrap angles of all contacts at the bends [rad]."""
-        route = self.model.description.route
-        middle = jnp.full_like(self.wrap_angle, route.middle if route else 0.0)
-        return self.model.cable.wrap_angles(values, middle).at[:, self.contact].set(self.wrap_angle)
+        return self.model.cable.wrap_angles(values, self._route).at[:, self.contact].set(self.wrap_angle)
 
     def exponent(self, values: Values) -> Float[Array, " bends"]:
         """Friction exponent of one rope [1]."""
-        return self.model.cable.friction_exponent(values, self._angles(values))
+        return self.model.cable.friction_exponent(values, self._angles(values), route=self._route)
 
     def total_angle(self, values: Values) -> Float[Array, " bends"]:
         """Total wrap angle of the cable [rad]."""

@@ -309,7 +309,7 @@ def _compute_exponent_and_preload(model: Model, values: Mapping[str, Array], poi
         return cable.exponent(values), cable.preload(values)[0]
     angles = model.cable.wrap_angles(values, points)
     preload = model.cable.elasticity.preload_or_none(values, jnp.sum(angles, axis=-1))
-    return model.cable.friction_exponent(values, angles), preload
+    return model.cable.friction_exponent(values, angles, route=points), preload
 
 
 def _compute_stiffness(model: Model, values: Mapping[str, Array], points: Array, bent: bool) -> Array:

@@ -272,11 +272,11 @@ def _forces_over_gait(
     function: Callable[..., Array] = cable.input_force_at_angles if inverse else cable.output_force_at_angles
 
     def average_over_gait(values: Mapping[str, Array], bends: Array, mounting: Array, errors: Array) -> dict[str, Array]:
-        angles = chosen.resolve(cable, values, errors)
+        angles, route = chosen.resolve(cable, values, errors), jnp.asarray(chosen.rows.route)
 
         def step(carry: dict[str, Array], bend: Array) -> tuple[dict[str, Array], None]:
             bent = angles.at[:, gait.contact].set(bend[0])
-            forces_by_draw = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting), 0.0)
+            forces_by_draw = jnp.maximum(function(values, bent, jnp.asarray(force), jnp.asarray(sign), mounting, route), 0.0)
             torque = bend[1] * forces_by_draw
             return {
                 "mean": carry["mean"] + forces_by_draw / len(bends), "least": jnp.minimum(carry["least"], forces_by_draw),

@@ -78,7 +78,8 @@ def _predict_forces(
     def output(values: Mapping[str, Any], which: np.ndarray, force: Any, stroke: Any) -> tuple[Any, Any]:
         data = {name: jnp.asarray(array[which]) for name, array in arrays.items()}
         angles, _ = resolve_angles(cable, values, data)
-        exponent = cable.friction_exponent(values, angles, data["group"]) * friction.rate(values, jnp.asarray(velocity[which]))
+        exponent = cable.friction_exponent(values, angles, data["group"], data["route"])
+        exponent = exponent * friction.rate(values, jnp.asarray(velocity[which]))
         cells, more = LoadCells.of(values), (...,) + (None,) * (jnp.ndim(force) - 1)
         read = friction.output_force(values, cells.true_input(force, least), exponent[more], stroke)
         return cells.shown_output(read, least), jnp.sum(angles, axis=-1)

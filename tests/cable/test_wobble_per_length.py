@@ -1,6 +1,7 @@
 """Friction per length of the sheath beside friction per angle: recovered, predicted at other lengths, or refused."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from laboratory import Laboratory
 
@@ -108,7 +109,12 @@ def test_a_fit_says_both_predicts_at_other_lengths_and_exports_them(tmp_path):
     assert page["unit"] == "1/m" and page["q05"] < K < page["q95"]
     assert fit.verdict().trusted
     truth = [np.exp(-MU * np.pi / 2 - K * metres) for metres in (0.5, 1.9)]
-    assert [row["efficiency"] for row in fit.predict([0.5, 1.9])] == pytest.approx(truth, abs=0.02)
+    predicted = fit.efficiency([0.5, 1.9]).to_frame()["efficiency"]
+    assert list(predicted) == pytest.approx(truth, abs=0.02)
+    bf.export(fit, "csv", tmp_path / "cable.csv", points=18)
+    table = pd.read_csv(tmp_path / "cable.csv", comment="#")
+    exponent = np.interp([0.5, 1.9], table.iloc[:, 0], table["friction_exponent_q50"])
+    np.testing.assert_allclose(np.exp(-exponent), predicted, rtol=1e-3)
 
 
 @pytest.mark.extended

@@ -257,6 +257,8 @@ files and without a terminal it writes a template to fill in.
   init my-cable                       questions, from the first to the command
                                       that fits
   init my-cable --from forces.csv     of this file, or of several
+  init my-cable --from forces.csv --wrap-angle 180deg
+                                      of one file, said by the options of fit
   init --example on-body-exoskeleton  a data set to try
 """
 
@@ -269,6 +271,10 @@ def init(
     example: Annotated[
         list[str] | None, Parameter(metavar="[NAME]", consume_multiple=(0, 2), completer=lambda _: _examples())
     ] = None,
+    wrap_angle: Annotated[str | None, Parameter(metavar="ANGLE")] = None,
+    columns: Annotated[list[str] | None, Parameter("--column", metavar="QUANTITY=COLUMN:UNIT")] = None,
+    channels: Annotated[list[str] | None, Parameter("--channel", metavar="QUANTITY=CHANNEL:UNIT")] = None,
+    settings: Annotated[list[str] | None, Parameter("--set", metavar="KEY=VALUE")] = None,
 ) -> None:
     """Write a new data set.
 
@@ -276,8 +282,14 @@ def init(
         folder: The folder to write.
         files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
         example: Write a data set that comes with bowdenfit; without a name, list them.
+        wrap_angle: With one file: its wrap angle, as of fit, such as 180deg. Nothing is asked then.
+        columns: With one file: which column is what, as of fit; may be repeated.
+        channels: With one file: which channel of a recording is what, as of fit; may be repeated.
+        settings: With one file: a setting of cable.toml, as of fit; may be repeated.
     """
-    _init_dialog().start_data_set(folder, files or [], example)
+    named = {"wrap_angle": wrap_angle, "columns": columns, "channels": channels, "settings": settings}
+    reading = {name: value for name, value in named.items() if value}
+    _init_dialog().start_data_set(folder, files or [], example, reading)
 
 
 def _examples() -> list[str]:

@@ -11,7 +11,7 @@ from bowdenfit.cli.terminal import say
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.check.verb import check
-from bowdenfit.questions.start.describe import write_description
+from bowdenfit.questions.start.describe import describe_as_read, write_description
 from bowdenfit.questions.start.folder import (
     DEVICE_FILE,
     describe_written_files,
@@ -25,6 +25,7 @@ from bowdenfit.questions.start.folder import (
     write_template,
 )
 from bowdenfit.questions.start.question import Asker, Question, Unattended
+from bowdenfit.reading import Reading
 from bowdenfit.words import filled, printable
 
 Answer = TypeVar("Answer")
@@ -80,14 +81,19 @@ def is_interactive() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def start_data_set(folder: Path | None, files: Sequence[Path], example: Sequence[str] | None) -> None:
+def start_data_set(
+    folder: Path | None, files: Sequence[Path], example: Sequence[str] | None, reading: Reading | None = None
+) -> None:
     """Write a new data set.
 
     Args:
         folder: The folder to write; asked for if None.
         files: Measured files.
         example: Name of an example, and its folder; all are listed if empty. None for no example.
+        reading: What the user says of a file by the options of `fit`; nothing is then asked.
     """
+    if reading and (example is not None or len(files) + bool(folder) < 2):
+        raise UsageError("options of fit, such as --wrap-angle, describe one measured file; name it after --from.")
     if example is not None:
         _example(example, folder, files)
         return
@@ -100,6 +106,9 @@ def start_data_set(folder: Path | None, files: Sequence[Path], example: Sequence
     target = target or _ask_folder(ask)
     if not measured and is_interactive():
         measured = _ask_files(ask)
+    if measured and reading:
+        _start_from_options(target, measured, reading)
+        return
     if measured:
         _start_from_files(target, measured, ask)
         return
@@ -167,6 +176,22 @@ def _start_from_files(folder_: Path, files: Sequence[Path], ask: Asker) -> None:
     refuse_files(files)
     called = printable(folder_.name.replace("-", " ").replace("_", " "))[:_LONGEST_NAME]
     text = write_description(files, (called.strip() and called) or "cable", ask)
+    _write_and_check(folder_, text, files)
+
+
+def _start_from_options(folder: Path, files: Sequence[Path], reading: Reading) -> None:
+    """Write the folder of one file that options describe as `fit` reads it, and check it."""
+    if len(files) > 1:
+        raise UsageError(
+            f"options of fit describe one file, and {len(files)} are named after --from; leave the options out and answer in a "
+            "terminal, or start with one file and add the others to its cable.toml."
+        )
+    refuse_files(files)
+    _write_and_check(folder, describe_as_read(files[0], reading), files)
+
+
+def _write_and_check(folder_: Path, text: str, files: Sequence[Path]) -> None:
+    """Write the folder, and check that `check` accepts it."""
     write_data_set(folder_, text, files)
     say("")
     say(filled(describe_written_files(folder_)))

@@ -30,6 +30,8 @@ from bowdenfit.questions.start.question import (
     quantity_question,
     text_question,
 )
+from bowdenfit.reading import Reading, read
+from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.words import listed
 
 _REMARKS = {
@@ -77,6 +79,27 @@ def write_description(paths: Sequence[Path], default_name: str, asker: Asker) ->
     page |= {"route": layout.route} if layout.route else {}
     page |= {"contact": layout.contacts, "tables": _table_entries(measured_files)}
     return format_toml(page | ({"recording": recordings} if recordings else {}), _REMARKS)
+
+
+def describe_as_read(path: Path, reading: Reading) -> str:
+    """Write the text of a cable.toml for one file that is described by the options of `fit`.
+
+    Args:
+        path: The file, which is to lie beside it.
+        reading: The options.
+
+    Raises:
+        BowdenfitError: The file cannot be read with them.
+    """
+    page = read(path, **reading).description.model_dump(mode="json", exclude_defaults=True, by_alias=True)
+    if channels := parse_channels(reading.get("channels", ())):
+        sources = {quantity: source.model_dump(mode="json", exclude_defaults=True) for quantity, source in channels.items()}
+        recordings = {key: value for key, value in page["tables"].pop("recordings").items() if key != "files"}
+        page["tables"] |= {"recordings": recordings} if recordings else {}
+        page["recording"] = [{"file": path.name, "channels": sources}]
+    if not page["tables"]:
+        page.pop("tables")
+    return format_toml({"schema": SCHEMA, **page}, _REMARKS)
 
 
 def _inspect_files(paths: Sequence[Path], asker: Asker) -> list[MeasuredFile]:

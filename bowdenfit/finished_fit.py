@@ -6,7 +6,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bowdenfit.arguments import NumberWithUnit
+from bowdenfit.arguments import Quantity, number_with_unit
 from bowdenfit.display import Rows, text_of
 from bowdenfit.errors import UsageError, suggest_name
 from bowdenfit.questions.bends.answer import ElasticAnswers, elastic_answers
@@ -156,12 +156,12 @@ class FigureMethods:
         self._fit = fit
         self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
 
-    def __call__(self, name: str, width: NumberWithUnit | None = None) -> "Figure":
+    def __call__(self, name: str, width: Quantity | None = None) -> "Figure":
         """Return one of the figures.
 
         Args:
             name: Which.
-            width: On which words stay as large as they are, such as (3.5, "in"); what suits the figure if omitted.
+            width: On which words stay as large as they are, such as "3.5in"; what suits the figure if omitted.
 
         Raises:
             UsageError: The fit has no such figure, and which it has; or none can be so wide.
@@ -171,7 +171,8 @@ class FigureMethods:
         if self._data_of(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
         mark = warning_mark(assess_fit(self._fit).troubles)
-        return draw_with_title(name, self._data_of(name), self._fit.name, parse_page_width(width), mark)
+        stated = None if width is None else number_with_unit("3.5in").read(width, "width")
+        return draw_with_title(name, self._data_of(name), self._fit.name, parse_page_width(stated), mark)
 
     def __getattr__(self, name: str) -> "Callable[..., Figure]":
         if name.startswith("_"):

@@ -32,7 +32,7 @@ def test_a_figure_is_matplotlibs_and_shows_itself(fit):
     assert isinstance(figure, Figure)
     (data, size), wide = figure._repr_png_(), fit.plot("efficiency", width=(5, "in"))
     assert data.startswith(b"\x89PNG") and size["width"] == int(100 * figure.get_size_inches()[0])
-    assert wide.get_size_inches()[0] == pytest.approx(5.0) == fit.plot.efficiency(width=(127, "mm")).get_size_inches()[0]
+    assert wide.get_size_inches()[0] == pytest.approx(5.0) == fit.plot.efficiency(width="127 mm").get_size_inches()[0]
     assert dict(mpl.rcParams) == before
 
 

@@ -271,6 +271,7 @@ def init(
     example: Annotated[
         list[str] | None, Parameter(metavar="[NAME]", consume_multiple=(0, 2), completer=lambda _: _examples())
     ] = None,
+    notebook: bool = False,
     wrap_angle: Annotated[str | None, Parameter(metavar="ANGLE")] = None,
     columns: Annotated[list[str] | None, Parameter("--column", metavar="QUANTITY=COLUMN:UNIT")] = None,
     channels: Annotated[list[str] | None, Parameter("--channel", metavar="QUANTITY=CHANNEL:UNIT")] = None,
@@ -282,6 +283,7 @@ def init(
         folder: The folder to write.
         files: Files that you measured: they are copied into FOLDER, with a cable.toml that fits them.
         example: Write a data set that comes with bowdenfit; without a name, list them.
+        notebook: With an example: write a notebook that fits it beside it.
         wrap_angle: With one file: its wrap angle, as of fit, such as 180deg. Nothing is asked then.
         columns: With one file: which column is what, as of fit; may be repeated.
         channels: With one file: which channel of a recording is what, as of fit; may be repeated.
@@ -289,7 +291,7 @@ def init(
     """
     named = {"wrap_angle": wrap_angle, "columns": columns, "channels": channels, "settings": settings}
     reading = {name: value for name, value in named.items() if value}
-    _init_dialog().start_data_set(folder, files or [], example, reading)
+    _init_dialog().start_data_set(folder, files or [], example, reading, notebook)
 
 
 def _examples() -> list[str]:

@@ -24,6 +24,7 @@ from bowdenfit.questions.start.folder import (
     write_example,
     write_template,
 )
+from bowdenfit.questions.start.notebook import NOTEBOOK
 from bowdenfit.questions.start.question import Asker, Question, Unattended
 from bowdenfit.reading import Reading
 from bowdenfit.words import filled, printable
@@ -82,7 +83,11 @@ def is_interactive() -> bool:
 
 
 def start_data_set(
-    folder: Path | None, files: Sequence[Path], example: Sequence[str] | None, reading: Reading | None = None
+    folder: Path | None,
+    files: Sequence[Path],
+    example: Sequence[str] | None,
+    reading: Reading | None = None,
+    notebook: bool = False,
 ) -> None:
     """Write a new data set.
 
@@ -91,11 +96,14 @@ def start_data_set(
         files: Measured files.
         example: Name of an example, and its folder; all are listed if empty. None for no example.
         reading: What the user says of a file by the options of `fit`; nothing is then asked.
+        notebook: Whether a notebook is written beside an example.
     """
+    if notebook and not example:
+        raise UsageError("--notebook goes with an example: bowdenfit init --example on-body-exoskeleton --notebook.")
     if reading and (example is not None or len(files) + bool(folder) < 2):
         raise UsageError("options of fit, such as --wrap-angle, describe one measured file; name it after --from.")
     if example is not None:
-        _example(example, folder, files)
+        _example(example, folder, files, notebook)
         return
     target, measured = split_folder_and_files(folder, files)
     if not is_interactive() and target is None and not measured:
@@ -126,7 +134,7 @@ def split_folder_and_files(folder: Path | None, files: Sequence[Path]) -> tuple[
     return next(iter(folders), None), [path for path in named if path not in folders]
 
 
-def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | None) -> None:
+def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | None, notebook: bool) -> None:
     """Write an example, into a folder that may be named behind it, or say which there are."""
     if files:
         raise UsageError("--from and --example both say what to write; leave one of them out.")
@@ -135,11 +143,13 @@ def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | 
             say(known)
         return
     name, folder = named[0], folder or Path(named[-1])
-    write_example(name, folder)
+    write_example(name, folder, notebook)
     verb, place = find_verb(folder), shlex.quote(str(folder))
     if (folder / DEVICE_FILE).is_file():  # which is read beside a fit
         verb, place = f"{verb} RESULTS", shlex.quote(str(folder / DEVICE_FILE))
     say(f"Wrote {folder}. Next: bowdenfit {verb} {place}")
+    if notebook:
+        say(f"Or open {folder / NOTEBOOK} in Jupyter.")
 
 
 def _ask_folder(ask: Asker) -> Path:

@@ -1,7 +1,10 @@
 """`init` without a terminal takes the options of `fit` for one file, and its folder is read as `fit` reads that file."""
 
+import nbclient
+import nbformat
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import bowdenfit as bf
 from bowdenfit.kinds import iterate_tables
@@ -68,3 +71,35 @@ def test_options_without_one_file_are_refused_and_write_nothing(run, tmp_path):
     code, _, err = run("init", tmp_path / "cable", "--from", tmp_path / "a.csv", "--column", "wrap_angle=Lops:turn")
     assert code == 2 and "Loops" in err
     assert not (tmp_path / "cable").exists()
+
+
+@pytest.mark.parametrize("example", ["on-body-exoskeleton", "yarn-on-cylinder"])
+def test_an_example_brings_a_notebook_that_fits_it(run, tmp_path, example):
+    code, out, _ = run("init", "--example", example, tmp_path / "cable", "--notebook")
+    assert (code, "first-fit.ipynb in Jupyter" in out) == (0, True)
+    notebook = nbformat.read(tmp_path / "cable" / "first-fit.ipynb", as_version=4)
+    nbformat.validate(notebook)
+    cells = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    assert ("fit.optimal_length()" in cells) == (example == "on-body-exoskeleton")
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize("example", ["on-body-exoskeleton", "yarn-on-cylinder"])
+def test_the_notebook_of_an_example_runs_without_a_checkout(run, tmp_path, example, monkeypatch):
+    run("init", "--example", example, tmp_path / "cable", "--notebook")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    notebook = nbformat.read(tmp_path / "cable" / "first-fit.ipynb", as_version=4)
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path / "cable")}}).execute()
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert all(output.output_type != "error" for output in outputs)
+    assert sum("image/png" in output.get("data", {}) for output in outputs) >= 1
+
+
+def test_a_notebook_goes_with_the_data_set_of_one_cable(run, tmp_path):
+    code, _, err = run("init", "--example", "synthetic-fleet", tmp_path / "fleet", "--notebook")
+    assert (code, "which the notebook fits" in err) == (2, True)
+    code, _, err = run("init", tmp_path / "cable", "--notebook")
+    assert (code, "goes with an example" in err) == (2, True)
+    assert list(tmp_path.iterdir()) == []

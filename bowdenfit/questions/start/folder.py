@@ -9,6 +9,7 @@ from pathlib import Path
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.inputs import refuse_special
+from bowdenfit.questions.start.notebook import write_notebook
 from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
 from bowdenfit.results.folder import fill_folder_atomically, is_empty
 from bowdenfit.words import listed, shown
@@ -114,20 +115,30 @@ def find_verb(folder: Path) -> str:
     return next((verb for file, verb in _VERB_BY_FILE.items() if (folder / file).is_file()), "")
 
 
-def write_example(name: str, folder: Path) -> None:
+def write_example(name: str, folder: Path, with_notebook: bool = False) -> None:
     """Copy a shipped data set.
 
+    Args:
+        name: Which.
+        folder: Where to.
+        with_notebook: Whether a notebook that fits it is written beside it.
+
     Raises:
-        UsageError, StoreError: There is none of that name; or see `new_folder`.
+        UsageError, StoreError: There is none of that name, or none that a notebook fits; or see `new_folder`.
     """
     known = find_examples()
     if name not in known:
         hint = suggest_name(name, list(known)) if known else "; none was installed."
         raise UsageError(f"there is no example {shown(name)}{hint}")
+    if with_notebook and find_verb(known[name]) != "fit":
+        fitted = [example for example, path in known.items() if find_verb(path) == "fit"]
+        raise UsageError(f"{name} is no data set of one cable, which the notebook fits; there is one for {listed(fitted)}.")
     with new_folder(folder) as place:
         for file in sorted(known[name].rglob("*")):  # shutil.copytree hides what the system says
             copy = place / file.relative_to(known[name])
             copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
+        if with_notebook:
+            write_notebook(place)
 
 
 def find_measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:

@@ -164,6 +164,7 @@ def test_figures_show_the_parameter_of_a_law(fitted):
     assert any("$w$ sheath" in quantity.label and "deg" in quantity.label for quantity in pairs_figure.data(fitted).quantities)
 
 
+@pytest.mark.extended
 def test_identifiability_and_the_next_measurement_know_the_parameter_of_a_law(fitted):
     assert {p.name for p in fitted.known.groups["friction"].parameters} == {"mu", "wobble_sheath"}
     assert choose_target(fitted, "wobble_sheath").unit == "deg"

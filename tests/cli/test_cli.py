@@ -353,6 +353,7 @@ def test_a_setting_of_a_library_that_it_cannot_work_with_is_named(bench, setting
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.extended
 def test_flags_that_would_end_the_process_in_words_of_xla_are_refused(run, refuse, monkeypatch, bench):
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false --nonsense")
     assert "XLA_FLAGS in the environment holds '--nonsense', and flags of XLA begin with --xla_;" in refuse("identify", bench)

@@ -56,6 +56,7 @@ def places(tmp_path_factory, on_body, quick_results, loop_results):
     return {"DATASETS": on_body.parent, "FIT": quick_results, "OTHER": folder / "other", "LOOP": loop_results, "TMP": folder}
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("verb", COMMANDS)
 def test_each_verb_does_what_it_is_for(run, places, verb):
     arguments, word = COMMANDS[verb]

@@ -72,6 +72,7 @@ def forces(data_set, exponent, says="", hidden=0.0):
     return data_set("forces", "input_force_N,output_force_N,run", (force, output, runs), says)
 
 
+@pytest.mark.extended
 def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tmp_path):
     monkeypatch.setitem(KINDS, "losses", LossKind())
     monkeypatch.setitem(TERMS, "losses", LossTerms())
@@ -140,6 +141,7 @@ def test_a_new_file_format_is_a_module_and_a_line(monkeypatch, tmp_path):
     )
 
 
+@pytest.mark.extended
 def test_a_new_question_and_its_figure_are_a_file_and_a_line_each(data_set, monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(FIGURES, "shares", sys.modules[shares.__name__])
     fit = bf.fit(forces(data_set, MU * ANGLE), output=tmp_path / "fit", seed=1, settings=QUICK)

@@ -107,6 +107,7 @@ def independent_samples(dataset: Dataset) -> Dataset:
     return replace(dataset, measurements=dataset.measurements.with_tables(alone))
 
 
+@pytest.mark.extended
 def test_the_same_test_rejects_a_likelihood_that_takes_the_samples_of_a_run_for_independent():
     """The negative control: 40 samples a run, so that intervals of both coefficients come out several times too narrow.
 

@@ -180,6 +180,7 @@ def test_held_readings_have_their_own_noise_too(tmp_path):
     assert noisy > quiet + 3  # 0.105 is outside the band of 0.079, by four standard deviations or by a third of one
 
 
+@pytest.mark.extended
 def test_simulated_readings_and_the_next_run_have_the_stated_noise(tmp_path):
     dataset = bf.read(write(tmp_path, bench(np.random.default_rng(1), 0.12, 0.0)))
     model, table = build_model(dataset), dataset.measurements.table(ForceTable)

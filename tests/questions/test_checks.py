@@ -339,6 +339,7 @@ def changed(dataset, table, column, row, by):
     return dataclasses.replace(dataset, measurements=tables)
 
 
+@pytest.mark.extended
 def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     """Weights put it 3.9 to 9.5 sds from its prediction, by the seed, a fit without it 8.8 to 9.2 (eight seeds)."""
     right = bf.read(on_body, settings=QUICK)

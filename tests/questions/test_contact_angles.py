@@ -158,6 +158,7 @@ def test_another_seed_leaves_the_posterior_and_draws_other_mountings(fit):
         assert signature(verb).parameters["seed"].default is None
 
 
+@pytest.mark.extended
 def test_many_lengths_are_predicted_in_parts_and_too_many_are_refused(fit, monkeypatch):
     lengths = np.linspace(440.0, 520.0, 7)
     in_one, means = bf.predict(fit, lengths), [one.mean for one in fit.efficiency(lengths)]

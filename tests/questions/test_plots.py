@@ -515,6 +515,7 @@ def test_an_axis_has_two_numbers_which_make_a_scale(width):
             check_words(page, f"{low} {span}")
 
 
+@pytest.mark.extended
 def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):
     before = dict(mpl.rcParams)
     written = [path for name, data in paper_data().items() for path in write_figure_files(name, data, tmp_path / "figures")]
@@ -529,6 +530,7 @@ def test_only_the_formats_asked_for_are_written(tmp_path):
     assert [path.name for path in written] == ["coefficients.svg"]
 
 
+@pytest.mark.extended
 def test_the_same_data_give_the_same_bytes_with_words_as_text(tmp_path):
     for folder in ("first", "second"):
         for name, data in paper_data().items():

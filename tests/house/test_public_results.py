@@ -122,7 +122,12 @@ class Tags(HTMLParser):
 
 
 def look_at(value: Any) -> None:
-    """Asserts that something is short in a notebook and, if it is a result, begins with its answer and has a table."""
+    """Asserts that something is short in a notebook and, if it is a result, begins with its answer and has a table.
+
+    What xarray shows, a tree of all draws for ArviZ, is its own matter.
+    """
+    if type(value).__module__.startswith("xarray"):
+        return
     assert len(pretty(value)) <= MOST_IN_A_NOTEBOOK
     if not isinstance(value, Display):
         return
@@ -143,10 +148,11 @@ def is_plain(value: Any) -> bool:
 def reachable(value: Any, name: str, seen: dict[int, Any]) -> Iterator[tuple[str, Any]]:
     """Something, and all that attributes and indices lead to from there.
 
-    Arrays, which NumPy shows in its own way, and classes that compute, which are plain dataclasses, are where it ends; so is
-    the fit that an answer holds, which is a copy without answers of its own.
+    Arrays and trees, which NumPy and xarray show in their own way, and classes that compute, which are plain dataclasses, are
+    where it ends; so is the fit that an answer holds, which is a copy without answers of its own.
     """
-    if id(value) in seen or isinstance(value, np.ndarray) or is_plain(value) or (seen and isinstance(value, Record)):
+    of_library = isinstance(value, np.ndarray) or type(value).__module__.startswith("xarray")
+    if id(value) in seen or of_library or is_plain(value) or (seen and isinstance(value, Record)):
         return
     seen[id(value)] = value
     yield name, value

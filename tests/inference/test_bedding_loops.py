@@ -94,7 +94,7 @@ def test_friction_and_preload_are_recovered_at_any_force(tmp_path, newton):
     assert estimates["preload"].value == pytest.approx(12 * newton, rel=2e-3)
 
 
-@pytest.mark.extended
+@pytest.mark.slow
 def test_of_many_benches_the_friction_is_as_far_off_as_its_standard_errors_say(tmp_path):
     """A model without bedding in is 4 standard errors off on each; the mean of 8 is within 1.2 but once in 1500 times."""
     off = []

@@ -229,7 +229,7 @@ class Quadrature:
         return (lambda mu: np.interp(np.log(mu / 0.12) / 0.3, self.at, cdf / marginal.sum())), high - low
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.extended)])
+@pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.slow)])
 def test_intervals_hold_and_are_narrower_where_the_noise_of_each_reading_is_stated(tmp_path, count):
     """Truth drawn from the prior, readings by NumPy: ranks are uniform. Either assertion fails by chance once in 1000 seeds."""
     generator = np.random.default_rng(7)

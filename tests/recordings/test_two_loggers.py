@@ -199,7 +199,7 @@ def test_a_clock_that_runs_at_another_speed_is_corrected(tmp_path):
     assert abs(recording.strokes.exponent - bench.exponent) < 0.006
 
 
-@pytest.mark.extended
+@pytest.mark.slow
 def test_friction_and_shift_lie_inside_their_intervals_in_twenty_pairs(tmp_path):
     """By chance 2 of 20 intervals of 90 % miss, and 6 or more in one of 90 tests; a shift is off by 1.2 standard errors."""
     generator, inside, errors = np.random.default_rng(7), 0, []

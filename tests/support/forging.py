@@ -134,6 +134,11 @@ def ask(folder: Path, verb: tuple[str, ...]) -> tuple[int, str]:
     return 0, err.getvalue()
 
 
+def peak_memory() -> int:
+    """The most memory that this process has had [KiB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
 def ask_forged_folder(place: Path, whole: Path, number: int) -> Outcome:
     """Ask something of a folder that is forged; nothing but an answer or a refusal may come of it, nor may files be left.
 
@@ -149,10 +154,10 @@ def ask_forged_folder(place: Path, whole: Path, number: int) -> Outcome:
     folder = shutil.copytree(whole, place / "fit")
     try:
         what, verb = forge(chance, folder), chance.choice(VERBS)
-        before, start = contents(place, folder), time.process_time()
+        before, start, most = contents(place, folder), time.process_time(), peak_memory()
         with ended_in_time():
             code, printed = ask(folder, verb)
-        seconds, memory = time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        seconds, memory = time.process_time() - start, peak_memory() - most  # beyond what tests before it have taken
         (place / "x.csv").unlink(missing_ok=True)
         left = [path.name for path in folder.rglob("*") if path.name.endswith(".partial") or path.name == ".lock"]
         wrong = code not in (0, 2, 3) or seconds > SLOWEST or memory > LARGEST or left or contents(place, folder) != before

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from bowdenfit.arguments import read_first
+from bowdenfit.display import Named
 from bowdenfit.verb import Reply, Verb
 
 File = Literal["cable", "device", "fleet", "summary"]
@@ -16,13 +17,13 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 @read_first
-def schema(file: Annotated[File, Parameter("FILE")]) -> dict[str, Any]:
-    """Return the JSON schema of a file, as plain data.
+def schema(file: Annotated[File, Parameter("FILE")]) -> Named[Any]:
+    """Return the JSON schema of a file, a dictionary of plain data.
 
     Args:
         file: Such as cable (of cable.toml), device (device.toml), fleet (fleet.toml), or summary (summary.json).
     """
-    return dict(_SCHEMAS[file]())
+    return Named(_SCHEMAS[file]())
 
 
 @cache

@@ -125,23 +125,8 @@ class Cable:
         def total(laws: tuple[ContactLaw, ...]) -> Array:
             return jnp.sum(jnp.stack([law.exponent(values, wrap_angles[..., k]) for k, law in enumerate(laws)]), axis=0)
 
-        return self._in_own_group(total, group) + self._exponent_of_lengths(values, route)
-
-    def _exponent_of_lengths(self, values: Mapping[str, Array], route: Array | float | None) -> Array | float:
-        """Return what lengths of sheaths add to the friction exponent [1]; their coefficients are those of all groups."""
-        total: Array | float = 0.0
-        for law in self.laws:
-            constant, by_route = law.sheath
-            if by_route and route is None:
-                raise DescriptionError(
-                    f"the length of the sheath {law.contact!r} is the route variable, and at a bend alone, as in loops, "
-                    'displacements and whole recordings, it is not known; state one length instead, length = { value = 1.2, '
-                    'unit = "m" }, or ask at a length.'
-                )
-            if constant or by_route:
-                along_route = 0.0 if route is None else by_route * route
-                total = total + law.exponent_of_length(values, constant + along_route)
-        return total
+        of_lengths = [law.exponent_along(values, route) for law in self.laws]  # whose coefficients are those of all groups
+        return self._in_own_group(total, group) + sum(of_lengths)
 
     def _in_own_group(self, total: Callable[[tuple[ContactLaw, ...]], Array], group: Int[Array, " rows"] | None) -> Array:
         """Return what the laws of each row's group give."""

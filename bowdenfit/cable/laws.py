@@ -15,6 +15,7 @@ from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.description import PriorDefaults
+from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.parameters.symbols import make_symbol
@@ -53,6 +54,23 @@ class ContactLaw(ABC):
         """Return what a length of the sheath [m] adds to the friction exponent beside that [1]; none usually."""
         del values, length
         return 0.0
+
+    def exponent_along(self, values: Mapping[str, Array], route: Array | float | None) -> Array | float:
+        """Return what the length of the sheath at a value of the route variable adds to the friction exponent [1].
+
+        Raises:
+            DescriptionError: The length follows the route variable, and that is not given.
+        """
+        constant, by_route = self.sheath
+        if not by_route:
+            return self.exponent_of_length(values, constant)
+        if route is None:
+            raise DescriptionError(
+                f"the length of the sheath {self.contact!r} is the route variable, and at a bend alone, as in loops, "
+                'displacements and whole recordings, it is not known; state one length instead, length = { value = 1.2, '
+                'unit = "m" }, or ask at a length.'
+            )
+        return self.exponent_of_length(values, constant + by_route * route)
 
     def slope(self, values: Mapping[str, Array], wrap_angle: Float[Array, "*rows"]) -> Float[Array, "*rows"]:
         """Return the derivative of `exponent` by the wrap angle [1/rad]; carries an angle's error into the force prediction."""

@@ -103,10 +103,8 @@ def _compute_shares(fit: Record, at: float) -> np.ndarray:
 
     def exponents(values: dict[str, Array], route: Float[Array, " one"]) -> Array:
         angles = cable.wrap_angles(values, route)
-        return jnp.stack([
-            law.exponent(values, angles[:, k])[0] + law.exponent_of_length(values, law.sheath[0] + law.sheath[1] * route[0])
-            for k, law in enumerate(cable.laws)
-        ])  # fmt: skip
+        both = [law.exponent(values, angles[:, k]) + law.exponent_along(values, route) for k, law in enumerate(cable.laws)]
+        return jnp.stack(both)[:, 0]
 
     with jax.enable_x64(True):
         exponents_by_contact = np.asarray(for_each_value(exponents, parameter_values(fit), np.array([at])))

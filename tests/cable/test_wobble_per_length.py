@@ -72,6 +72,20 @@ def test_one_length_of_all_rows_is_stated_in_any_unit(tmp_path):
         assert float(exponent[0]) == pytest.approx(MU * np.pi + 1.5 * K, rel=1e-6)
 
 
+@pytest.mark.parametrize("forces", [False, True])
+def test_one_length_needs_no_route(tmp_path, forces):
+    """Friction per length is then what is left of the loss without any bend."""
+    folder = bench(tmp_path, length='{ value = 1.5, unit = "m" }', forces=forces, noise=1e-9)
+    text = (folder / "cable.toml").read_text()
+    (folder / "cable.toml").write_text(text.replace(ROUTE, ""))
+    head, *rows = (folder / "t.csv").read_text().splitlines()
+    kept = [row for row in rows if row.startswith("1.4")]
+    (folder / "t.csv").write_text("\n".join([head, *kept]).replace("sheath_length_m,", "").replace("1.4,", "") + "\n")
+    fit = Laboratory().least_squares(bf.read(folder))
+    assert fit.estimates["mu"].value == pytest.approx(MU, rel=1e-4)
+    assert fit.estimates["wobble_per_m_sheath"].value == pytest.approx(K * 1.4 / 1.5, rel=1e-3)
+
+
 def test_at_a_route_value_the_exponent_is_that_of_the_length_and_at_a_bend_alone_it_is_refused(tmp_path):
     cable = build_model(bf.read(bench(tmp_path, unit="mm"))).cable
     values = {"mu": MU, "wobble_per_m_sheath": K}
@@ -120,5 +134,5 @@ def test_a_fit_says_both_predicts_at_other_lengths_and_exports_them(tmp_path):
 @pytest.mark.extended
 def test_where_lengths_and_angles_grow_together_it_is_said_that_they_cannot_be_told_apart(tmp_path):
     bf.fit(bench(tmp_path, noise=0.01, along_angle=True), seed=1, output=tmp_path / "results", figures=False)
-    said = " ".join((tmp_path / "results" / "summary.txt").read_text().split())
-    assert "mu and wobble_per_m_sheath are strongly correlated" in said
+    summary = " ".join((tmp_path / "results" / "summary.txt").read_text().split())
+    assert "mu and wobble_per_m_sheath are strongly correlated" in summary

@@ -351,6 +351,8 @@ def test_fits_that_differ_in_a_prior_alone_are_said_to(by_run_effect, mountings)
     assert f"{other} differs from {comparison.best} only in the prior of mu_edge" in text
     assert "Prefer the simpler one" not in text
     assert bf.compare(by_run_effect).other_priors == {}
+    held = fitted(mountings, friction={"mu_edge": measured_apart}, prior={"tau": {"fixed": 0.03}})
+    assert bf.compare({"none": by_run_effect["without"], "held": held}).other_priors == {}, "a value is held at another one"
 
 
 def test_a_fit_with_a_fixed_parameter_is_loaded_as_it_was_saved(by_run_effect, tmp_path):

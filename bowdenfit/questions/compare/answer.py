@@ -236,10 +236,11 @@ def _list_other_priors(one: Record, other: Record) -> tuple[str, ...]:
     without_priors = [
         fit.dataset.description.model_dump(exclude={"friction", "prior", "sampler", "name", "source"}) for fit in (one, other)
     ]
-    of_one, of_other = ({p.name: p for p in fit.model.space.free} for fit in (one, other))
-    if without_priors[0] != without_priors[1] or of_one.keys() != of_other.keys():
+    fixed, of_other = ({p.name: p.fixed for p in fit.model.space.parameters} for fit in (one, other))
+    if without_priors[0] != without_priors[1] or fixed != of_other:
         return ()
-    return tuple(name for name, p in of_one.items() if p.prior != of_other[name].prior)
+    pairs = zip(one.model.space.free, other.model.space.free, strict=True)  # in one order, as their descriptions are alike
+    return tuple(p.name for p, q in pairs if p.prior != q.prior)
 
 
 def _require_draws(name: str, fit: Record) -> Draws:

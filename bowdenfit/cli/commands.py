@@ -28,7 +28,7 @@ import bowdenfit as bf
 from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
 from bowdenfit.cli.running import watch_verb
-from bowdenfit.cli.stage_line import print_stages, show_stages
+from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stages
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
@@ -195,9 +195,9 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
         refuse_unwritable(request["output"])
     function = unwrap(verb.function)  # whose arguments have been read
     if "report" in parameters_of(function):
-        request["report"] = lambda sentence: say(sentence, err=True)
+        request["report"] = say_beside_stages
     if verb.watch is None:
-        with show_stages(None, verb.name or verb.function.__name__):
+        with show_stages(None):
             answer = function(**request)
     else:
         with watch_verb(request["output"], verb.watch) as progress:

@@ -130,7 +130,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         return f"{watch.remark} {folder}: run the same command with --resume" if kept is not None and kept.exists() else ""
 
     try:
-        with announce_continuation(how_to_go_on), show_stages(watch, watch.bar["desc"]) as show:
+        with announce_continuation(how_to_go_on), show_stages(watch) as show:
 
             def report(*progress: Any) -> None:
                 refuse_interrupted()

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 from tqdm import tqdm
 
+from bowdenfit.cli.terminal import say
 from bowdenfit.stages import LOGGER
 from bowdenfit.verb import Watch
 
@@ -42,12 +43,11 @@ class StageLine(logging.Handler):
 
 
 @contextmanager
-def show_stages(watch: Watch | None, name: str = "") -> Iterator[Report]:
+def show_stages(watch: Watch | None) -> Iterator[Report]:
     """Yield what a verb calls with its progress; on a terminal, show that and the stages that are announced meanwhile.
 
     Args:
         watch: What the bar shows of a verb's progress; None if it has none.
-        name: Of the verb, shown before the first stage.
     """
     if not sys.stderr.isatty() or LOGGER.isEnabledFor(logging.INFO):  # nobody looks, or --verbose prints them
         yield lambda *_: None
@@ -55,7 +55,7 @@ def show_stages(watch: Watch | None, name: str = "") -> Iterator[Report]:
     options: dict[str, Any] = dict(watch.bar) if watch else {}
     with tqdm(leave=False, delay=_DELAY, **options) as bar:
         line, done = StageLine(bar, watch), threading.Event()
-        bar.bar_format, bar.desc = _STAGE, name
+        bar.bar_format, bar.desc = _STAGE, "starting"
         clock = threading.Thread(target=_refresh, args=(bar, done), daemon=True)
         LOGGER.addHandler(line)
         LOGGER.setLevel(logging.INFO)
@@ -76,6 +76,12 @@ def _refresh(bar: Any, done: threading.Event) -> None:
         return
     while not done.wait(_TICK):
         bar.refresh()
+
+
+def say_beside_stages(sentence: str) -> None:
+    """Print a sentence on standard error, above the line with the stage where there is one."""
+    with tqdm.external_write_mode(file=sys.stderr):
+        say(sentence, err=True)
 
 
 def print_stages() -> None:

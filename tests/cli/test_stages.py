@@ -6,7 +6,7 @@ import re
 import time
 from contextlib import redirect_stderr
 
-from bowdenfit.cli.stage_line import show_stages
+from bowdenfit.cli.stage_line import say_beside_stages, show_stages
 from bowdenfit.run.verb import WATCH
 from bowdenfit.stages import LOGGER, announce_stage
 
@@ -26,7 +26,7 @@ class Terminal(io.StringIO):
 
 def test_the_clock_of_a_stage_runs_and_its_line_goes_in_the_end():
     terminal = Terminal()
-    with redirect_stderr(terminal), show_stages(None, "predict"):
+    with redirect_stderr(terminal), show_stages(None):
         announce_stage("reading my-cable")
         time.sleep(2.6)
     lines = terminal.lines()
@@ -41,7 +41,7 @@ def test_progress_takes_the_line_and_the_next_stage_takes_it_back():
     class Progress:
         steps, sampler, r_hat, ess = 300, "emcee", None, None
 
-    with redirect_stderr(terminal), show_stages(WATCH, "fitting") as report:
+    with redirect_stderr(terminal), show_stages(WATCH) as report:
         announce_stage("compiling the posterior")
         time.sleep(1.8)
         report(Progress)
@@ -52,9 +52,19 @@ def test_progress_takes_the_line_and_the_next_stage_takes_it_back():
     assert re.search(in_order, shown)
 
 
+def test_a_sentence_beside_a_stage_has_a_line_of_its_own():
+    terminal = Terminal()
+    with redirect_stderr(terminal), show_stages(None):
+        announce_stage("drawing efficiency")
+        time.sleep(1.8)
+        say_beside_stages("Its figure could not be drawn.")
+        time.sleep(0.8)
+    assert re.search(r"\r +\rIts figure could not be drawn\.\n\r?drawing efficiency, 00:0\d", terminal.getvalue())
+
+
 def test_a_quick_command_shows_nothing():
     terminal = Terminal()
-    with redirect_stderr(terminal), show_stages(None, "length"):
+    with redirect_stderr(terminal), show_stages(None):
         announce_stage("reading my-cable")
     assert terminal.lines() == []
 

@@ -1,1 +1,5 @@
-"""JSON schemas of the files that people and programs write and read."""
+"""JSON schemas of the files that people and programs write and read; functions are loaded when first used."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+from .schemas import make_schema as make_schema

@@ -100,7 +100,7 @@ def start_data_set(
     """
     if notebook and not example:
         raise UsageError("--notebook goes with an example: bowdenfit init --example on-body-exoskeleton --notebook.")
-    if reading and (example is not None or len(files) + bool(folder) < 2):
+    if reading and (example is not None or not files):
         raise UsageError("options of fit, such as --wrap-angle, describe one measured file; name it after --from.")
     if example is not None:
         _example(example, folder, files, notebook)

@@ -60,8 +60,8 @@ _BEND_WORDS = (  # of the angular ones those of nothing but a bent cable
 _BENDS = frozenset(_BEND_WORDS.split())
 _WITH_UNIT_ALONE = frozenset({"elbow", "direction", "configuration"})  # else a label, or a direction of motion
 _COUNTED = {"turn": "turn", "turns": "turn", "wraps": "turn", "windungen": "turn", "umdrehungen": "turn", "tours": "turn",
-            "vueltas": "turn", "giri": "turn",
-            "windings": "turn", "loops": "turn", "coils": "turn", "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
+            "vueltas": "turn", "giri": "turn", "windings": "turn", "loops": "turn", "coils": "turn",
+            "deg": "deg", "degree": "deg", "degrees": "deg"}  # fmt: skip
 _GUESSES = {name: quantity for quantity, names in _AMBIGUOUS_NAMES.items() for name in names.split("|")}
 _RATIO = ("ratio",)
 _MOST_RADIANS = 13.0  # two turns are 12.6; larger numbers are degrees
@@ -151,12 +151,10 @@ def likely_angle_unit(heading: str, high: float, are_whole: bool) -> str:
         high: The largest of them.
         are_whole: Whether they are whole numbers.
     """
-    unit = implied_angle_unit(heading)
-    if unit == "deg" and names_bend(heading) and are_whole and high <= _MOST_RADIANS:
-        return ""  # the number of 90 deg bends
-    if unit:
+    unit, are_few = implied_angle_unit(heading), are_whole and high <= _MOST_RADIANS
+    if unit and not (unit == "deg" and names_bend(heading) and are_few):  # as in the number of 90 deg bends
         return unit
-    return "deg" if high > _MOST_RADIANS else "" if are_whole else "rad"
+    return "" if are_few else "deg" if high > _MOST_RADIANS else "rad"
 
 
 def implied_angle_unit(heading: str) -> str:

@@ -295,21 +295,14 @@ def _refuse_passed_over(path: Path, table: RawTable) -> None:
         if unit is None:
             raise DatasetError(
                 f"{path.name} has a column {shown(name)}, which is likely to count the bends of each row, and --wrap-angle "
-                f"states one angle for all rows. {_counted_bends(name)} If it counts something else, take it out of the file."
+                "states one angle for all rows. Write the wrap angle into a column of its own, headed wrap_angle_deg: the "
+                f"number in {shown(name)} times the angle of one bend. If it counts something else, take it out of the file."
             )
         raise DatasetError(
             f"{path.name} has a column {shown(name)}, which is likely to hold the wrap angle of each row, and --wrap-angle "
             f"states one angle for all rows. Name it instead: {option_naming('wrap_angle', name, unit)}; if it is another "
             "angle, take the column out of the file."
         )
-
-
-def _counted_bends(name: str) -> str:
-    """Return what to do about a column that counts bends."""
-    return (
-        f"Write the wrap angle into a column of its own, headed wrap_angle_deg: the number in {shown(name)} times the angle "
-        "of one bend."
-    )
 
 
 def _find_columns_of_words(headings: Sequence[tuple[str, str]], numbers: Sequence[HeadedColumn]) -> dict[str, ColumnSource]:

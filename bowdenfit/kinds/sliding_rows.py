@@ -116,7 +116,7 @@ def expected_forces(
     out_variance: Vector | float = 1.0
     if sd is not None:
         in_variance, out_variance = sd[:, 0] ** 2, sd[:, 1] ** 2
-        slope, noise = _york_slopes(input_force, output_force, group, slope, (sd[:, 0] ** 2, sd[:, 1] ** 2)), 1.0
+        slope, noise = _york_slopes(input_force, output_force, group, slope, (in_variance, out_variance)), 1.0
     slope = slope[group]
     across = out_variance + in_variance * slope**2
     distance = output_force - slope * input_force

@@ -8,6 +8,7 @@ import numpy as np
 from bowdenfit.description.cable_parts import Pulleys
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import Channel, ChannelFile
+from bowdenfit.files.clocks import YEARS
 from bowdenfit.files.headings import option_naming
 from bowdenfit.files.pieces import have_same_numbers
 from bowdenfit.recordings.named_channels import (
@@ -24,10 +25,9 @@ from bowdenfit.units import INTERNAL_UNITS, ColumnSource, dimension_of, is_unit,
 from bowdenfit.words import quoted, shown
 
 _FORCES = ("input_force", "output_force")
-_FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
+FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
 _SLOWEST = 2.0  # s between samples, from which a clock without a unit is likelier to count milliseconds
 _SHORTEST = 0.5  # s, in which no motor pulls a cable back and forth; a judgement
-_DATES = 1e8  # numbers from here on are dates, of which the unit is plain
 
 
 def to_recording(
@@ -321,9 +321,9 @@ def _read_clock_without_unit(file: ChannelFile, channel: Channel) -> tuple[Chann
     None for any other clock, for one that holds dates, and for few samples.
     """
     clock = next((c for c in file.channels if c.name == channel.clock), None)
-    if clock is None or clock.unit or channel.time is None or len(channel.time) < _FEW_SAMPLES:
+    if clock is None or clock.unit or channel.time is None or len(channel.time) < FEW_SAMPLES:
         return None
-    if np.nanmax(np.abs(clock.values)) >= _DATES:
+    if np.nanmax(np.abs(clock.values)) >= YEARS:
         return None
     return clock, float(np.nanmedian(np.diff(channel.time))), float(np.nanmax(channel.time) - np.nanmin(channel.time))
 

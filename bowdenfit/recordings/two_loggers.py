@@ -9,12 +9,14 @@ A shift at which the output follows the input is only taken where no other fits 
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from bowdenfit.description import Preparation, QuantityValue
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.pieces import subsample
+from bowdenfit.recordings.forces import FEW_SAMPLES
 from bowdenfit.recordings.preparation import delays_of_parts, inspect_recording
 from bowdenfit.recordings.preparation.blocks import main_frequency
 from bowdenfit.recordings.preparation.checks import check_channels, check_sign
@@ -39,7 +41,6 @@ _AS_WELL = 3.0
 _FEWEST_PARTS, _MOST_PARTS = 8, 24  # judged: of a recording, whose delays tell how fast the output's clock runs
 _PART = 25.0  # [s]; as much as is looked at for a delay
 _CLEAR_DRIFT = 4.5  # standard errors; four in a thousand steady clocks by Student's t with 6 degrees of freedom
-FEW_SAMPLES = 50  # below which a recording may well have been written down by hand
 _ROUNDS = 5  # judged: of correcting the speed of a clock
 _DAY = 86400.0  # [s]
 _STATE = 'state what is to be added to the output\'s times, clock_shift = { value = ..., unit = "s" } in its [[recording]].'
@@ -51,12 +52,12 @@ class ClockShift:
 
     Args:
         value: What was added to the times of the output [s]; to those from the input's first date where both have dates.
-        source: "forces", "dates" or "stated".
+        source: What says it.
         rate: By how much the output's clock runs faster [1].
     """
 
     value: float
-    source: str
+    source: Literal["forces", "dates", "stated"]
     rate: float = 0.0
 
     def describe(self, raw: RawRecording, delay: float, sd: float) -> str:

@@ -188,8 +188,8 @@ def test_simulated_readings_and_the_next_run_have_the_stated_noise(tmp_path):
     with jax.enable_x64(True):
         keys = jax.random.split(jax.random.key(0), 400)
         draw = jax.vmap(lambda key: TERMS["forces"].draw(table, Truth(model.cable, None, values, key)))
-        drawn = draw(keys)
-        spread = np.std(np.stack([drawn["input_force"], drawn["output_force"]], axis=-1), axis=0)
+        readings = draw(keys)
+        spread = np.std(np.stack([readings["input_force"], readings["output_force"]], axis=-1), axis=0)
         run = typical_run(dataset.measurements)
     assert spread / table.sd == pytest.approx(np.ones((48, 2)), abs=0.2)  # 400 draws: 0.035 each, 96 of them
     assert run.noise == STATED_NOISE and sorted(set(np.round(run.sd[:, 1], 6))) == [0.15, 1.5]

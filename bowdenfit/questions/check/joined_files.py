@@ -9,12 +9,16 @@ from bowdenfit.files import read_channels
 from bowdenfit.files.apart import limits_times
 from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.kinds.fit_command import FitCommand, require_recordings
-from bowdenfit.questions.check.single_file import describe_channels, describe_commands, describe_recorded
+from bowdenfit.questions.check.single_file import (
+    ANY_ANGLE,
+    describe_channels,
+    describe_commands,
+    describe_recorded,
+    with_missing,
+)
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import counted, filled
-
-_ANY_ANGLE = (180.0, "deg")  # any will do to look at files; the command proposes the same
 
 
 def describe_joined_files(path: Path, reading: Reading) -> tuple[str, bool]:
@@ -33,7 +37,7 @@ def describe_joined_files(path: Path, reading: Reading) -> tuple[str, bool]:
     with limits_times(limit):
         files = [MissingCodes(tuple(missing)).blank_samples(read_channels(file))[0] for file in (path, join)]
         try:
-            data = load_folder_or_file(path, reading.get("settings", ()), channels, (), missing, _ANY_ANGLE, limit, join)
+            data = load_folder_or_file(path, reading.get("settings", ()), channels, (), missing, ANY_ANGLE, limit, join)
             recordings = data.measurements.table(Recordings)
         except DatasetError as error:
             obstacle = str(error)
@@ -43,7 +47,7 @@ def describe_joined_files(path: Path, reading: Reading) -> tuple[str, bool]:
         lines += [filled(title), "", *describe_channels(file), ""]
     lines += [*describe_recorded(recordings, obstacle)[1:], ""]
     options = [f"--join {shlex.quote(str(join))}", *(f"--channel {shlex.quote(channel)}" for channel in channels)]
-    options += [f"--missing {shlex.quote(str(code))}" for code in missing]
-    command = " ".join(["bowdenfit fit", shlex.quote(str(path)), "--wrap-angle 180deg", *options])
-    lines += describe_commands([FitCommand(command, ("180 deg is the wrap angle of the bench",))], not obstacle)
+    text = " ".join(["bowdenfit fit", shlex.quote(str(path)), "--wrap-angle 180deg", *options])
+    command = with_missing(FitCommand(text, ("180 deg is the wrap angle of the bench",)), missing)
+    lines += describe_commands([command], not obstacle)
     return "\n".join(lines) + "\n", not obstacle

@@ -47,7 +47,7 @@ from bowdenfit.recordings.recording import Recordings
 from bowdenfit.words import WIDTH, counted, filled, listed, narrow_table, shown
 
 _CHOICES = ("noise", "friction", "geometry", "undetected")  # options that the command repeats
-_ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
+ANY_ANGLE = (180.0, "deg")  # any will do to look at a file; the command proposes the same
 _LEFT = ("column", "unit", "read as")  # columns aligned to the left
 _MAX_NAMED = 8  # channels whose first and last sample are named
 _LONG = 50  # rows from which a table beside a clock is meant as a recording; with fewer its clock may say when each was read
@@ -92,7 +92,7 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
     command = make_table_command(path, raw, file.kind, named)
     has_angles = has_own_angles(path, file.kind, tuple(named), stated=False)
     strict = any(reading.values()) and not command.names_more
-    angle = None if has_angles or "wrap_angle=" in command.text else _ANY_ANGLE
+    angle = None if has_angles or "wrap_angle=" in command.text else ANY_ANGLE
     data, obstacle = _try_as_data_set(path, cast(Reading, {**reading, "wrap_angle": angle}), strict)
     remaining = obstacle
     if obstacle and command.names_more:
@@ -137,10 +137,10 @@ def _with_settings(command: FitCommand, reading: Reading) -> FitCommand:
     """Return the command with what the user has set besides columns."""
     stated = [f"--set {shlex.quote(setting)}" for setting in reading.get("settings", ())]
     stated += [f"--{name} {value}" for name in _CHOICES if (value := reading.get(name))]
-    return _with_missing(replace(command, text=" ".join([command.text, *stated])), reading.get("missing", ()))
+    return with_missing(replace(command, text=" ".join([command.text, *stated])), reading.get("missing", ()))
 
 
-def _with_missing(command: FitCommand, codes: Sequence[str]) -> FitCommand:
+def with_missing(command: FitCommand, codes: Sequence[str]) -> FitCommand:
     """Return the command with the missing-value codes."""
     return replace(command, text=" ".join([command.text, *(f"--missing {shlex.quote(code)}" for code in codes)]))
 
@@ -153,7 +153,7 @@ def _describe_recording(path: Path, kind: FileKind, channels: Sequence[str], mis
     recordings, obstacle = _read_recording(file, channels, angle, missing)
     backwards = describe_backward_clock(file) if obstacle and "backwards" not in obstacle else ""
     obstacle = "\n".join(filter(None, [obstacle, backwards]))
-    command = _with_missing(_recording_command(path, file, channels, angle), missing)
+    command = with_missing(_recording_command(path, file, channels, angle), missing)
     usable = not obstacle or (not channels and "--channel" in command.text and not backwards)
     return describe_recording_file(file, kind.why, command, recordings, obstacle, usable), not obstacle
 
@@ -215,7 +215,7 @@ def _read_recording(
     Returns:
         The recording, None where they make none; and why not, in a sentence.
     """
-    stated = _ANY_ANGLE if angle is None else (angle.angle, "rad")
+    stated = ANY_ANGLE if angle is None else (angle.angle, "rad")
     try:
         data = single_file_dataset(file.path, stated, (), parse_channels(channels), kind="recordings", missing=missing)
     except DatasetError as error:

@@ -15,7 +15,6 @@ from bowdenfit.files.headings import (
     MatchedColumn,
     find_candidates,
     heading_of,
-    is_number,
     meanings,
     option_naming,
     plain_name,
@@ -23,6 +22,7 @@ from bowdenfit.files.headings import (
 )
 from bowdenfit.files.headings import Quantity as Quantity  # readers of tables take both from here
 from bowdenfit.files.measured_cells import split_measured
+from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.files.spellings import parse_heading
 from bowdenfit.files.tables import RawTable
 from bowdenfit.units import (
@@ -38,7 +38,6 @@ from bowdenfit.units import (
 from bowdenfit.words import few, listed, quoted, shown
 
 Value = TypeVar("Value")
-_FEWEST_IN_PIVOT = 2  # headings that are values, from which they are those of a pivot table
 _ALIKE = 0.5  # judged: difflib's likeness from which an unknown quantity is taken for a misspelled one
 
 
@@ -259,8 +258,9 @@ def _missing_column_error(table: RawTable, name: str, example: str, read: Collec
     if values := find_pivot_headings(others):
         return DatasetError(
             f"{table.file}: {few([shown(value) for value in values])} stand over columns, as in a pivot table with a column "
-            "for each angle or load. Write one row for each reading instead, in the columns wrap_angle_deg, input_force_N and "
-            "output_force_N."
+            "for each angle or load. Such a table is read where these headings have their unit, as in 45° or 20 N, the other "
+            "column says what it is, as in Input force (N) or Wrap angle (deg), and the cells are output forces; else write "
+            "one row for each reading, in the columns wrap_angle_deg, input_force_N and output_force_N."
         )
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
     option = option_naming(name, "NAME", unit.replace("_", "*"))
@@ -268,12 +268,6 @@ def _missing_column_error(table: RawTable, name: str, example: str, read: Collec
         f"{table.file} has no column {name}{_suggest_heading(name, others)}; it has {quoted(table.header)}. Name the "
         f"column {example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
-
-
-def find_pivot_headings(header: Sequence[str]) -> list[str]:
-    """Return the headings that are values, as in a pivot table, where there are several; empty for any other table."""
-    values = [heading for heading in header if is_number(heading) or split_measured(heading)]
-    return values if len(values) >= _FEWEST_IN_PIVOT else []
 
 
 def describe_paired_headings(table: RawTable, columns: Mapping[str, Column], stated: Collection[str]) -> list[str]:

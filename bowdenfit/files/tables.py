@@ -10,6 +10,7 @@ from bowdenfit.files.cells import Cell, Decimals, is_plain_number
 from bowdenfit.files.formats import PLAIN_TEXT, UNKNOWN, check_ending, recognize
 from bowdenfit.files.headings import heading_of, repeated_heading
 from bowdenfit.files.measured_cells import split_measured
+from bowdenfit.files.pivot import unpivot
 from bowdenfit.files.row_account import BLANK, COMMENT, RowAccount, make_account
 from bowdenfit.files.table_parts import TableParts, count_numbers, is_measured, split_table
 from bowdenfit.files.text_file import (
@@ -49,6 +50,7 @@ class RawTable:
         units: The unit that stands below each heading, or behind its numbers; empty without one.
         lines: Where the rows of the file went.
         errors: What stands behind ± in the cells of a column, by its heading.
+        remarks: How its layout was understood, in sentences.
         faults: What is found wrong while it is read.
     """
 
@@ -59,6 +61,7 @@ class RawTable:
     units: tuple[str, ...]
     lines: RowAccount
     errors: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
     faults: Faults = field(default_factory=Faults, compare=False)
 
     @property
@@ -213,7 +216,11 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
         for i, (heading, unit) in enumerate(zip(header, below, strict=True))
     )
     account = _account(name, lines, rows, parts, len(header))
-    return RawTable(name, header, parts.headings[0].row, cells, units, account, _errors_in_cells(header, cells))
+    remarks: tuple[str, ...] = ()
+    if long := unpivot(header, units, cells):
+        header, units, cells, remarks = long.header, long.units, long.rows, (f"{name}: {long.remark}",)
+    errors = _errors_in_cells(header, cells)
+    return RawTable(name, header, parts.headings[0].row, cells, units, account, errors, remarks)
 
 
 def _score_separator(lines: Sequence[Line], separator: str) -> tuple[int, bool, bool, int]:

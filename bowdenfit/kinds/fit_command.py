@@ -10,9 +10,9 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.clocks import names_time
-from bowdenfit.files.columns import find_pivot_headings
 from bowdenfit.files.headings import Quantity, find_candidates, heading_of, option_naming, split_brackets
 from bowdenfit.files.layout import is_index
+from bowdenfit.files.pivot import find_pivot_headings
 from bowdenfit.files.spellings import likely_angle_unit, likely_wrap_angle, parse_heading
 from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.kinds.file_kind import (

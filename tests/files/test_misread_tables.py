@@ -6,6 +6,7 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.files.tables import read_csv
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
+from bowdenfit.kinds.forces.table import ForceTable
 
 HEADING = "input_force_N,output_force_N\n"
 
@@ -294,13 +295,45 @@ def test_forces_without_any_noise_are_said_to_be_computed(tmp_path, digits, comp
     assert any("these forces were computed" in remark for remark in remarks) == computed
 
 
-@pytest.mark.parametrize("heading", ["Input force (N),45°,90°,180°", "F_in (N),45,90,180", "Wrap angle (deg),10 N,20 N,30 N"])
-def test_a_pivot_table_is_answered_with_how_to_write_it(tmp_path, run, heading):
-    (tmp_path / "t.csv").write_text(f"{heading}\n10,9.2,8.5,7.3\n20,18.5,17,14.6\n30,27.7,25.6,21.9\n", encoding="utf-8")
+BY_ANGLE = "10,9.2,8.5,7.3\n20,18.5,17,14.6\n30,27.7,25.6,21.9\n"
+BY_LOAD = "45,9.2,18.5,27.7\n90,8.5,17,25.6\n180,7.3,14.6,21.9\n"
+
+
+@pytest.mark.parametrize(
+    ("heading", "body"),
+    [
+        ("Input force (N),45°,90°,180°", BY_ANGLE),
+        ("F_in [N];45 deg;90 deg;180 deg", BY_ANGLE.replace(",", ";")),
+        ("Wrap angle (deg),10 N,20 N,30 N", BY_LOAD),
+    ],
+)
+def test_a_pivot_table_of_output_forces_is_read_cell_by_cell(tmp_path, heading, body):
+    (tmp_path / "t.csv").write_text(f"{heading}\n{body}", encoding="utf-8")
+    data = bf.read(tmp_path / "t.csv")
+    rows = data.measurements.table(ForceTable)
+    readings = sorted(zip(np.rad2deg(rows.own.angle[:, 0]).round(), rows.input_force, rows.output_force, strict=True))
+    assert readings == [
+        (45, 10, 9.2), (45, 20, 18.5), (45, 30, 27.7), (90, 10, 8.5), (90, 20, 17), (90, 30, 25.6), (180, 10, 7.3),
+        (180, 20, 14.6), (180, 30, 21.9),
+    ]  # fmt: skip
+    assert any("over columns are taken as" in sentence for sentence in data.measurements.remarks)
+
+
+@pytest.mark.parametrize(
+    ("heading", "body"),
+    [
+        ("F_in (N),45,90,180", BY_ANGLE),  # angles, but in which unit?
+        ("Load,45°,90°,180°", BY_ANGLE),
+        ("Output force (N),45°,90°,180°", BY_ANGLE),
+        ("Input force (N),45°,90°,180°", "10,0.92,0.85,0.73\n20,0.92,0.85,0.73\n30,0.92,0.85,0.73\n"),
+    ],
+)
+def test_another_pivot_table_is_answered_with_how_to_write_it(tmp_path, run, heading, body):
+    (tmp_path / "t.csv").write_text(f"{heading}\n{body}", encoding="utf-8")
     code, out, _ = run("check", tmp_path / "t.csv")
     printed = " ".join(out.split())
     assert code == 2 and "as in a pivot table" in printed
-    assert "Write one row for each reading" in printed and "NAME" not in printed
+    assert "write one row for each reading" in printed and "NAME" not in printed
 
 
 def test_a_table_of_wrap_angles_by_length_is_said_to_be_one(tmp_path, run):

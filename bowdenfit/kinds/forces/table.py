@@ -210,7 +210,7 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     with table.faults.collect():
         group, remarks = read_groups(columns, table.file, *groups)
     remarks += describe_paired_headings(table, columns, source.columns) + sd_remarks
-    remarks += remark_on_errors_in_cells(table, columns)
+    remarks += [*remark_on_errors_in_cells(table, columns), *table.remarks]
     if "stroke" not in columns:
         remarks.append(f"{table.file} has no stroke column: every row is taken as pulling (rope sliding to the motor).")
     strokes, stroke_remarks = read_strokes_by_loss(columns, np.log(input_force / output_force))

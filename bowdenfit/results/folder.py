@@ -318,6 +318,12 @@ def remove_earlier_fit(folder: Path) -> None:
     remove_run_files(folder, _WRITTEN, [FIGURES])
 
 
+def remove_checkpoint(folder: Path) -> None:
+    """Remove the checkpoint of a fit that needs no more draws; one that cannot be removed harms nothing."""
+    with suppress(OSError):
+        (folder / CHAIN).unlink(missing_ok=True)
+
+
 def refuse_invalid_seed(seed: Any) -> None:
     """Refuse an invalid seed.
 

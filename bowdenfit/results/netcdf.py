@@ -16,11 +16,14 @@ from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.files.apart import Limits, call_isolated
 from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
+from bowdenfit.results.serialization import round_to_single
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
 # Bytes and seconds of CPU that reading may take, some times what honest files take: they hold plain arrays.
 _MEMORY, _MEMORY_PER_BYTE, _SECONDS, _SECONDS_PER_BYTE = 1 << 29, 8, 5.0, 5e-7
+_PACKED = {"compression": "gzip", "shuffle": True}  # draws of walkers that stay where they are repeat
+_MOST_PACKED = 100  # times the size of a file that one of its arrays may have; a judgement
 EXPECTED, DERIVED = "expected_", "derived"  # the group of what follows from parameters, and may be infinite
 
 
@@ -84,8 +87,16 @@ def _write(
             else:
                 group.create_variable(dimension, (dimension,), data=np.arange(length))
     flags = values.dtype == bool
-    variable = group.create_variable(name, dimensions, data=values.astype("int8") if flags else values)
+    variable = group.create_variable(name, dimensions, data=_shorten(values), **(_PACKED if values.size > 1 else {}))
     variable.attrs.update({**attributes, **({"dtype": "bool"} if flags else {})})
+
+
+def _shorten(values: np.ndarray) -> np.ndarray:
+    """Return an array as it is written: flags as integers, and numbers of single precision in as many bytes as these take."""
+    if values.dtype == bool:
+        return values.astype("int8")
+    is_single = values.dtype == np.float64 and np.array_equal(values, round_to_single(values), equal_nan=True)
+    return values.astype(np.float32) if is_single else values
 
 
 def _key(name: str) -> str:
@@ -171,8 +182,8 @@ def own_member(group: h5py.Group, name: str) -> Any:
     if isinstance(member, h5py.Dataset):
         if member.external or member.is_virtual:
             raise ValueError(f"{name} lies in other files")
-        if member.nbytes > group.file.id.get_filesize():
-            raise ValueError(f"{name} says that it is larger than its file")
+        if member.nbytes > _MOST_PACKED * group.file.id.get_filesize():
+            raise ValueError(f"{name} says that it is far larger than its file")
     return member
 
 
@@ -189,4 +200,5 @@ def _is_label(member: h5py.Dataset) -> bool:
 
 
 def _array(member: h5py.Dataset) -> np.ndarray:
-    return np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)
+    values = np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)
+    return values.astype(np.float64) if values.dtype == np.float32 else values

@@ -145,6 +145,12 @@ _PAGE, _ARRAY = "page", "array"
 _LARGEST_PAGE = 40e6  # bytes; a judgement: far more than figures need
 
 
+def round_to_single(values: np.ndarray) -> np.ndarray:
+    """Return numbers as they are in single precision, in the type that they have; infinite where they are too large for it."""
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32).astype(values.dtype) if values.dtype == np.float64 else values
+
+
 def write_arrays(path: Path, data: Mapping[str, Any]) -> None:
     """Write data whole; an array that stands in several places is written once.
 

@@ -15,6 +15,7 @@ from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.outputs import replace_atomically
 from bowdenfit.results.folder import (
     CHAIN,
+    FIT,
     folder_to_write,
     refuse_invalid_seed,
     refuse_to_overwrite,
@@ -121,6 +122,11 @@ def read_checkpoint(folder: Path) -> dict[str, Any]:
     """
     path = folder / CHAIN
     if not path.exists():
+        if (folder / FIT).exists():
+            raise StoreError(
+                f"{folder} holds a finished fit, whose checkpoint ({CHAIN}) is no longer there: nothing is left to resume. "
+                "Read it with bowdenfit summary, or fit again with --force in the place of --resume."
+            )
         raise StoreError(f"{folder} holds no checkpoint ({CHAIN}) to resume from; fit without --resume.")
     try:
         fingerprint = read_fingerprint(path)

@@ -13,7 +13,7 @@ from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Seed, read_first
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
-from bowdenfit.results.folder import CHAIN, reserve_folder
+from bowdenfit.results.folder import CHAIN, remove_checkpoint, reserve_folder
 from bowdenfit.stages import announce_stage
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
 
@@ -74,6 +74,8 @@ def fit(
             result = run.fit_classically(data, seed)
         for sentence in run.write_results(result, folder, figures) if folder is not None else ():
             report(sentence)
+        if folder is not None and result.converged:
+            remove_checkpoint(folder)
     return result
 
 

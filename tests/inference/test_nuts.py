@@ -199,12 +199,13 @@ def test_resumed_chains_equal_those_that_were_never_interrupted(program, tmp_pat
     np.testing.assert_array_equal(run(checkpoint=path, resume=True).z, run().z)
 
 
-def test_resume_tops_up_a_finished_fit_and_refuses_another_sampler(saved):
-    fit, folder = saved
+def test_resume_tops_up_a_fit_that_has_not_converged_and_refuses_another_sampler(tmp_path):
+    folder, settings = tmp_path / "fit", (*QUICK, "sampler.target_r_hat=1.0000001")
+    fit = bf.fit(YARN, output=folder, sampler="nuts", seed=5, settings=settings, figures=False)
     with pytest.raises(bf.StoreError, match="description changed"):
-        bf.fit(YARN, output=folder, resume=True, settings=QUICK)
-    more = ("sampler.max_steps=500", "sampler.target_r_hat=1.0000001")
-    longer = bf.fit(YARN, output=folder, sampler="nuts", resume=True, settings=(*QUICK, *more), figures=False)
+        bf.fit(YARN, output=folder, resume=True, settings=settings)
+    more = (*settings, "sampler.max_steps=500")
+    longer = bf.fit(YARN, output=folder, sampler="nuts", resume=True, settings=more, figures=False)
     assert (fit.posterior.steps, longer.posterior.steps) == (300, 500)
     np.testing.assert_array_equal(longer.posterior.z[:, :300], fit.posterior.z)
     assert not longer.converged

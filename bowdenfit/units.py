@@ -117,6 +117,11 @@ def _registry() -> "pint.UnitRegistry":
     return pint.UnitRegistry(cache_folder=None)
 
 
+def usual_units(dimension: str) -> list[str]:
+    """Return the usual units of a dimension, the most usual first; none where there are none."""
+    return _EXAMPLES[dimension].split(", ") if dimension in _EXAMPLES else []
+
+
 def is_unit(text: str) -> bool:
     """Return whether `text` is a unit that pint reads."""
     if text in _COMMON_UNITS:

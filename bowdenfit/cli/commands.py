@@ -27,7 +27,7 @@ from rich.box import Box
 import bowdenfit as bf
 from bowdenfit import results
 from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_arguments
-from bowdenfit.cli.running import watch_verb
+from bowdenfit.cli.running import requested, watch_verb
 from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stages
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
@@ -42,6 +42,7 @@ from bowdenfit.words import few, listed, shown
 if TYPE_CHECKING:
     from bowdenfit.finished_fit import Fit
 
+_OF_APP = {"nicegui", "fastapi", "uvicorn"}  # libraries of the extra
 LOOK: dict[str, Any] = {  # of every command
     "default_parameter": Parameter(negative=(), show_default=False, json_list=False, json_dict=False),
     "group_arguments": Group("Arguments", sort_key=1),
@@ -305,6 +306,37 @@ def _init_dialog() -> ModuleType:
     return init_dialog
 
 
+APP_HELP = """Open the bench in the browser: bring, fit, see, and what to measure next.
+
+The page is served to this machine alone, and asks no other for anything. Data
+sets and fits lie in FOLDER as the other commands write them: data sets beside
+each other, fits in its folder fits. It needs pip install 'bowdenfit[app]'.
+"""
+
+
+def app(
+    folder: Annotated[Path, Parameter("FOLDER")] = Path(),
+    /,
+    *,
+    port: Annotated[int, Parameter(metavar="NUMBER", show_default="one that is free")] = 0,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
+) -> None:
+    """Serve the app until Ctrl-C.
+
+    Args:
+        folder: Where data sets and fits lie; the current folder if omitted.
+        port: On which this machine serves the page.
+        browser: Open the page in the default browser.
+    """
+    try:
+        from bowdenfit.app import serve_app  # here, because NiceGUI is large, and not everybody has installed it
+    except ModuleNotFoundError as error:
+        if error.name not in _OF_APP:
+            raise
+        raise UsageError("the app needs NiceGUI, which is not installed; install it: pip install 'bowdenfit[app]'.") from None
+    serve_app(folder, port, browser, requested, say)
+
+
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.
 
 With honest uncertainty, and the cable length that transmits force best.
@@ -334,6 +366,7 @@ bowdenfit = App(name="bowdenfit", help=_HELP, version=_version, **LOOK)
 COMMANDS = (
     App(name="init", help=INIT_HELP, default_command=init, **LOOK),
     *map(command, VERBS),
+    App(name="app", help=APP_HELP, default_command=app, **LOOK),
     App(name="completion", help=_COMPLETION, default_command=_completion, **LOOK),
 )
 for position, verb in enumerate(COMMANDS):

@@ -46,7 +46,7 @@
   class Chart {
     constructor(box) {
       this.box = box;
-      this.charts = JSON.parse(box.querySelector("script").textContent);
+      this.charts = JSON.parse(box.querySelector(".numbers").textContent);
       this.drawing = box.parentElement.querySelector(".drawing");
       this.current = 0;
       this.tools = make("div", box, { className: "tools" });
@@ -178,5 +178,7 @@
     }
   }
 
-  for (const box of document.querySelectorAll(".chart")) new Chart(box);
+  // Whoever puts charts on a page later calls this again; those that are drawn are no longer hidden.
+  globalThis.drawCharts = () => document.querySelectorAll(".chart[hidden]").forEach(box => new Chart(box));
+  drawCharts();
 })();

@@ -14,7 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
-from bowdenfit.pages.section import HtmlPage, Picture
+from bowdenfit.pages.section import HtmlPage, PageSection, Picture
 from bowdenfit.words import printable, unbroken
 
 MOST_BYTES = 1_450_000  # of a page, so that it can be mailed; a judgement
@@ -23,6 +23,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"  # its first bytes; width and height follow in the f
 _CSS_PIXELS = 0.6  # of a page for one of a figure: 96 in an inch for 160
 _COLUMN = 576  # px of a page, 6 in: wider figures take both columns of a printed page
 _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
+_STYLES = (_HERE / "page.css", _HERE / "uplot" / "uPlot.min.css")  # the second of charts alone
 
 
 def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
@@ -46,6 +47,31 @@ def render_page(page: HtmlPage, drawings: Mapping[str, bytes]) -> str:
     return "".join(pieces)
 
 
+def render_section(section: PageSection, addresses: Mapping[str, str]) -> str:
+    """One section as HTML, for a page that somebody else makes with `page_assets`.
+
+    Args:
+        section: What is shown.
+        addresses: Where its drawings are, by name; a figure without one is left out.
+    """
+    shown_section = section.with_pictures(addresses)
+    pieces = _render_body(_make_environment(), shown_section).split(_MARK)
+    for i, picture in enumerate(shown_section.pictures):
+        alt, source = escape(printable(picture.title)), escape(addresses[picture.name])
+        pieces[2 * i + 1] = f'<img class="wide" alt="{alt}" src="{source}" loading="lazy">'
+    return "".join(pieces)
+
+
+def page_assets() -> tuple[str, str]:
+    """Return style and script of pages with charts; `drawCharts()` draws those that were put on the page since."""
+    return "\n".join(map(_read_text, _STYLES)), "\n".join(_load_scripts())
+
+
+def _render_body(environment: Environment, section: PageSection) -> str:
+    """A section, with marks about the places of its drawings."""
+    return environment.from_string(_read_text(section.template)).render(section.context)
+
+
 def _image_tag(png: bytes, title: str) -> str:
     """Return a PNG as an element that holds it, in the size in which it was drawn."""
     if not png.startswith(_PNG):
@@ -60,11 +86,11 @@ def _assemble(page: HtmlPage) -> str:
     """The page with marks about the places of its drawings, one after the other."""
     environment = _make_environment()
     scripts = _load_scripts() if any(picture.charts for picture in page.pictures) else ()
-    styles = [_HERE / "page.css", *([_HERE / "uplot" / "uPlot.min.css"] if scripts else [])]
+    styles = _STYLES if scripts else _STYLES[:1]
     frame = environment.get_template("page.html")
     return frame.render(
         page=page,
-        bodies=[Markup(environment.from_string(_read_text(s.template)).render(s.context)) for s in page.sections],  # noqa: S704
+        bodies=[Markup(_render_body(environment, section)) for section in page.sections],  # noqa: S704
         style=Markup("\n".join(map(_read_text, styles))),  # noqa: S704  (ours)
         scripts=[Markup(script) for script in scripts],  # noqa: S704  (ours)
         allowed=" ".join(f"'sha256-{_digest(script)}'" for script in scripts) or "'none'",

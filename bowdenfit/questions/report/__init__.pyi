@@ -1,2 +1,3 @@
+from .page import figures_section as figures_section
 from .page import report_page as report_page
 from .page import write_report as write_report

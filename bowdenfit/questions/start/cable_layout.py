@@ -236,6 +236,8 @@ def _ask_length_column(file: MeasuredFile, lengths: Sequence[FileColumn], why: s
 
 def _assign_angles(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
     """Assign the wrap angles that rows carry themselves, of known contacts or of new ones."""
+    if _WRAP_ANGLE in file.assigned and _WRAP_ANGLE not in layout.columns:  # it was stated
+        layout.add_contact("cable", {"column": _WRAP_ANGLE})
     for name in layout.columns:
         matching = file.columns_for(Quantity(name, "angle"))
         if len(matching) == 1:

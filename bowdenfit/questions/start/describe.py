@@ -54,7 +54,20 @@ def write_description(paths: Sequence[Path], default_name: str, asker: Asker) ->
     Raises:
         DatasetError: A file cannot be read, or holds nothing that can be used.
     """
-    measured_files = _inspect_files(paths, asker)
+    return describe_measured_files(inspect_files(paths, asker), default_name, asker)
+
+
+def describe_measured_files(measured_files: Sequence[MeasuredFile], default_name: str, asker: Asker) -> str:
+    """Write the text of a cable.toml for files that were inspected; their columns are assigned on the way.
+
+    Args:
+        measured_files: See `inspect_files`.
+        default_name: Name of the cable if nobody states one.
+        asker: Whom to ask what the files do not say.
+
+    Raises:
+        DatasetError: A file holds nothing that can be used.
+    """
     name = asker.ask(cable_name_question("What is the cable called?", default_name))
     source = asker.ask(text_question("Who measured it, when, on which bench? (- to leave it out)", "-"))
     faults = Faults()
@@ -102,8 +115,16 @@ def describe_as_read(path: Path, reading: Reading) -> str:
     return format_toml({"schema": SCHEMA, **page}, _REMARKS)
 
 
-def _inspect_files(paths: Sequence[Path], asker: Asker) -> list[MeasuredFile]:
-    """Inspect every file; ask for its kind where it does not say it."""
+def inspect_files(paths: Sequence[Path], asker: Asker) -> list[MeasuredFile]:
+    """Inspect every file; ask for its kind where it does not say it.
+
+    Args:
+        paths: The files.
+        asker: Whom to ask.
+
+    Raises:
+        DatasetError: A file cannot be read, or two hold what only one can.
+    """
     faults, measured_files = Faults(), list[MeasuredFile]()
     for path in paths:
         with faults.collect():

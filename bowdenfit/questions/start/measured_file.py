@@ -43,6 +43,7 @@ class FileColumn:
         low, high: Lowest and highest of these.
         values: Number of different values in it.
         blanks: Number of blank cells.
+        first, last: What stands in its first and in its last row.
     """
 
     name: str
@@ -53,6 +54,8 @@ class FileColumn:
     high: float = 0.0
     values: int = 0
     blanks: int = 0
+    first: str = ""
+    last: str = ""
 
     @property
     def dimension(self) -> str:
@@ -139,6 +142,19 @@ class MeasuredFile:
         (match,) = find_candidates([(column.name, column.below)], wanted)[quantity.name] or (None,)
         return match is not None and match.unit == column.unit and bool(column.unit)
 
+    def state(self, heading: str, quantity: str, unit: str) -> None:
+        """Take what somebody states of a column, in place of what its heading says.
+
+        Args:
+            heading: Its heading; a heading that the file has not is passed over.
+            quantity: What it holds; empty where only its unit is stated.
+            unit: Its unit; empty where the heading says it.
+        """
+        for column in [column for column in self.columns if column.name == heading]:
+            known = self.set_unit(column, unit) if unit else column
+            if quantity:
+                self.assigned[quantity], self.sources[quantity] = heading, known.source
+
     def set_unit(self, column: FileColumn, unit: str) -> FileColumn:
         """Set the unit of a column, and return the column with it."""
         known = replace(column, unit=unit)
@@ -177,6 +193,8 @@ def inspect_recording(path: Path, why: str) -> MeasuredFile:
             True,
             *_measure_range(channel.values),
             len(channel.values),
+            first="".join(f"{value:.5g}" for value in channel.values[:1]),
+            last="".join(f"{value:.5g}" for value in channel.values[-1:]),
         )
         for channel in signals
     )
@@ -204,7 +222,8 @@ def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
         spread = (numbers.low, numbers.high) if numbers else (0.0, 0.0)
         different, blanks = len({cell.text.strip() for cell in cells}), sum(cell.blank for cell in cells)
         unit = unit if unit and is_unit(unit) else ""
-        columns.append(FileColumn(heading, below, unit, numbers is not None, *spread, different, blanks))
+        ends = [" ".join(cell.text.split()) for cell in (cells[0], cells[-1])] if cells else ["", ""]
+        columns.append(FileColumn(heading, below, unit, numbers is not None, *spread, different, blanks, *ends))
     file = MeasuredFile(path, tuple(columns), None, detected.why)
     fitting = _fitting_kinds(file)
     matching = [kind for kind in fitting if kind.name == detected.kind] or fitting
@@ -270,6 +289,8 @@ def name_columns(file: MeasuredFile, asker: Asker) -> None:
     """
     assert file.kind is not None and file.kind.init_questions is not None  # only files whose kind is known come here
     for wanted in file.kind.init_questions.columns:
+        if {one.name for one in (wanted.quantity, *wanted.also)}.intersection(file.assigned):
+            continue  # it was stated
         quantity = next((one for one in (wanted.quantity, *wanted.also) if file.columns_for(one)), wanted.quantity)
         options = file.columns_for(quantity)
         if len(options) == 1:

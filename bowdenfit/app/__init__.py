@@ -1,0 +1,9 @@
+"""The bench in the browser: bring measurements, fit them, see the answer, in pages that this machine serves to itself alone.
+
+Pages ask the functions that the command line asks, and say what it says: nothing is read, fitted or worded here. Nothing below
+imports this room, and the command line loads it when `bowdenfit app` runs, because NiceGUI is large.
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+from .serve import serve_app as serve_app

@@ -1,0 +1,27 @@
+"use strict";
+// Beside the script of charts: files go up, what is pasted fills cells, and the focus stays where it was when a part is drawn anew.
+(() => {
+  globalThis.sendFiles = async (files, address) => {
+    const refusals = [];
+    for (const file of files) {
+      const answer = await fetch(`${address}?name=${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
+      if (!answer.ok) refusals.push(await answer.text());
+    }
+    return refusals;
+  };
+  let last = null;
+  document.addEventListener("focusin", event => { last = event.target.dataset?.key ?? null; });
+  const tidy = () => {
+    globalThis.drawCharts?.();
+    if (last && document.activeElement === document.body) document.querySelector(`[data-key="${CSS.escape(last)}"]`)?.focus({ preventScroll: true });
+  };
+  const start = () => { new MutationObserver(tidy).observe(document.body, { childList: true, subtree: true }); tidy(); };
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start); else start();
+  for (const kind of ["dragover", "dragleave", "drop"])
+    document.addEventListener(kind, event => {
+      const zone = event.target.closest?.(".drop");
+      if (!zone) return;
+      event.preventDefault();
+      zone.classList.toggle("over", kind === "dragover");
+    });
+})();

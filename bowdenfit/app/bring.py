@@ -1,0 +1,267 @@
+"""Pages on which measurements are brought: the start, the files of a new data set, a data set as `check` understands it."""
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+from nicegui import ui
+
+from bowdenfit.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
+from bowdenfit.app.elements import block, button, choice, field, link, text, text_input
+from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.app.workbench import Workbench, refuse_folder_name
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.files import FORMATS
+from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
+
+Again: TypeAlias = Callable[[], Awaitable[None]]
+_HEADS = ("column", "unit", "read as", "first", "last", "lowest", "highest")
+
+
+def show_start(workbench: Workbench) -> None:
+    """Show what lies in the folder, and what can be brought."""
+    with frame(NAME):
+        text(f"Friction of a Bowden cable from what was measured on its bench. Everything stays in {workbench.folder}.")
+        with section("Bring measurements", "bring"):
+            with block("div", "row"):
+                button("New data set", lambda: ui.navigate.to(f"/new/{workbench.new_draft().key}"), "primary")
+            _show_examples(workbench)
+        _show_data_sets(workbench)
+        _show_fits(workbench)
+
+
+def _show_examples(workbench: Workbench) -> None:
+    """Show the examples that can be copied into the folder."""
+    examples = [name for name, path in find_examples().items() if find_verb(path) == "fit"]
+    if not examples:
+        return
+    chosen = {"name": examples[0]}
+
+    async def take() -> None:
+        if await attempt(lambda: write_example(chosen["name"], workbench.folder / chosen["name"])):
+            ui.navigate.to(f"/data/{chosen['name']}")
+
+    with block("div", "row"):
+        with field("Or copy an example", "example"):
+            choice("example", examples[0], [(name, name) for name in examples], lambda name: chosen.update(name=name))
+        button("Copy the example", take)
+
+
+def _show_data_sets(workbench: Workbench) -> None:
+    """Show the data sets of the folder."""
+    names = workbench.data_sets()
+    if not names:
+        return
+    with section("Data sets", "data-sets"), block("ul", "cards"):
+        for name in names:
+            with block("li"):
+                text(workbench.title_of(name), "h3", dir="auto")
+                with block("div", "row"):
+                    link("Look at it and fit it", f"/data/{name}", "button")
+
+
+def _show_fits(workbench: Workbench) -> None:
+    """Show the fits of the folder, those that run or were interrupted too."""
+    fits = workbench.fits()
+    running = [name for name, job in workbench.jobs.items() if job.running]
+    if not (fits or running):
+        return
+    with section("Fits", "fits"), block("ul", "cards"):
+        for name in dict.fromkeys([*running, *(fit.name for fit in fits)]):
+            finished = any(fit.name == name and fit.finished for fit in fits)
+            with block("li"):
+                text(name, "h3", dir="auto")
+                if name in running:
+                    text("Being fitted now.", classes="state doubtful")
+                elif not finished:
+                    text("Interrupted; it can be resumed.", classes="state doubtful")
+                with block("div", "row"):
+                    link("See the answer" if finished and name not in running else "Open", f"/fit/{name}", "button")
+
+
+async def show_draft(workbench: Workbench, draft: Draft) -> None:
+    """Show files on their way to a data set: what they say, and what is asked."""
+    with frame("New data set"):
+        with section("Files", "files"):
+            zone = block("div")
+        place = block("div")
+
+    async def look_again() -> None:
+        understanding = await workbench.compute(draft.understand)
+        place.clear()
+        with place:
+            _show_understanding(workbench, draft, understanding, look_again)
+
+    with zone:
+        _show_drop_zone(draft, look_again)
+    ui.timer(0.05, look_again, once=True)
+
+
+def _show_drop_zone(draft: Draft, look_again: Again) -> None:
+    """Show where files are dropped or chosen."""
+    address = f"/upload/{draft.key}"
+
+    async def taken(event: object) -> None:
+        for sentence in getattr(event, "args", ()) or ():
+            notify(str(sentence))
+        await look_again()
+
+    with block("label", "drop") as zone:
+        text("Drop the files that you measured here, or choose them: tables, recordings, workbooks.", "span")
+        endings = ",".join(FORMATS)
+        chooser = block("input", type="file", multiple="", accept=endings, aria_label="Measured files", data_key="files")
+    chooser.on("change", taken, js_handler=f"async event => emit(await sendFiles(event.target.files, '{address}'))")
+    zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{address}'))")
+
+
+def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
+    """Show what is understood of a draft, and what is asked."""
+    if not draft.files:
+        text("Nothing is here yet.")
+        return
+    for file in understanding.files:
+        _show_file(draft, file, look_again)
+    for path in [path for path in draft.files if path.name not in {file.name for file in understanding.files}]:
+        with block("div", "row"):
+            text(path.name, "h3", dir="auto")
+            _remove_button(draft, path.name, look_again)
+    _show_refusals(understanding.refusals)
+    _show_questions(draft, understanding, look_again)
+    if understanding.description:
+        with block("details"):
+            text("The cable.toml that is written", "summary")
+            text(understanding.description, "pre", tabindex="0")
+    if understanding.report:
+        with section("As it is understood", "understood"):
+            text(understanding.report, "pre", tabindex="0")
+        _show_writing(workbench, draft)
+
+
+def _remove_button(draft: Draft, name: str, look_again: Again) -> None:
+    """Show the button that leaves a file out."""
+
+    async def remove() -> None:
+        draft.remove_file(name)
+        await look_again()
+
+    button("Leave this file out", remove, key=f"remove-{name}", aria_label=f"Leave {name} out")
+
+
+def _show_file(draft: Draft, file: UnderstoodFile, look_again: Again) -> None:
+    """Show the columns of a file, whose meanings and units can be changed."""
+    with block("section"):
+        with block("div", "row"):
+            text(file.name, "h3", dir="auto")
+            _remove_button(draft, file.name, look_again)
+        if file.holds:
+            text(f"It holds {file.holds}.")
+        with block("div", "wide", role="region", tabindex="0", aria_label=f"Columns of {file.name}"), block("table", "columns"):
+            with block("thead"), block("tr"):
+                for head in _HEADS:
+                    text(head, "th", "left" if head in _HEADS[:3] else "", scope="col")
+            with block("tbody"):
+                for number, column in enumerate(file.columns):
+                    _show_column(draft, file, column, number, look_again)
+
+
+def _show_column(draft: Draft, file: UnderstoodFile, column: UnderstoodColumn, number: int, look_again: Again) -> None:
+    """Show a column with the menus of its meaning and unit."""
+
+    async def state(quantity: str | None = None, unit: str | None = None) -> None:
+        draft.state(file.name, column.heading, quantity, unit)
+        await look_again()
+
+    meanings = [("", "not used"), *((name, f"{name}: {words}" if words else name) for name, words in file.meanings)]
+    units = [("", "not stated"), *((unit, unit) for unit in column.units)]
+    key = f"{file.name}-{number}"
+    with block("tr"):
+        text(column.heading, "th", scope="row", dir="auto")
+        with block("td", "left"):
+            choice(f"{key}-unit", column.unit, units, lambda unit: state(unit=unit), f"Unit of {column.heading}")
+        with block("td", "left"):
+            choice(f"{key}-as", column.meaning, meanings, lambda name: state(quantity=name), f"Meaning of {column.heading}")
+        for value in (column.first, column.last, column.low, column.high):
+            text(value, "td")
+
+
+def _show_refusals(refusals: tuple[Refusal, ...]) -> None:
+    """Show why a draft cannot be fitted yet."""
+    if refusals:
+        refused("\n".join(refusal.sentence for refusal in refusals))
+
+
+def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
+    """Show what the files do not say."""
+    if not understanding.entries:
+        return
+
+    async def answer(key: str, typed: str) -> None:
+        draft.answers[key] = typed
+        await look_again()
+
+    with section("What the files do not say", "questions"):
+        for number, entry in enumerate(understanding.entries):
+            key = f"question-{number}"
+            with field(entry.words, key, entry.hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):
+                if entry.options:
+                    options = entry.options if entry.answer else (("", "choose one"), *entry.options)
+                    choice(key, entry.answer, options, partial(answer, entry.key))
+                else:
+                    text_input(key, entry.answer, partial(answer, entry.key))
+
+
+def _show_writing(workbench: Workbench, draft: Draft) -> None:
+    """Show where the data set goes, and the button that writes it."""
+    name = {"folder": Path(draft.files[0].name).stem.replace(" ", "-") or "my-cable"}
+
+    def write() -> None:
+        refuse_folder_name(name["folder"])
+        draft.write(workbench.folder / name["folder"])
+        ui.navigate.to(f"/data/{name['folder']}")
+
+    with section("Keep it", "keep"):
+        with field("Name of the folder with cable.toml", "folder", f"It is written into {workbench.folder}."):
+            text_input("folder", name["folder"], lambda typed: name.update(folder=typed))
+        with block("div", "row"):
+            button("Write the data set", lambda: attempt(write), "primary")
+
+
+async def show_data_set(workbench: Workbench, name: str) -> None:
+    """Show a data set as `check` understands it, and the button that fits it."""
+    folder, fit = workbench.data_set(name), {"name": workbench.free_name(name), "seed": ""}
+
+    def start() -> None:
+        seed = int(fit["seed"]) if fit["seed"].strip() else None
+        workbench.start_fit(fit["name"], name, seed)
+        ui.navigate.to(f"/fit/{fit['name']}")
+
+    with frame(workbench.title_of(name)):
+        with section("Fit it", "fit"):
+            with block("div", "row"):
+                button("Fit", lambda: attempt(start), "primary")
+            with block("details"):
+                text("Name and seed", "summary")
+                with field("Kept as fits/", "fit-name"):
+                    text_input("fit-name", fit["name"], lambda typed: fit.update(name=typed))
+                with field("Seed of everything random", "seed", "A whole number; random, and recorded, where it is empty."):
+                    text_input("seed", "", lambda typed: fit.update(seed=typed))
+        with section("As it is understood", "understood"):
+            place = block("div", aria_live="polite")
+    with place:
+        text("Reading ...")
+
+    async def look() -> None:
+        try:
+            report, refusal = str(await workbench.compute(check, folder)), ""
+        except BowdenfitError as error:
+            report, refusal = "", str(error)
+        place.clear()
+        with place:
+            if refusal:
+                refused(refusal)
+            else:
+                text(report, "pre", tabindex="0")
+
+    ui.timer(0.05, look, once=True)

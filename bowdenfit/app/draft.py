@@ -1,0 +1,247 @@
+"""A data set that is being brought: its files, what they say, what is asked, and what `check` says of all that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bowdenfit.app.form import Form, FormEntry, UnansweredError
+from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.kinds.file_kind import columns_of_kind
+from bowdenfit.outputs import write_text
+from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.start.describe import describe_measured_files, inspect_files
+from bowdenfit.questions.start.folder import refuse_existing, refuse_files, write_data_set
+from bowdenfit.questions.start.measured_file import FileColumn, MeasuredFile
+from bowdenfit.units import dimension_of, usual_units
+from bowdenfit.words import printable, shown
+
+_LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
+_FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
+_DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
+_MOST_FAULTS = 40  # refusals beside cells; a judgement
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why something cannot be read.
+
+    Args:
+        sentence: In words.
+        file, row, column: The cell that it speaks of; empty, or 0, where it speaks of none.
+    """
+
+    sentence: str
+    file: str = ""
+    row: int = 0
+    column: str = ""
+
+
+@dataclass(frozen=True)
+class UnderstoodColumn:
+    """A column of a file as it is understood.
+
+    Args:
+        heading: What stands over it.
+        unit: Its unit; empty where the file does not say it.
+        meaning: The quantity that it is read as; empty where it is not read.
+        first, last: What stands in its first and last row.
+        low, high: Its range; empty of words.
+        units: Units that it may have.
+    """
+
+    heading: str
+    unit: str
+    meaning: str
+    first: str
+    last: str
+    low: str
+    high: str
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UnderstoodFile:
+    """A file as it is understood.
+
+    Args:
+        name: Its name.
+        holds: What it holds, in words.
+        columns: Its columns, or the channels of a recording.
+        meanings: Quantities that they may be, with their words.
+    """
+
+    name: str
+    holds: str
+    columns: tuple[UnderstoodColumn, ...]
+    meanings: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """What is understood of a draft.
+
+    Args:
+        files: Its files.
+        entries: The questions.
+        refusals: Why it cannot be fitted yet.
+        description: Text of its cable.toml; empty where questions are open.
+        report: What `check` says; empty where it cannot be fitted.
+    """
+
+    files: tuple[UnderstoodFile, ...] = ()
+    entries: tuple[FormEntry, ...] = ()
+    refusals: tuple[Refusal, ...] = ()
+    description: str = ""
+    report: str = ""
+
+
+@dataclass
+class Draft:
+    """Files on their way to a data set, in a folder of their own that goes with the app.
+
+    Args:
+        folder: Where they lie.
+        answers: What was answered, by question.
+        stated: What was stated of columns, as (quantity, unit), by file and heading.
+        understanding: What was understood when it was last looked at.
+    """
+
+    folder: Path
+    answers: dict[str, str] = field(default_factory=dict)
+    stated: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
+    understanding: Understanding = Understanding()
+
+    @property
+    def key(self) -> str:
+        """By which the address of its page names it."""
+        return self.folder.name
+
+    @property
+    def files(self) -> list[Path]:
+        """Its measured files."""
+        return [path for path in sorted(self.folder.iterdir()) if path.name != DESCRIPTION_FILE]
+
+    def new_file(self, name: str) -> Path:
+        """Return where a file of a name is to be written.
+
+        Raises:
+            UsageError: The name is not one of a file that may lie in a data set.
+        """
+        refuse_file_name(name)
+        return self.folder / name
+
+    def remove_file(self, name: str) -> None:
+        """Remove one of the files."""
+        for path in [path for path in self.files if path.name == name]:
+            path.unlink()
+        self.stated.pop(name, None)
+
+    def state(self, file: str, heading: str, quantity: str | None = None, unit: str | None = None) -> None:
+        """State what a column holds, or its unit; the other stays as it is.
+
+        Args:
+            file, heading: Which column.
+            quantity: What it holds; empty for what its heading says.
+            unit: Its unit; empty for what its heading says.
+        """
+        of_file = self.stated.setdefault(file, {})
+        before = of_file.get(heading, ("", ""))
+        of_file[heading] = (before[0] if quantity is None else quantity, before[1] if unit is None else unit)
+
+    def understand(self) -> Understanding:
+        """Return what is understood now: columns, questions, and what `check` says where all are answered."""
+        form, measured_files, description, report = Form(self.answers), list[MeasuredFile](), "", ""
+        refusals: tuple[Refusal, ...] = ()
+        try:
+            refuse_files(self.files)
+            measured_files = inspect_files(self.files, form) if self.files else []
+            self._state_columns(measured_files)
+            if measured_files:
+                description = describe_measured_files(measured_files, _cable_name(measured_files), form)
+                write_text(self.folder / DESCRIPTION_FILE, description)
+                report = str(check(self.folder))
+        except UnansweredError:
+            pass
+        except BowdenfitError as error:
+            refusals = list_refusals(error)
+        files = tuple(map(_understood_file, measured_files))
+        self.understanding = Understanding(files, tuple(form.entries), refusals, description, report)
+        return self.understanding
+
+    def _state_columns(self, measured_files: Sequence[MeasuredFile]) -> None:
+        """Take what was stated of columns."""
+        for file in measured_files:
+            for heading, (quantity, unit) in self.stated.get(file.name, {}).items():
+                file.state(heading, quantity, unit)
+
+    def write(self, folder: Path) -> None:
+        """Write it as a data set, as `bowdenfit init` does.
+
+        Args:
+            folder: The new folder.
+
+        Raises:
+            UsageError, StoreError: It exists, or cannot be written; or questions are open.
+        """
+        if not self.understanding.description:
+            raise UsageError("questions are still open; answer them first.")
+        refuse_existing(folder)
+        write_data_set(folder, self.understanding.description, self.files)
+
+
+def refuse_file_name(name: str) -> None:
+    """Refuse the name of a file that comes from elsewhere where it could lead out of its folder, or steer what shows it.
+
+    Raises:
+        UsageError: It does.
+    """
+    has_odd_end = name.startswith((".", "-", " ")) or name.endswith((" ", "."))
+    is_odd = has_odd_end or not name.isprintable() or _FORBIDDEN.intersection(name)
+    if is_odd or not 0 < len(name) <= _LONGEST_FILE_NAME or name.lower() == DESCRIPTION_FILE:
+        raise UsageError(
+            f"{shown(name)} cannot be the name of a measured file here; rename it: letters, digits, blanks and - _ . do, "
+            f"{_LONGEST_FILE_NAME} of them at most."
+        )
+
+
+def list_refusals(error: BowdenfitError) -> tuple[Refusal, ...]:
+    """Return the refusals that an error combines, each with the cell that it speaks of."""
+    faults = error.faults or (error,)
+    return tuple(_refusal(fault) for fault in faults[:_MOST_FAULTS])
+
+
+def _refusal(fault: BowdenfitError) -> Refusal:
+    """Return a refusal with the cell that it speaks of."""
+    key = fault.fault_key
+    if isinstance(key, tuple) and len(key) == 3 and fault.row:
+        return Refusal(str(fault), str(key[0]), fault.row, str(key[1]))
+    return Refusal(str(fault))
+
+
+def _cable_name(measured_files: Sequence[MeasuredFile]) -> str:
+    """Return the name that is proposed for the cable: that of its first file."""
+    stem = printable(measured_files[0].path.stem.replace("-", " ").replace("_", " "))[:80]
+    return stem.strip() or "cable"
+
+
+def _understood_file(file: MeasuredFile) -> UnderstoodFile:
+    """Return a file as it is understood."""
+    questions = file.kind.init_questions if file.kind is not None else None
+    wanted = questions.columns if questions is not None else ()
+    words = {one.name: column.words for column in wanted for one in (column.quantity, *column.also)}
+    if file.kind is not None and not file.kind.takes_channels:
+        words |= {quantity.name: "" for quantity in columns_of_kind(file.kind.name) if quantity.name not in words}
+    meanings = {heading: quantity for quantity, heading in file.assigned.items()}
+    columns = tuple(_understood_column(column, meanings.get(column.name, "")) for column in file.columns)
+    words |= {quantity: "" for quantity in meanings.values() if quantity not in words}
+    return UnderstoodFile(file.name, questions.holds if questions is not None else "", columns, tuple(words.items()))
+
+
+def _understood_column(column: FileColumn, meaning: str) -> UnderstoodColumn:
+    """Return a column as it is understood."""
+    ends = (f"{column.low:.5g}", f"{column.high:.5g}") if column.numbers else ("", "")
+    dimensions = (*([dimension_of(column.unit)] if column.unit else []), *_DIMENSIONS)
+    usual = [unit for name in dimensions for unit in usual_units(name)]
+    units = tuple(dict.fromkeys([*([column.unit] if column.unit else []), *usual]))
+    return UnderstoodColumn(column.name, column.unit, meaning, column.first, column.last, *ends, units)

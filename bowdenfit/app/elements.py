@@ -1,0 +1,100 @@
+"""What pages are made of: plain elements of HTML with labels, in the look of the report."""
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from nicegui import ui
+from nicegui.element import Element
+
+from bowdenfit.words import printable, unbroken
+
+_VALUE = "event => emit(event.target.value)"
+
+
+def text(words: str, tag: str = "p", classes: str = "", **attributes: str) -> ui.html:
+    """Return an element with text in it, in which names stay text."""
+    return markup(escape(unbroken(printable(words))), tag, classes, **attributes)
+
+
+def markup(html: str, tag: str = "div", classes: str = "", **attributes: str) -> ui.html:
+    """Return an element with HTML of ours in it."""
+    made = ui.html(html, sanitize=False, tag=tag)
+    _set_attributes(made, classes, attributes)
+    return made
+
+
+def block(tag: str = "div", classes: str = "", **attributes: str) -> Element:
+    """Return an element that others go into."""
+    made = ui.element(tag)
+    _set_attributes(made, classes, attributes)
+    return made
+
+
+def _set_attributes(element: Element, classes: str, attributes: Mapping[str, str]) -> None:
+    element.classes(classes)
+    for name, value in attributes.items():
+        element.props[name.rstrip("_").replace("_", "-")] = value
+
+
+def button(words: str, on_click: Callable[..., Any], classes: str = "", key: str = "", **attributes: str) -> Element:
+    """Return a button."""
+    made = text(words, "button", classes, type="button", data_key=key or words, **attributes)
+    return made.on("click", on_click, args=[])
+
+
+def link(words: str, address: str, classes: str = "", **attributes: str) -> Element:
+    """Return a link."""
+    return text(words, "a", classes, href=address, data_key=address, **attributes)
+
+
+def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
+    """Return a block with a label, into which the control of that key goes; what is below it describes it.
+
+    Args:
+        label: What is asked.
+        key: Of the control.
+        hint: Below it.
+        fault: Why what it holds cannot be taken.
+    """
+    outer = block("div", "field")
+    with outer:
+        text(label, "label", for_=key)
+        slot = block("div")
+        if fault:
+            text(fault, "p", "fault", id=f"{key}-fault", role="alert")
+        if hint:
+            text(hint, "p", "hint", id=f"{key}-hint")
+    return slot
+
+
+def text_input(key: str, value: str, on_change: Callable[[str], Any], placeholder: str = "", label: str = "") -> Element:
+    """Return a line of text that is asked for; told when it is left, or at Enter."""
+    made = block("input", "", id=key, type="text", data_key=key, autocomplete="off", placeholder=placeholder)
+    made.props["value"] = value
+    if label:
+        made.props["aria-label"] = label
+    return made.on("change", lambda event: on_change(str(event.args)), js_handler=_VALUE)
+
+
+def choice(
+    key: str, value: str, options: Sequence[tuple[str, str]], on_change: Callable[[str], Any], label: str = ""
+) -> Element:
+    """Return a menu.
+
+    Args:
+        key: Of the control.
+        value: What is chosen.
+        options: Values with their words.
+        on_change: Called with what is chosen.
+        label: What it is of, where no label stands beside it.
+    """
+    made = block("select", "", id=key, data_key=key)
+    if label:
+        made.props["aria-label"] = label
+    with made:
+        for option, words in options:
+            item = text(words, "option", value=option)
+            if option == value:
+                item.props["selected"] = True
+    return made.on("change", lambda event: on_change(str(event.args)), js_handler=_VALUE)

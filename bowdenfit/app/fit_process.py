@@ -1,0 +1,84 @@
+"""One fit in a process of its own: `python -m bowdenfit.app.fit_process` reads what to fit, and says in lines how far it is.
+
+It ends when its standard input closes: so whoever started it cancels it, and so it ends when that process ends, however that
+ends. What is sampled by then is kept.
+"""
+
+import io
+import json
+import logging
+import os
+import sys
+import threading
+from functools import partial
+from typing import Any
+
+from tqdm import tqdm
+
+import bowdenfit as bf
+from bowdenfit.errors import BowdenfitError, system_error
+from bowdenfit.run.verb import WATCH
+from bowdenfit.stages import LOGGER
+
+_INTERRUPTED = 130  # exit code, as shells have it
+
+
+class Announcer(logging.Handler):
+    """Sends each stage as a line."""
+
+    def __init__(self, stream: Any) -> None:
+        super().__init__()
+        self._stream, self._lock_of_lines = stream, threading.Lock()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Send a stage."""
+        self.send(stage=record.getMessage())
+
+    def send(self, **line: Any) -> None:
+        """Send a line."""
+        with self._lock_of_lines:
+            self._stream.write(f"{json.dumps(line)}\n")
+            self._stream.flush()
+
+
+def main() -> None:
+    """Fit what the first line of standard input says."""
+    announcer, request = Announcer(sys.stdout), json.loads(sys.stdin.readline())
+    sys.stdout = sys.stderr  # what libraries print is no line of ours
+    threading.Thread(target=_end_with_reader, daemon=True).start()
+    LOGGER.addHandler(announcer)
+    LOGGER.setLevel(logging.INFO)
+    LOGGER.propagate = False
+    try:
+        trusted = _fit(request, announcer)
+    except Exception as error:
+        known = error if isinstance(error, BowdenfitError) else system_error(error)
+        what = f"{type(error).__name__}: {error}"
+        unforeseen = f"something went wrong inside bowdenfit ({what}). This is our fault: please report it."
+        announcer.send(refused=str(known or unforeseen))
+        sys.exit(known.exit_code if known else 1)
+    announcer.send(trusted=trusted)
+
+
+def _end_with_reader() -> None:
+    """End this process when nobody waits for it any more."""
+    sys.stdin.read()
+    os._exit(_INTERRUPTED)
+
+
+def _fit(request: dict[str, Any], announcer: Announcer) -> bool:
+    """Fit, and return whether the answer may be trusted."""
+
+    class Bar(tqdm):
+        monitor_interval = 0
+
+        def display(self, msg: str | None = None, pos: int | None = None) -> None:  # noqa: ARG002
+            announcer.send(progress=str(self) if msg is None else msg)
+
+    with Bar(file=io.StringIO(), **WATCH.bar) as bar:
+        fit = bf.fit(**request, progress=partial(WATCH.show, bar), report=lambda sentence: announcer.send(note=sentence))
+    return fit.verdict().trusted
+
+
+if __name__ == "__main__":
+    main()

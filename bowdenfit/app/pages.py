@@ -1,0 +1,115 @@
+"""The addresses of the app: its pages, and the files that they show or take."""
+
+from pathlib import Path
+
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import FileResponse, PlainTextResponse
+from nicegui import ui
+
+from bowdenfit.app.bring import show_data_set, show_draft, show_start
+from bowdenfit.app.frame import frame, refused, style_and_script
+from bowdenfit.app.see import show_fit
+from bowdenfit.app.workbench import Workbench
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.inputs import refuse_special
+from bowdenfit.results.folder import REPORT
+
+_REFUSED, _MISSING = 422, 404
+_REPORT_POLICY = "sandbox allow-scripts"  # what is in a results folder may come from elsewhere, and reaches nothing of the app
+
+
+def register_pages(workbench: Workbench, application: FastAPI) -> None:
+    """Make the pages known.
+
+    Args:
+        workbench: What they show.
+        application: Which answers.
+    """
+    _register_files(workbench, application)
+
+    @ui.page("/")
+    def start() -> None:
+        show_start(workbench)
+
+    @ui.page("/new/{key}")
+    async def draft(key: str) -> None:
+        if key in workbench.drafts:
+            await show_draft(workbench, workbench.drafts[key])
+        else:
+            _show_refusal("New data set", "These files are gone, because the app was started anew since; bring them again.")
+
+    @ui.page("/data/{name}")
+    async def data_set(name: str) -> None:
+        try:
+            workbench.data_set(name)
+        except BowdenfitError as error:
+            _show_refusal(name, str(error))
+        else:
+            await show_data_set(workbench, name)
+
+    @ui.page("/fit/{name}")
+    async def fit(name: str) -> None:
+        try:
+            workbench.results(name)
+        except BowdenfitError as error:
+            _show_refusal(name, str(error))
+        else:
+            await show_fit(workbench, name)
+
+
+def _show_refusal(title: str, sentence: str) -> None:
+    with frame(title):
+        refused(sentence)
+
+
+def _register_files(workbench: Workbench, application: FastAPI) -> None:
+    """Make the addresses of files known."""
+    style, script = style_and_script()
+
+    @application.get("/assets/app.css")
+    def get_style() -> Response:
+        return Response(style, media_type="text/css")
+
+    @application.get("/assets/app.js")
+    def get_script() -> Response:
+        return Response(script, media_type="text/javascript")
+
+    @application.put("/upload/{key}")
+    async def take_file(key: str, name: str, request: Request) -> Response:
+        try:
+            await _write_upload(workbench.drafts[key].new_file(name), request)
+        except KeyError:
+            return PlainTextResponse("The app was started anew since this page was opened; load it again.", _MISSING)
+        except BowdenfitError as error:
+            return PlainTextResponse(str(error), _REFUSED)
+        return PlainTextResponse("taken")
+
+    @application.get("/kept/{fit}/{name}")
+    async def get_kept(fit: str, name: str) -> Response:
+        try:
+            if name == REPORT:
+                return _report(workbench.results(fit) / REPORT)
+            return Response(await workbench.draw_figure(fit, name.removesuffix(".png")), media_type="image/png")
+        except BowdenfitError as error:
+            return PlainTextResponse(str(error), _MISSING)
+
+
+async def _write_upload(path: Path, request: Request) -> None:
+    """Write a file that comes up, whole or not at all."""
+    whole = False
+    try:
+        with path.open("wb") as file:
+            async for piece in request.stream():
+                file.write(piece)
+        whole = True
+    finally:
+        if not whole:
+            path.unlink(missing_ok=True)
+
+
+def _report(path: Path) -> Response:
+    """Return the report of a fit."""
+    if not path.is_file():
+        return PlainTextResponse("This fit has no report; `bowdenfit report` writes it.", _MISSING)
+    refuse_special(path)
+    return FileResponse(path, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})

@@ -1,0 +1,139 @@
+"""The page of a fit: how far it is, then what it says."""
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from nicegui import ui
+
+from bowdenfit.app.elements import block, button, choice, field, link, markup, text
+from bowdenfit.app.fit_job import FitJob
+from bowdenfit.app.frame import attempt, frame, refused, section
+from bowdenfit.app.workbench import Workbench
+from bowdenfit.display import as_html
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.pages.page import render_section
+from bowdenfit.questions import report as report_room
+from bowdenfit.questions.summary.verb import reply, summary
+from bowdenfit.results.folder import FIT as FIT_FILE
+from bowdenfit.results.folder import REPORT
+from bowdenfit.verb import Reply
+
+Again: TypeAlias = Callable[[], Awaitable[None]]
+_TICK = 0.5  # s between two looks at a fit that runs; a judgement
+
+
+async def show_fit(workbench: Workbench, name: str) -> None:
+    """Show a fit: while it runs its stage and clock, and then its answer."""
+    with frame(name):
+        place = block("div")
+        with place:
+            text("Reading ...")
+
+    async def show() -> None:
+        place.clear()
+        job = workbench.jobs.get(name)
+        with place:
+            if job is not None and (job.running or job.refusal or job.cancelled):
+                _show_job(workbench, name, job, show)
+            elif (workbench.results(name) / FIT_FILE).is_file():
+                await _show_answer(workbench, name)
+            else:
+                _show_interrupted(workbench, name, show)
+
+    ui.timer(0.05, show, once=True)
+
+
+def _show_job(workbench: Workbench, name: str, job: FitJob, show: Again) -> None:
+    """Show a fit that runs, or why it ended without an answer."""
+    if not job.running:
+        if job.refusal:
+            refused(job.refusal)
+        elif job.cancelled:
+            text("It was cancelled; what was sampled is kept.")
+        if (workbench.results(name) / FIT_FILE).is_file():
+            link("See the earlier answer", f"/fit/{name}")
+        _show_interrupted(workbench, name, show)
+        return
+    with section("Being fitted", "running"):
+        with block("div", "stage", role="status"):
+            stage = text(job.stage, "span", "state")
+            progress = text(job.progress, "span")
+            clock = text(_clock(job.seconds), "span", "clock")
+        with block("div", "row"):
+            button("Cancel", lambda: workbench.compute(job.cancel))
+        text("It goes on if this page is closed; what is sampled is kept.", classes="hint")
+
+    async def look() -> None:
+        if not job.running:
+            timer.cancel()
+            await show()
+            return
+        for element, words in ((stage, job.stage), (progress, job.progress), (clock, _clock(job.seconds))):
+            element.set_content(words)
+
+    timer = ui.timer(_TICK, look)
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
+
+
+def _show_interrupted(workbench: Workbench, name: str, show: Again) -> None:
+    """Show how an interrupted fit goes on."""
+    names = workbench.data_sets()
+    if not names:
+        return
+    job = workbench.jobs.get(name)
+    before = next((one for one in names if job is not None and workbench.data_set(one) == job.request.dataset), None)
+    likely = before or max((one for one in names if name.startswith(workbench.title_of(one))), key=len, default=names[0])
+    chosen = {"name": likely}
+
+    async def start(resume: bool) -> None:
+        if await attempt(lambda: workbench.start_fit(name, chosen["name"], resume=resume, force=not resume)):
+            await show()
+
+    with section("This fit has no answer yet", "interrupted"):
+        with field("Data set that it is of", "data-set"):
+            options = [(one, workbench.title_of(one)) for one in names]
+            choice("data-set", likely, options, lambda one: chosen.update(name=one))
+        with block("div", "row"):
+            button("Resume", lambda: start(True), "primary")
+            button("Start over", lambda: start(False))
+
+
+async def _show_answer(workbench: Workbench, name: str) -> None:
+    """Show what a fit says: sentences, figures, and links."""
+    folder = workbench.results(name)
+    try:
+        printed = await workbench.compute(_read_summary, folder)
+    except BowdenfitError as error:
+        refused(str(error))
+        return
+    with block("div", "columns-of-page"):
+        with block("div"):
+            with section("The answer", "answer"):
+                markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
+            with block("ul", "links"), block("li"):
+                link("Report", f"/kept/{name}/{REPORT}", target="_blank")
+        with block("div"), section("Figures", "figures"):
+            figures = markup("<p>Loading ...</p>", "div")
+    figures.set_content(await workbench.compute(_render_figures, name, await workbench.figure_data(name)))
+
+
+def _kind_of(printed: Reply) -> str:
+    """Return how the verdict is colored."""
+    verdict = printed.page()["verdict"] if printed.page else {}
+    return "bad" if not verdict.get("trusted") else "doubtful" if verdict.get("doubts") else "good"
+
+
+def _read_summary(folder: Path) -> Reply:
+    """Return what `bowdenfit summary` prints."""
+    return reply(summary(folder), {})
+
+
+def _render_figures(name: str, figures: dict[str, Any]) -> str:
+    """Return the figures as HTML, as the report has them."""
+    pictures = report_room.figures_section(figures)
+    drawings = {figure: f"/kept/{name}/{figure}.png" for figure in figures}
+    return render_section(pictures, drawings) if pictures is not None else ""

@@ -1,0 +1,214 @@
+"""What lies on the bench: the folder with its data sets and fits, the fits that run, and those that were opened."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from secrets import token_hex
+from tempfile import TemporaryDirectory
+from threading import Event
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import bowdenfit as bf
+from bowdenfit.app.draft import Draft
+from bowdenfit.app.fit_job import FitJob, FitRequest
+from bowdenfit.dataset import DESCRIPTION_FILE
+from bowdenfit.errors import UsageError
+from bowdenfit.inputs import refuse_special
+from bowdenfit.plots.write import PNG
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data, warning_mark, write_figure_files
+from bowdenfit.results.folder import CHAIN
+from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
+from bowdenfit.results.folder import FIT as FIT_FILE
+from bowdenfit.words import shown
+
+if TYPE_CHECKING:
+    from bowdenfit.finished_fit import Fit
+
+Answer = TypeVar("Answer")
+FITS = "fits"  # the folder in which the command line keeps them, too
+_HERE = "."  # the data set that the folder itself is
+_NAME = re.compile(r"[^\W_][\w .()+-]{0,79}")  # of folders that are made: no separator, no leading dot, one line
+_MOST_OPEN = 4  # fits that are kept in memory; a judgement
+_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
+
+
+@dataclass(frozen=True)
+class KeptFit:
+    """A fit in the folder.
+
+    Args:
+        name: Of its folder.
+        finished: Whether it has its answer; else it was interrupted.
+    """
+
+    name: str
+    finished: bool
+
+
+class Workbench:
+    """The folder of the app, the same for all tabs.
+
+    Args:
+        folder: Where data sets and fits lie.
+        stop: Set where the app is to end.
+    """
+
+    def __init__(self, folder: Path, stop: Event) -> None:
+        self.folder, self.stop = folder.resolve(), stop
+        self.jobs: dict[str, FitJob] = {}
+        self.drafts: dict[str, Draft] = {}
+        self._temporary = TemporaryDirectory(prefix="bowdenfit-", ignore_cleanup_errors=True)  # of drafts
+        self._open: dict[str, tuple[int, Fit]] = {}
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="answers")  # one, as libraries of files are not made for more
+
+    def new_draft(self) -> Draft:
+        """Return a new data set that is to be brought."""
+        folder = Path(self._temporary.name) / token_hex(4)
+        folder.mkdir()
+        draft = Draft(folder)
+        self.drafts[draft.key] = draft
+        return draft
+
+    def data_sets(self) -> list[str]:
+        """Return the data sets in the folder, by name."""
+        inside = [path.name for path in sorted(self.folder.iterdir()) if (path / DESCRIPTION_FILE).is_file()]
+        return [_HERE, *inside] if (self.folder / DESCRIPTION_FILE).is_file() else inside
+
+    def data_set(self, name: str) -> Path:
+        """Return the folder of a data set.
+
+        Raises:
+            UsageError: There is none of that name.
+        """
+        if name not in self.data_sets():
+            raise UsageError(f"there is no data set {shown(name)} in {self.folder.name} any more; go back to the start.")
+        return self.folder if name == _HERE else self.folder / name
+
+    def title_of(self, name: str) -> str:
+        """Return what a data set is called."""
+        return self.folder.name if name == _HERE else name
+
+    def fits(self) -> list[KeptFit]:
+        """Return the fits that are kept, those that were interrupted among them."""
+        place = self.folder / FITS
+        folders = sorted(path for path in place.iterdir() if path.is_dir()) if place.is_dir() else []
+        kept = [KeptFit(path.name, (path / FIT_FILE).is_file()) for path in folders]
+        return [fit for fit in kept if fit.finished or (place / fit.name / CHAIN).is_file()]
+
+    def results(self, name: str) -> Path:
+        """Return the results folder of a fit that is kept or runs.
+
+        Raises:
+            UsageError: There is none of that name.
+        """
+        if name not in self.jobs and name not in {fit.name for fit in self.fits()}:
+            raise UsageError(f"there is no fit {shown(name)} in {self.folder.name} any more; go back to the start.")
+        return self.folder / FITS / name
+
+    def free_name(self, name: str) -> str:
+        """Return the name of a data set, or with a number behind it, that no fit has yet."""
+        title = self.title_of(name)
+        names = [title, *(f"{title}-{number}" for number in range(2, 1000))]
+        return next(free for free in names if not (self.folder / FITS / free).exists() and free not in self.jobs)
+
+    def start_fit(self, name: str, data_set: str, seed: int | None = None, resume: bool = False, force: bool = False) -> FitJob:
+        """Start a fit, or go on with one.
+
+        Args:
+            name: Of the fit.
+            data_set: Which.
+            seed: Of everything random.
+            resume: Whether an interrupted fit goes on.
+            force: Whether an earlier one is replaced.
+
+        Raises:
+            UsageError: The name is not one of a folder, it runs already, or there is no such data set.
+        """
+        refuse_folder_name(name)
+        job = self.jobs.get(name)
+        if job is not None and job.running:
+            raise UsageError(f"the fit {name} runs already; wait for it, or cancel it.")
+        request = FitRequest(self.data_set(data_set), self.folder / FITS / name, seed, resume=resume, force=force)
+        self.jobs[name] = FitJob(request)
+        return self.jobs[name]
+
+    async def compute(self, function: Callable[..., Answer], *arguments: object) -> Answer:
+        """Return what a function returns that takes a while, in the thread for that."""
+        return await asyncio.get_running_loop().run_in_executor(self._thread, function, *arguments)
+
+    async def open_fit(self, name: str) -> Fit:
+        """Return a fit, read from its folder unless that has not changed since.
+
+        Raises:
+            StoreError: The folder is damaged.
+        """
+        folder = self.results(name)
+        changed = (folder / FIT_FILE).stat().st_mtime_ns
+        known = self._open.get(name)
+        if known is None or known[0] != changed:
+            known = (changed, await self.compute(bf.load, folder))
+            self._open = dict([*((key, kept) for key, kept in self._open.items() if key != name), (name, known)][-_MOST_OPEN:])
+        return known[1]
+
+    async def figure_data(self, name: str) -> dict[str, Any]:
+        """Return what the figures of a fit show, by their names: kept beside it, or worked out.
+
+        Raises:
+            StoreError: The folder is damaged.
+        """
+        kept = await self.compute(read_figure_data, self.results(name))
+        return kept or dict(await self.compute(_collect_figure_data, await self.open_fit(name)))
+
+    async def draw_figure(self, name: str, figure: str) -> bytes:
+        """Return a figure of a fit as PNG, drawn as `bowdenfit plot` draws it where it does not lie in the folder.
+
+        Raises:
+            UsageError: There is no such figure.
+            StoreError: The folder is damaged.
+        """
+        if figure not in FIGURES:
+            raise UsageError(f"there is no figure {shown(figure)}.")
+        drawing = self.results(name) / FIGURES_FOLDER / f"{figure}.png"
+        if drawing.is_file():
+            refuse_special(drawing)
+            return drawing.read_bytes()
+        data = (await self.figure_data(name)).get(figure)
+        if data is None:
+            raise UsageError(f"this fit has nothing to show in the figure {figure}.")
+        fit = await self.open_fit(name)
+        return await self.compute(_draw, figure, data, fit)
+
+    def close(self) -> None:
+        """End all fits that run; what they have sampled is kept."""
+        for job in self.jobs.values():
+            if job.running:
+                job.cancel()
+        self._thread.shutdown(wait=False, cancel_futures=True)
+        self._temporary.cleanup()
+
+
+def _collect_figure_data(fit: Fit) -> dict[str, Any]:
+    return dict(collect_figure_data(fit))
+
+
+def _draw(figure: str, data: Any, fit: Fit) -> bytes:
+    """Return a figure as PNG."""
+    with TemporaryDirectory() as folder:
+        (file,) = write_figure_files(figure, data, Path(folder), (PNG,), fit.name, mark=warning_mark(fit.verdict().troubles))
+        return file.read_bytes()
+
+
+def refuse_folder_name(name: str) -> None:
+    """Refuse a name that a new folder may not have.
+
+    Raises:
+        UsageError: It has a separator, begins with a dot, is reserved on some systems, or is too long.
+    """
+    plain = name.strip()
+    if plain != name or not _NAME.fullmatch(name) or name.endswith((".", " ")) or name.partition(".")[0].lower() in _RESERVED:
+        raise UsageError(f"{shown(name)} cannot be the name of a folder; use letters, digits, blanks and - _ . ( ) +.")

@@ -1,0 +1,100 @@
+"""The questions of `init` as a form, and what is understood of files on their way to a data set."""
+
+import pytest
+
+from bowdenfit.app.draft import Draft
+from bowdenfit.app.form import Form, UnansweredError
+from bowdenfit.cli.init_dialog import start_data_set
+from bowdenfit.questions.start.question import number_question, quantity_question, yes_no_question
+
+TABLE = "F_in (N),F_out (N),run\n20,15.2,1\n40,30.1,1\n20,15.0,2\n40,30.9,2\n20,14.8,3\n40,29.9,3\n"
+
+
+@pytest.fixture
+def draft_of(tmp_path):
+    """Make a draft of some tables."""
+
+    def make(**files):
+        draft = Draft(tmp_path / "draft")
+        draft.folder.mkdir()
+        for name, content in files.items():
+            draft.new_file(f"{name}.csv").write_text(content)
+        return draft
+
+    return make
+
+
+def answer(draft, words, typed):
+    """Answer the question that begins with some words."""
+    (entry,) = [entry for entry in draft.understanding.entries if entry.words.startswith(words)]
+    draft.answers[entry.key] = typed
+    return draft.understand()
+
+
+def test_a_form_goes_on_with_proposed_answers_and_ends_at_the_first_without_one():
+    form = Form({})
+    assert form.ask(yes_no_question("Is it so?", True)) is True
+    with pytest.raises(UnansweredError):
+        form.ask(quantity_question("How far?", "angle", "90 deg"))
+    assert [(entry.words, entry.answer, entry.options) for entry in form.entries] == [
+        ("Is it so?", "y", (("y", "yes"), ("n", "no"))),
+        ("How far?", "", ()),
+    ]
+
+
+def test_the_same_question_asked_twice_has_two_answers():
+    form = Form({"How many? 1": "2", "How many? 2": "3"})
+    assert [form.ask(number_question("How many?", None)) for _ in range(2)] == [2, 3]
+
+
+def test_an_answer_that_cannot_be_read_is_refused_in_the_words_of_the_terminal():
+    form = Form({"How many? 1": "some"})
+    with pytest.raises(UnansweredError):
+        form.ask(number_question("How many?", None, example="3"))
+    assert form.entries[0].fault == "'some' is not a number; write one, such as 3."
+
+
+def test_a_draft_is_understood_as_init_understands_it(draft_of, tmp_path):
+    draft = draft_of(forces=TABLE)
+    before = draft.understand()
+    assert [column.meaning for column in before.files[0].columns] == ["input_force", "output_force", "run"]
+    assert (before.files[0].columns[1].first, before.files[0].columns[1].last) == ("15.2", "29.9")
+    assert before.report == before.description == ""
+    after = answer(draft, "By which angle", "180 deg")
+    assert after.refusals == ()
+    assert "Everything could be read" in after.report
+    draft.write(tmp_path / "by-app")
+    measured = tmp_path / "forces.csv"
+    measured.write_text(TABLE)
+    start_data_set(tmp_path / "by-init", [measured], None, {"wrap_angle": "180deg"})
+    assert 'wrap_angle = { value = 180, unit = "deg" }' in (tmp_path / "by-app" / "cable.toml").read_text()
+    assert (tmp_path / "by-app" / "forces.csv").read_text() == TABLE
+
+
+def test_meaning_and_unit_of_a_column_can_be_stated(draft_of):
+    draft = draft_of(forces="a,b,bend,trial\n20,15.2,90,1\n40,30.1,90,1\n20,13.0,180,2\n40,25.9,180,2\n")
+    draft.state("forces.csv", "a", "input_force", "lbf")
+    draft.state("forces.csv", "b", "output_force", "lbf")
+    draft.state("forces.csv", "bend", "wrap_angle", "deg")
+    understanding = draft.understand()
+    if understanding.entries[0].words.startswith("forces.csv has the columns"):
+        understanding = answer(draft, "forces.csv has the columns", "2")
+    assert {column.heading: (column.meaning, column.unit) for column in understanding.files[0].columns} == {
+        "a": ("input_force", "lbf"), "b": ("output_force", "lbf"), "bend": ("wrap_angle", "deg"), "trial": ("", ""),
+    }  # fmt: skip
+
+
+def test_a_refusal_names_the_cell_that_it_speaks_of(draft_of):
+    draft = draft_of(forces=TABLE.replace("30.9", "many"))
+    draft.understand()
+    refusal = next(r for r in answer(draft, "By which angle", "180 deg").refusals if r.row)
+    assert (refusal.file, refusal.row, refusal.column) == ("forces.csv", 5, "F_out (N)")
+    assert refusal.sentence.startswith("forces.csv, row 5, column 'F_out (N)': ")
+
+
+def test_a_draft_with_open_questions_is_not_written(draft_of, tmp_path):
+    draft = draft_of(forces=TABLE)
+    draft.understand()
+    with pytest.raises(Exception, match="questions are still open"):
+        draft.write(tmp_path / "x")
+    assert not (tmp_path / "x").exists()

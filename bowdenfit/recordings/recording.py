@@ -111,6 +111,8 @@ class Blocks(Part):
         samples: Number of good samples of each block, at least 1; blocks without any are left out.
         saturated: Blocks most of whose samples were at the end of a load cell's range; their forces are the means of
             the saturated samples, and they must not be used as readings.
+        input_turn: Input force [N] at which a block below both neighbors was lowest, or one above both highest, less what
+            noise adds to extremes; of other blocks the mean. None in fits that were saved before it was kept.
     """
 
     time: Vector
@@ -119,6 +121,7 @@ class Blocks(Part):
     velocity: Vector
     samples: Labels
     saturated: Flags
+    input_turn: Vector | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -3,7 +3,7 @@
 Output forces follow from the measured input force by the cable's play operator, for every draw.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +22,8 @@ from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
 from bowdenfit.models import Model
-from bowdenfit.recordings.preparation.hysteresis import smooth_input
-from bowdenfit.recordings.recording import Recording, Recordings
+from bowdenfit.recordings.preparation.hysteresis import last_contact, smooth_input
+from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.results.record import Record, cached_per_fit, parameter_values, thinned_parameter_values
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -95,7 +95,9 @@ class RecordingFollower:
     """
 
     def __init__(self, model: Model, recordings: Recordings, angles: AngleTable | None) -> None:
-        self._data = _block_arrays(model, recordings, angles)
+        steps = [_choose_steps(recording.blocks) for recording in recordings.items]
+        self._shown = pad_columns([step.shown for step in steps])
+        self._data = _step_arrays(model, recordings, angles, steps)
         values = {p.name: jax.ShapeDtypeStruct((DRAWS,), jnp.float64) for p in model.space.parameters}
         mounting = jax.ShapeDtypeStruct((DRAWS, len(recordings.items)), jnp.float64)
         function = jax.vmap(_make_follow_function(model), in_axes=(0, 0, None))
@@ -111,7 +113,7 @@ class RecordingFollower:
             mounting: Effect of the mounting on the friction exponent of each recording [1].
         """
         force, exponent = self._program(values, mounting, self._data)
-        return np.asarray(force), np.asarray(exponent)
+        return np.take_along_axis(np.asarray(force), self._shown[None], axis=1), np.asarray(exponent)
 
 
 @cached_per_fit
@@ -170,18 +172,50 @@ def choose_blocks(n_blocks: int) -> np.ndarray:
     return np.arange(0, n_blocks, -(-n_blocks // MOST_BLOCKS))
 
 
-def _block_arrays(model: Model, recordings: Recordings, angles: AngleTable | None) -> dict[str, Any]:
-    """Return the blocks of all recordings side by side, the shorter ones standing still at their end."""
-    shown = [choose_blocks(len(r.blocks.time)) for r in recordings.items]
-    chosen = list(zip(recordings.items, shown, strict=True))
+@dataclass(frozen=True)
+class _Steps:
+    """What the play operator of one recording follows: the chosen blocks, with a step more wherever the input turns.
+
+    Args:
+        block: Number of the block of each step.
+        input_force: Likely input force of each step [N].
+        shown: Numbers of the steps whose output is that of the chosen blocks.
+    """
+
+    block: np.ndarray
+    input_force: np.ndarray
+    shown: np.ndarray
+
+
+def _choose_steps(blocks: Blocks) -> _Steps:
+    """Choose the steps of a recording; the step more is at the lowest or highest input of the samples about a turn.
+
+    After a valley the output stands at what the lowest input was, so that means of blocks, and blocks that are left out
+    between those that are chosen, would put it too high.
+    """
+    chosen, likely = choose_blocks(len(blocks.time)), smooth_input(blocks.input_force)
+    turn = likely if blocks.input_turn is None else likely + (blocks.input_turn - blocks.input_force)
+    lowest, highest = np.minimum.reduceat(turn, chosen), np.maximum.reduceat(turn, chosen)
+    heading = last_contact(np.sign(np.diff(likely[chosen], append=likely[-1])).astype(int))  # to the next force that differs
+    turns = np.flatnonzero(heading[1:] * heading[:-1] < 0) + 1
+    ends = [lowest[i - 1 : i + 2].min() if heading[i] > 0 else highest[i - 1 : i + 2].max() for i in turns]
+    shown = np.arange(len(chosen)) + np.searchsorted(turns, np.arange(len(chosen)))
+    return _Steps(np.insert(chosen, turns + 1, chosen[turns]), np.insert(likely[chosen], turns + 1, ends), shown)
+
+
+def _step_arrays(
+    model: Model, recordings: Recordings, angles: AngleTable | None, steps: Sequence[_Steps]
+) -> dict[str, Any]:
+    """Return the steps of all recordings side by side, the shorter ones standing still at their end."""
+    chosen = list(zip(recordings.items, steps, strict=True))
     drive = LoopDrive if model.cable.is_loop else RopeDrive
-    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s] for r, s in chosen]
+    rates = [np.gradient(drive.reading(r.blocks.output_force), r.blocks.time)[s.block] for r, s in chosen]
     rows = collect_row_angles(model.description, angles_of_recordings(recordings), angles).data
     held = {
-        name: pad_columns([getattr(r.blocks, name)[s] for r, s in chosen])
+        name: pad_columns([getattr(r.blocks, name)[s.block] for r, s in chosen])
         for name in ("input_force", "output_force", "velocity")
     }
-    likely = pad_columns([smooth_input(r.blocks.input_force)[s] for r, s in chosen])
+    likely = pad_columns([step.input_force for step in steps])
     return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant")}
 
 

@@ -119,7 +119,7 @@ def average_recording(inspected: Inspected, shared_delay: tuple[float, float] | 
     bandwidth = estimate_bandwidth(filled[0], filled[1], 1 / common.step, main, raw.loop)
     noise = _noise(cleaned.input, bandwidth), _noise(cleaned.output, bandwidth)
     samples = _samples_of_block(inspected, common, bandwidth, main, noise)
-    blocks, counts = average_blocks(common, samples)
+    blocks, counts = average_blocks(common, samples, noise[0])
     account = Account(
         counts=counts,
         samples=len(common.time),

@@ -124,7 +124,7 @@ def _quiet_enough(common: CommonClock, noise: tuple[float, float], loop: bool) -
     return int(np.ceil((single / (_NOISE_IN_BAND * band)) ** 2)) if single > 0 else 1
 
 
-def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str, int]]:
+def average_blocks(common: CommonClock, samples: int, input_noise: float) -> tuple[Blocks, dict[str, int]]:
     """Return means of the good samples over equal stretches of time, and where every sample went.
 
     A block of whose readings more than half are at the end of a load cell's range is marked, and holds the means of those;
@@ -133,6 +133,7 @@ def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str,
     Args:
         common: Both channels.
         samples: Samples of a block; 0 to leave every sample by itself.
+        input_noise: Standard deviation of a single sample of the input force [N].
     """
     kept, lost, counts, start = [], [], np.zeros(len(KINDS), dtype=int), 0
     while start < len(common.time):
@@ -145,12 +146,26 @@ def average_blocks(common: CommonClock, samples: int) -> tuple[Blocks, dict[str,
         start = stop
     joined = [np.concatenate(column) for column in zip(*kept, *lost, strict=True)]
     order = np.argsort(joined[0], kind="stable")
-    place, input_, output, velocity, count = (column[order] for column in joined)
+    place, input_, output, velocity, lowest, highest, count = (column[order] for column in joined)
     middle = common.time[0] + common.step * ((place + 0.5) * max(samples, 1) - 0.5)
     saturated = (np.arange(len(order)) >= sum(len(column[0]) for column in kept))[order]
     time = common.time[place] if samples == 0 else middle
-    blocks = Blocks(time, input_, output, velocity, count, saturated)
+    turn = _turning_values(input_, lowest, highest, input_noise)
+    blocks = Blocks(time, input_, output, velocity, count, saturated, turn)
     return blocks, dict(zip(KINDS, counts.tolist(), strict=True))
+
+
+def _turning_values(mean: Vector, lowest: Vector, highest: Vector, noise: float) -> Vector:
+    """Return the force at which each block turned: what means of a valley or a peak cut off; the mean elsewhere.
+
+    Args:
+        mean, lowest, highest: Of the samples of each block.
+        noise: Standard deviation of a sample, about as much as it adds to the extreme of the few samples near a turn.
+    """
+    before, after = np.append(mean[:1], mean[:-1]), np.append(mean[1:], mean[-1:])
+    down = np.minimum(lowest + noise, mean)
+    up = np.maximum(highest - noise, mean)
+    return np.where((mean < before) & (mean < after), down, np.where((mean > before) & (mean > after), up, mean))
 
 
 def _whole_blocks(common: CommonClock, start: int, samples: int) -> tuple[Positions, int]:
@@ -184,14 +199,18 @@ def _swept(fault: Labels, place: Labels) -> Labels:
 
 def _means(
     common: CommonClock, place: Labels, chosen: Flags
-) -> tuple[Positions, ChosenVector, ChosenVector, ChosenVector, Positions]:
-    """Return the number of each block with chosen samples, the means of the two forces and the velocity, and the counts."""
+) -> tuple[Positions, ChosenVector, ChosenVector, ChosenVector, ChosenVector, ChosenVector, Positions]:
+    """Return the number of each block with chosen samples; the means of the two forces and the velocity, and the lowest and
+    the highest input force, of these; and their counts.
+    """
     where = np.flatnonzero(chosen)
     starts = np.flatnonzero(np.append(True, np.diff(place[where]) > 0)) if len(where) else np.zeros(0, dtype=int)
     count = np.diff(np.append(starts, len(where)))
     columns = (common.input_force, common.output_force, common.velocity)
     means = [np.add.reduceat(v[where], starts) / count if len(starts) else np.zeros(0) for v in columns]
-    return place[where][starts], means[0], means[1], means[2], count
+    input_ = common.input_force[where]
+    ends = [of.reduceat(input_, starts) if len(starts) else np.zeros(0) for of in (np.minimum, np.maximum)]
+    return place[where][starts], means[0], means[1], means[2], ends[0], ends[1], count
 
 
 def estimate_bandwidth(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:

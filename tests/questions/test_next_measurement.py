@@ -39,9 +39,9 @@ from bowdenfit.questions.next.variance_reduction import (
     explained_share,
     mean_and_spread,
     simulate_readings,
-    spread_after_outcomes,
+    widths_after_outcomes,
 )
-from bowdenfit.questions.next.words import next_measurement_text
+from bowdenfit.questions.next.words import format_width, next_measurement_text
 from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.results.along_route import make_optimizer
 from bowdenfit.results.record import Draws
@@ -581,13 +581,31 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     assert max(expected, key=expected.__getitem__) == max(realized, key=lambda c: realized[c][0])
 
 
-def test_the_spread_after_an_outcome_is_that_of_a_normal_distribution():
+def test_an_interval_after_an_outcome_is_as_wide_as_the_conditional_one():
     rng = np.random.default_rng(3)
-    reading = rng.normal(size=20_000)
-    answer = 0.8 * reading + 0.6 * rng.normal(size=20_000)
-    spread = spread_after_outcomes(reading[:, None], answer)
-    assert np.median(spread) == pytest.approx(0.6, rel=0.05)
-    assert np.quantile(spread, 0.95) < 0.75
+    answer = rng.normal(size=5_000)
+    readings = (0.8 * answer[:, None] + 0.6 * rng.normal(size=(5_000, 2)))[..., None]
+    widths = widths_after_outcomes(readings, answer)
+    assert np.median(widths) == pytest.approx(2 * 1.645 * 0.6, rel=0.05)
+    assert np.quantile(widths, 0.95) < 2.5
+
+
+def test_the_range_after_a_second_mounting_is_the_same_for_every_seed():
+    """Though the tail of tau is so long that standard deviations have no limit."""
+    rng, stated = np.random.default_rng(4), []
+    for _ in range(4):
+        tau = 0.02 * np.abs(rng.standard_cauchy(5_000))
+        mu = 0.1 - tau * rng.standard_normal(5_000)
+        readings = (mu + tau * rng.standard_normal((3, 5_000))).T[..., None]
+        stated.append(np.quantile(widths_after_outcomes(readings, mu), (0.05, 0.5, 0.95)))
+    assert np.ptp(np.log(stated), axis=0) == pytest.approx([0, 0, 0], abs=0.35)
+
+
+@pytest.mark.parametrize(
+    ("width", "printed"), [(0.0367, "0.04"), (0.0162, "0.016"), (0.0951, "0.1"), (23.4, "20"), (0.0, "0")]
+)
+def test_widths_are_printed_to_digits_that_stand(width, printed):
+    assert format_width(width) == printed
 
 
 @pytest.mark.parametrize("runs", [1, 2])
@@ -605,8 +623,8 @@ def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
     text = " ".join(next_measurement_text(ranking).split())
     if runs == 1:
         assert second is not None
-        assert second.low < second.sd < second.high
-        assert second.sd < ranking.answer.sd
+        assert second.low < second.width < second.high
+        assert second.width < second.width_now
         assert text.startswith("Mount the cable anew and measure a force run next: all readings come from one mounting")
         assert "uncertainty lower by" not in text
         assert "Next: mount the cable anew" in " ".join(str(fit).split())

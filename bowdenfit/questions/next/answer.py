@@ -222,19 +222,21 @@ class LoadAndStroke(Part):
 class SecondMounting:
     """What a second mounting would do where all readings come from one.
 
-    How far mountings differ is then known by its prior alone, whose tail is so long that the average of what may come says
-    little: the middle of all outcomes stands here, and their range.
+    How far mountings differ is then known by its prior alone, whose tail is so long that variances, and the average of what may
+    come, are those of a few draws: widths of 90 % intervals stand here, the middle of all outcomes and their range.
 
     Args:
         words: The measurement in a sentence.
         name: As `--candidate` takes it.
-        sd: Median over all outcomes of the standard deviation of the answer afterwards.
-        low, high: 5 and 95 % quantiles of it.
+        width_now: Width of the 90 % interval of the answer as things are.
+        width: Median over all outcomes of its width afterwards.
+        low, high: 5 and 95 % quantiles of that.
     """
 
     words: str
     name: str
-    sd: float
+    width_now: float
+    width: float
     low: float
     high: float
 

@@ -40,7 +40,8 @@ from bowdenfit.questions.next.variance_reduction import (
     explained_share,
     mean_and_spread,
     simulate_readings,
-    spread_after_outcomes,
+    width_of_interval,
+    widths_after_outcomes,
 )
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
 from bowdenfit.results.store import load
@@ -109,9 +110,9 @@ def _second_mounting(
     if not anew or not rests_on_one_mounting(fit):
         return None
     first = chosen[anew[0]]
-    sds = spread_after_outcomes(readings[anew[0]][:, 0], target.draws)
-    low, middle, high = (float(sd) for sd in np.quantile(sds, (0.05, 0.5, 0.95)))
-    return SecondMounting(describe_candidate(fit, first), format_candidate(first), middle, low, high)
+    now, after = float(width_of_interval(target.draws)), widths_after_outcomes(readings[anew[0]], target.draws)
+    low, middle, high = (float(width) for width in np.quantile(after, (0.05, 0.5, 0.95)))
+    return SecondMounting(describe_candidate(fit, first), format_candidate(first), now, middle, low, high)
 
 
 def _load_range(fit: Record) -> tuple[float, float] | None:

@@ -33,8 +33,9 @@ GROUPS = 64  # of draws: what is learned on all but one is judged on that one; a
 # `scripts/check_next_measurement.py` compares the ranking with refits.
 _DEGREES = {1: 5, 2: 4, 3: 3}
 _DEFAULT_DEGREE = 2
-# Outcomes of a reading, and draws that stand for what is known after one; judgements: a standard deviation errs by 5 %.
-_OUTCOMES, _NEAREST = 500, 200
+# Outcomes of a reading, and draws that stand for what is known after one; judgements: with fewer outcomes the ends of their
+# range differ by a third instead of a sixth from seed to seed (`scripts/check_one_mounting.py`).
+_OUTCOMES, _NEAREST = 10_000, 200
 _MIN_REPEATS = 3  # readings whose scatter says something; a judgement
 _NEGLIGIBLE_SPREAD = 1e-9  # relative spread below which readings are all the same
 
@@ -77,21 +78,29 @@ def explained_share(
     return Explained(float(np.clip(share, 0.0, 1.0)), _jackknife_error(without), without)
 
 
-def spread_after_outcomes(
-    reading: Float[np.ndarray, "draws columns"], answer: Float[np.ndarray, " draws"]
+def widths_after_outcomes(
+    readings: Float[np.ndarray, "draws repeats columns"], answer: Float[np.ndarray, " draws"]
 ) -> Float[np.ndarray, " outcomes"]:
-    """Return the standard deviation of an answer after each of many outcomes of a reading.
+    """Return the width of the 90 % interval of an answer after each of many outcomes of a reading.
 
-    After an outcome the draws that gave nearly the same reading are left, as in approximate Bayesian computation.
+    After an outcome the draws that gave nearly the same reading are left, as in approximate Bayesian computation. Widths and no
+    standard deviations: where the tail is long, these are those of a few draws, and differ by a factor from seed to seed.
 
     Args:
-        reading: The reading as each draw would give it; several columns are read together.
+        readings: The reading as each draw would give it, taken several times; its columns are read together.
         answer: The answer of each draw.
     """
-    scores = np.column_stack([_compute_normal_scores(column) for column in reading.T])
-    outcomes = np.linspace(0, len(scores) - 1, _OUTCOMES).astype(int)
+    of_each, repeats = readings.reshape(-1, readings.shape[2]), readings.shape[1]
+    scores = np.column_stack([_compute_normal_scores(column) for column in of_each.T])
+    outcomes = np.linspace(0, len(scores) - 1, min(_OUTCOMES, len(scores))).astype(int)
     _, nearest = cKDTree(scores).query(scores[outcomes], k=min(_NEAREST, len(scores)))
-    return np.asarray(answer[nearest].std(axis=1))
+    return width_of_interval(np.repeat(answer, repeats)[nearest])
+
+
+def width_of_interval(draws: np.ndarray) -> np.ndarray:
+    """Return the width of the central 90 % of draws along the last axis."""
+    low, high = np.quantile(draws, (0.05, 0.95), axis=-1)
+    return np.asarray(high - low)
 
 
 def error_of_difference(first: Explained, second: Explained) -> float:

@@ -64,14 +64,20 @@ def ranking_sentences(ranking: NextMeasurement) -> list[str]:
 
 def _second_mounting_sentences(ranking: NextMeasurement, second: SecondMounting) -> list[str]:
     """Say that a second mounting comes first, and what it may bring."""
-    answer, now = ranking.answer, _format_sd(ranking, ranking.answer.sd)
-    low, high = _format_sd(ranking, second.low).removeprefix("± "), _format_sd(ranking, second.high)
+    answer = ranking.answer
+    unit = f" {answer.unit}" if answer.unit else ""
     return [
         f"Mount the cable anew and measure {second.words} next: all readings come from one mounting, which cannot show how "
         "far mountings differ.",
-        f"Then {answer.words} would be known to {_format_sd(ranking, second.sd)}, now to {now}; how the second mounting turns "
-        f"out decides, and 90 % of the outcomes leave {low} to {high.removeprefix('± ')}.",
+        f"Then the 90 % interval of {answer.words} would be about {format_width(second.width)}{unit} wide, now "
+        f"{format_width(second.width_now)}{unit}. How the second mounting turns out decides: 90 % of the outcomes leave "
+        f"{significant(second.low, 1)} to {significant(second.high, 1)}{unit}.",
     ]
+
+
+def format_width(width: float) -> str:
+    """Return a width to one digit, or two where the first is 1: another seed moves it by a twentieth."""
+    return significant(width, 2 if f"{width:e}".startswith("1") else 1)
 
 
 def _format_sd(ranking: NextMeasurement, sd: float) -> str:

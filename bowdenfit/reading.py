@@ -44,8 +44,9 @@ class Reading(TypedDict, total=False):
         noise: How readings scatter: normally, or as a Student-t, with which a few bad readings or mountings hardly pull
             the fit.
         friction: How friction depends on load, stroke and speed: capstan, or drag (a hidden tension D, which costs
-            D (1 - exp(-Lambda)) of the force at any load), load-dependent, stroke-dependent, rate-dependent and by-group (a
-            coefficient for each group that a table names) joined by +.
+            D (1 - exp(-Lambda)) of the force at any load), load-dependent, stroke-dependent, rate-dependent, by-group (a
+            coefficient for each group that a table names), and of recordings dahl or lugre (friction that builds up after
+            a turn) or play (what these are compared with) joined by +.
         geometry: How wrap angles follow the length: one curve over the whole range, or regions with dropped angles as
             the on-body paper has them.
         undetected: How angles too small to detect enter.

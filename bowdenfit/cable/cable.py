@@ -11,7 +11,8 @@ from jaxtyping import Float, Int
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.curves import Curve
 from bowdenfit.cable.elasticity import STRETCH_FRICTION, Elasticity
-from bowdenfit.cable.friction import FrictionModel, friction_options
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.friction_options import friction_options
 from bowdenfit.cable.laws import Capstan, ContactLaw, parameter_of
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, check_names, coefficient_of, load_class, sheath_length
 from bowdenfit.description import Contact, Description, PriorDefaults

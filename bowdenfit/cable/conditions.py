@@ -25,6 +25,7 @@ class Conditions:
         shows_loads: Whether any table shows the forces, and not their ratio alone.
         median_load: Median of all loads measured at [N]; None where no table shows any.
         groups: Groups of its readings; empty without any.
+        shows_turns: Whether there are recordings of a single rope, which show what happens when the motion turns.
     """
 
     reference_force: float
@@ -34,6 +35,7 @@ class Conditions:
     shows_loads: bool = True
     median_load: float | None = None
     groups: tuple[str, ...] = ()
+    shows_turns: bool = False
 
     @property
     def load(self) -> Scale:
@@ -67,6 +69,7 @@ def make_conditions(
     speeds: Float[np.ndarray, " speeds"],
     velocity_unit: str,
     groups: tuple[str, ...] = (),
+    shows_turns: bool = False,
 ) -> Conditions:
     """Return the reference force and speed as stated, or from the middle of the measurements.
 
@@ -77,6 +80,7 @@ def make_conditions(
         speeds: Speeds while the rope slides [mm/s or rad/s].
         velocity_unit: Which of the two; empty without velocities.
         groups: Groups of readings.
+        shows_turns: Whether there are recordings of a single rope.
     """
     stated = description.reference_force
     force = stated.to("force") if stated else _rounded(np.exp(np.mean(np.log(forces)))) if len(forces) else 1.0
@@ -86,7 +90,7 @@ def make_conditions(
     ends = (float(speeds.min()), float(speeds.max())) if len(speeds) else (float("nan"), float("nan"))
     loads = forces if len(forces) else tensions
     typical = float(np.median(loads)) if len(loads) else None
-    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0, typical, groups)
+    return Conditions(float(force), float(speed), ends, velocity_unit, len(forces) > 0, typical, groups, shows_turns)
 
 
 def _rounded(value: float) -> float:

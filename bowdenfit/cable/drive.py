@@ -1,8 +1,9 @@
 """A single rope or a pull-pull loop as a recording shows it: from the input force through any motion to the output force.
 
 Both follow the play operator, each on a scale of its own: a rope on the scale g on which friction is a shift, a loop on
-that of the force itself. What a load cell shows of the output is compared as a logarithm of a rope, whose force is
-positive, and as it is of a loop, whose force passes through zero.
+that of the force itself. A rope whose friction builds up after a turn follows `bowdenfit.physics.presliding` instead. What a
+load cell shows of the output is compared as a logarithm of a rope, whose force is positive, and as it is of a loop, whose force
+passes through zero.
 """
 
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.physics.friction import play_operator
 from bowdenfit.physics.loop import Rope, loop_band
+from bowdenfit.physics.presliding import presliding_operator
 
 LEAST_EXPONENT = 1e-9  # no mounting takes friction below none; not 0, of which logarithms are infinite
 
@@ -38,12 +40,14 @@ class RopeDrive:
         values: Values of the parameters.
         exponent: Friction exponent of each recording at the reference speed [1].
         rate: Factor on it at each time [1].
+        step: Time since the one before [s]; 0 where it is not known, and bristles then have no damping.
     """
 
     friction: FrictionModel
     values: Mapping[str, Array]
     exponent: PerRecording
     rate: PerTime
+    step: PerTime | float = 0.0
     least_share = LEAST_SHARE
 
     @property
@@ -77,12 +81,34 @@ class RopeDrive:
             noise: What the output is expected to follow beyond what the rope does: what a reading of the input has in it
                 that is no motion, where the rope slides; 0 elsewhere [N].
         """
-        x, band = self.scaled(input_force), self.band(mounting)
-        (pulling, returning), slopes = jax.jvp(partial(self.friction.shifts, self.values), (band,), (jnp.ones_like(band),))
-        y, slope = play_operator(x - pulling, x + returning, start, (-slopes[0], slopes[1]), restart)
+        x = self.scaled(input_force)
+        stiffness = self.friction.presliding_stiffness(self.values)
+        if stiffness is None:
+            y, slope = self._stand_still(x, mounting, start, restart)
+        else:
+            follow = partial(self._creep, x, stiffness, start, restart)
+            y, slope = jax.jvp(follow, (mounting,), (jnp.ones_like(mounting),))
         if noise is not None:
             y = y + self.scaled(jnp.maximum(input_force + noise, self.least_force)) - x
         return jnp.maximum(self.friction.force(self.values, y), self.least_force), slope
+
+    def _stand_still(
+        self, x: PerTime, mounting: PerRecording, start: PerRecording, restart: PerTime | None
+    ) -> tuple[PerTime, PerTime]:
+        """Return the output of the play operator on the scale g, and its derivative by the friction exponent."""
+        band = self.band(mounting)
+        (pulling, returning), slopes = jax.jvp(partial(self.friction.shifts, self.values), (band,), (jnp.ones_like(band),))
+        return play_operator(x - pulling, x + returning, start, (-slopes[0], slopes[1]), restart)
+
+    def _creep(
+        self, x: PerTime, stiffness: Array, start: PerRecording, restart: PerTime | None, mounting: PerRecording
+    ) -> PerTime:
+        """Return the output on the scale g where friction builds up after a turn."""
+        band, step = self.band(mounting), jnp.asarray(self.step)
+        known = step > 0
+        damping = jnp.where(known, self.friction.bristle_damping(self.values) / jnp.where(known, step, 1.0), 0.0)
+        by_band = stiffness * jnp.maximum(self.exponent + mounting, LEAST_EXPONENT) / band
+        return presliding_operator(x, self.friction.shifts(self.values, band), by_band, start, restart, damping)
 
     def shown(self, cells: LoadCells, output_force: PerTime, slope: PerTime) -> tuple[PerTime, PerTime]:
         """Return the log of what the output's cell shows, and its derivative by the exponent, of what `follow` gave."""
@@ -168,6 +194,7 @@ def make_drive(
     wrap_angles: Float[Array, "recordings contacts"],
     velocity: PerTime,
     exponent: PerRecording | None = None,
+    step: PerTime | float = 0.0,
 ) -> RopeDrive | LoopDrive:
     """Return the cable as it lies in each recording.
 
@@ -177,9 +204,10 @@ def make_drive(
         wrap_angles: Wrap angle of each contact in each recording [rad].
         velocity: At each time; NaN where it is not known.
         exponent: Friction exponents, if they are not those of the wrap angles [1].
+        step: Time since the one before [s]; 0 where it is not known.
     """
     exponent = cable.friction_exponent(values, wrap_angles) if exponent is None else exponent
     if cable.is_loop:
         preload = cable.elasticity.preload(values, jnp.sum(wrap_angles, axis=-1))[0]
         return LoopDrive(preload, exponent, cable.elasticity.loop_rope(values))
-    return RopeDrive(cable.friction, values, exponent, cable.friction.rate(values, velocity))
+    return RopeDrive(cable.friction, values, exponent, cable.friction.rate(values, velocity), step)

@@ -1,200 +1,17 @@
-"""How friction depends on load and speed: options beside the capstan equation that the data can be asked about.
+"""The friction of a cable beyond its coefficients, as the options of its description make it."""
 
-An option is one class here and one line in `FRICTION_OPTIONS`; options combine with `+`, as in "drag+rate-dependent".
-"""
-
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 from jaxtyping import Float
 
 from bowdenfit.cable.conditions import Conditions
-from bowdenfit.description import BY_GROUP, PriorDefaults
-from bowdenfit.errors import DescriptionError, suggest_name
-from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Uniform
-from bowdenfit.parameters.space import Parameter, Role
-from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope, rate_factor
-
-DRAG, LOAD_EXPONENT = "drag", "load_exponent"
-STROKE_DIFFERENCE = "stroke_difference"
-STRIBECK, STRIBECK_SPEED, VISCOUS = "stribeck", "stribeck_speed", "viscous"
-_SHOWN_SPEED = {"mm/s": ("mm/s", 1.0), "rad/s": ("r/min", 30 / np.pi), "": ("mm/s", 1.0)}
-
-
-class FrictionOption(ABC):
-    """One way in which friction may depend on load or speed: the parameters it adds, and what they do.
-
-    Options that depend on load change the scale g on which friction is a shift; those that depend on speed are factors on
-    every coefficient. Several add up, or multiply.
-    """
-
-    of_load = False
-    of_rate = False
-    of_stroke = False
-    of_group = False
-
-    @abstractmethod
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Return its parameters.
-
-        Raises:
-            DescriptionError: The measurements lack what the option needs.
-        """
-
-    def load_exponent(self, values: Mapping[str, Array]) -> Array:
-        """Return what it adds to the exponent p of the scale g, see `bowdenfit.physics.friction.force_scale` [1]."""
-        del values
-        return jnp.zeros(())
-
-    def drag(self, values: Mapping[str, Array]) -> Array:
-        """Return what it adds to the drag D of that scale [N]."""
-        del values
-        return jnp.zeros(())
-
-    def stroke_difference(self, values: Mapping[str, Array]) -> Array:
-        """Return by how much more friction there is pulling than returning, over the mean of both [1]."""
-        del values
-        return jnp.zeros(())
-
-    def factor(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """Return its factor on every coefficient at a speed, up to a constant [1]."""
-        del values
-        return jnp.ones_like(speed)
-
-
-class Drag(FrictionOption):
-    r"""A part D of the tension that the load cells do not show: adhesion, seals, bending stiffness, preload tared away.
-
-    .. math:: F_\text{out} = (F_\text{in} + D) e^{-\Lambda} - D = F_\text{in} e^{-\Lambda} - D (1 - e^{-\Lambda})
-
-    So the force that it costs at any load is not D but D (1 - exp(-Lambda)).
-    """
-
-    of_load = True
-
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Return the drag in newtons."""
-        conditions.needs_loads("drag")
-        meaning = "drag: hidden tension D, which the load cells do not show; D (1 - exp(-Lambda)) of the force is lost"
-        prior = HalfCauchy(defaults.drag_share * conditions.load.value)
-        by = conditions.load.describe_share(defaults.drag_share)
-        return [Parameter(DRAG, "$D$ hidden", meaning, "friction_model", prior, "N", scaled_by=by)]
-
-    def drag(self, values: Mapping[str, Array]) -> Array:
-        """D"""
-        return values[DRAG]
-
-
-class LoadDependent(FrictionOption):
-    """Friction coefficients that fall with the load, mu(F) = mu (F/F_ref)^-p."""
-
-    of_load = True
-
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Return the exponent."""
-        del defaults
-        conditions.needs_loads("load-dependent")
-        meaning = f"load exponent: how friction falls with the load, mu as stated at {conditions.reference_force:g} N"
-        return [Parameter(LOAD_EXPONENT, "$p$", meaning, "friction_model", Uniform(0.0, 1.0))]
-
-    def load_exponent(self, values: Mapping[str, Array]) -> Array:
-        """P"""
-        return values[LOAD_EXPONENT]
-
-
-class RateDependent(FrictionOption):
-    """Friction coefficients that change with the speed of the rope (Stribeck and viscous)."""
-
-    of_rate = True
-
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Stribeck rise, Stribeck speed and viscous coefficient."""
-        if not np.isfinite(conditions.speeds[1]) or conditions.speeds[1] <= 0:
-            raise DescriptionError(
-                'friction_model has "rate-dependent", but no force table or recording has a velocity; map a velocity '
-                'channel, or state it: velocity = { value = 20, unit = "r/min" } under [[recording]].'
-            )
-        unit, shown = _SHOWN_SPEED[conditions.velocity_unit]
-        low, high = conditions.speeds
-        speed, bound = float(np.sqrt(max(low, high / 100) * high)), defaults.viscous_at_highest_speed / high
-        role: Role = "friction_model"
-        stribeck_speed, viscous = LogNormal(speed, defaults.stribeck_speed_log_sd), Uniform(-bound, bound)
-        return [
-            Parameter(
-                STRIBECK, "$a$", "Stribeck rise: relative rise of friction toward standstill", role,
-                HalfNormal(defaults.stribeck),
-            ),
-            Parameter(
-                STRIBECK_SPEED, "$v_s$", "Stribeck speed: where that rise has ended", role,
-                stribeck_speed, unit, shown, prior_words=stribeck_speed.text(unit, shown, 3),
-            ),
-            Parameter(
-                VISCOUS, "$c$", "viscous coefficient: relative change of friction with speed", role,
-                viscous, f"1/({unit})", 1 / shown, prior_words=viscous.text("", 1 / shown, 3),
-            ),
-        ]  # fmt: skip
-
-    def factor(self, values: Mapping[str, Array], speed: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-        """1 + a exp(-(v/v_s)^2) + c |v|"""
-        return rate_factor(speed, values[STRIBECK], values[STRIBECK_SPEED], values[VISCOUS])
-
-
-class StrokeDependent(FrictionOption):
-    """Friction that is not the same both ways, mu (1 + d/2) pulling and mu (1 - d/2) returning: a laid rope, wear."""
-
-    of_stroke = True
-
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Return the difference d."""
-        conditions.needs_loads("stroke-dependent")
-        meaning = "stroke difference: by how much more friction there is pulling than returning, over the mean of both"
-        prior = Normal(0.0, defaults.stroke_difference)
-        return [Parameter(STROKE_DIFFERENCE, "$d$", meaning, "friction_model", prior)]
-
-    def stroke_difference(self, values: Mapping[str, Array]) -> Array:
-        """D"""
-        return values[STROKE_DIFFERENCE]
-
-
-class ByGroup(FrictionOption):
-    """Each group of readings has coefficients of its own, but of contacts with by_group = false."""
-
-    of_group = True
-
-    def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
-        """Return none: the coefficients of its groups are parameters already."""
-        del conditions, defaults
-        return []
-
-
-FRICTION_OPTIONS: dict[str, FrictionOption] = {
-    "drag": Drag(),
-    "load-dependent": LoadDependent(),
-    "rate-dependent": RateDependent(),
-    "stroke-dependent": StrokeDependent(),
-    BY_GROUP: ByGroup(),
-}
-
-
-def friction_options(text: str) -> tuple[str, ...]:
-    """Return the options in a text such as "drag+rate-dependent"; "capstan" has none.
-
-    Raises:
-        DescriptionError: An option is unknown or named twice.
-    """
-    names = [part.strip() for part in text.split("+")]
-    options = tuple(name for name in names if name != "capstan")
-    for name in options:
-        if name not in FRICTION_OPTIONS:
-            known = ["capstan", *FRICTION_OPTIONS]
-            raise DescriptionError(f"the friction model {name!r} is unknown{suggest_name(name, known)}")
-        if options.count(name) > 1:
-            raise DescriptionError(f"the friction model {text!r} names {name!r} twice; once is enough.")
-    return options
+from bowdenfit.cable.friction_options import FRICTION_OPTIONS, FrictionOption
+from bowdenfit.description import PriorDefaults
+from bowdenfit.parameters.space import Parameter
+from bowdenfit.physics.friction import force_from_scale, force_scale, force_scale_slope
 
 
 @dataclass(frozen=True)
@@ -223,6 +40,20 @@ class FrictionModel:
     def depends_on_stroke(self) -> bool:
         """Whether friction is not the same pulling and returning."""
         return any(option.of_stroke for option in self._options)
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether every block after a turn of the motion counts, and not only where the output stands."""
+        return any(option.of_turns for option in self._options)
+
+    def presliding_stiffness(self, values: Mapping[str, Array]) -> Array | None:
+        """Return the presliding stiffness [1]; None for a play operator."""
+        stated = [option.presliding_stiffness(values) for option in self._options]
+        return next((stiffness for stiffness in stated if stiffness is not None), None)
+
+    def bristle_damping(self, values: Mapping[str, Array]) -> Array:
+        """Return the damping of the bristles over their stiffness [s]."""
+        return sum((option.bristle_damping(values) for option in self._options), jnp.zeros(()))
 
     @property
     def groups(self) -> tuple[str, ...]:

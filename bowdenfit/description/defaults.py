@@ -172,6 +172,8 @@ class PriorDefaults(Frozen):
     wobble_per_m: Positive = 0.1
     stribeck: Positive = 0.3
     stroke_difference: Positive = 0.3
+    presliding_stiffness: Positive = 20.0
+    bristle_damping_ms: Positive = 10.0
     viscous_at_highest_speed: Positive = 0.5
     stribeck_speed_log_sd: Positive = 1.0
     stiffness_log_sd: Positive = 1.5

@@ -49,6 +49,7 @@ from bowdenfit.kinds.stretch.term import STRETCH_NOISE, StretchTerms
 from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.kinds.term import Circumstances, TermKind, Truth
 from bowdenfit.parameters.space import Parameter
+from bowdenfit.recordings.recording import Recordings
 
 _ALL: tuple[TermKind[Any], ...] = (
     AngleTerms(),
@@ -119,7 +120,9 @@ def make_measured_cable(description: Description, measurements: Measurements) ->
     speeds = _concatenate_positive([kind.speeds(table) for kind, table in friction])
     unit = _common_velocity_unit([kind.velocity_unit(table) for kind, table in friction])
     groups = order_groups(description, measurements)
-    conditions = make_conditions(description, forces, tensions, speeds, unit, groups)
+    recordings = measurements.table(Recordings)
+    shows_turns = recordings is not None and not recordings.loop
+    conditions = make_conditions(description, forces, tensions, speeds, unit, groups, shows_turns)
     return make_cable(description, _mean_own_angles(description, friction), conditions)
 
 

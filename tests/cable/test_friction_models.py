@@ -8,7 +8,8 @@ from cables import cable
 from scipy import stats
 
 from bowdenfit.cable.conditions import Conditions
-from bowdenfit.cable.friction import FrictionModel, friction_options
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.friction_options import friction_options
 from bowdenfit.dataset import Dataset
 from bowdenfit.errors import DescriptionError
 from bowdenfit.kinds.forces.table import ForceTable
@@ -214,7 +215,7 @@ def test_capstan_adds_nothing_and_options_add_up():
     [
         ("drga", ["'drga'", "did you mean 'drag'?"]),
         ("capstan+load_dependent", ["'load_dependent'", "did you mean 'load-dependent'?"]),
-        ("xyz", ["'xyz'", "known here: capstan, drag, load-dependent, rate-dependent, stroke-dependent, by-group."]),
+        ("xyz", ["'xyz'", "known here: capstan, drag, load-dependent, rate-dependent, stroke-dependent, play, dahl, lugre,"]),
         ("drag+", ["''", "known here"]),
         ("drag+rate-dependent+drag", ["'drag+rate-dependent+drag'", "'drag' twice"]),
     ],

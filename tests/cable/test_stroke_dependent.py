@@ -9,7 +9,8 @@ import pytest
 import bowdenfit as bf
 from bowdenfit.cable.conditions import Conditions
 from bowdenfit.cable.drive import RopeDrive
-from bowdenfit.cable.friction import STROKE_DIFFERENCE, FrictionModel
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.friction_options import STROKE_DIFFERENCE
 
 DIFFERENCE, EXPONENT = 0.2, 0.12 * np.pi
 VALUES = {STROKE_DIFFERENCE: jnp.asarray(DIFFERENCE)}

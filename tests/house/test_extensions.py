@@ -13,7 +13,7 @@ from scratch.losses.kind import LossKind
 from scratch.losses.term import LossTerms
 
 import bowdenfit as bf
-from bowdenfit.cable.friction import FRICTION_OPTIONS
+from bowdenfit.cable.friction_options import FRICTION_OPTIONS
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, CurveFamily
 from bowdenfit.cli.commands import command
 from bowdenfit.files import FORMATS

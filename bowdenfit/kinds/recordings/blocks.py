@@ -34,7 +34,7 @@ _NEAR_LIMIT = 0.005  # distance from the end of a range, over it, at which a sat
 
 MOST_BLOCKS = 600  # of one recording in the play operator: time grows with blocks, information hardly. A judgement
 _FREE = ("weight", "n_effective", "censored", "share", "drift", "restart", "input_noise")
-WITHOUT_WEIGHT = (*_FREE, "moving")  # arrays that are 0 where a recording has ended; the others stay as they were
+WITHOUT_WEIGHT = (*_FREE, "moving", "step")  # arrays that are 0 where a recording has ended; the others stay as they were
 _HELD = ("input_force", "likely_force", "output_force", "velocity")
 
 
@@ -204,13 +204,16 @@ class BlockGroups:
         """Return whether a flag is set in each group."""
         return np.maximum.reduceat(flags, self.starts)
 
-    def arrays(self, drive: type[RopeDrive | LoopDrive], usable: np.ndarray, censored: bool) -> dict[str, Any]:
+    def arrays(
+        self, drive: type[RopeDrive | LoopDrive], usable: np.ndarray, censored: bool, *, counts_turns: bool = False
+    ) -> dict[str, Any]:
         """Return the arrays that every likelihood of blocks takes, without their weight.
 
         Args:
             drive: What the recording is of.
             usable: Blocks that are readings.
             censored: Whether a saturated output counts as one beyond the end of the range.
+            counts_turns: Whether each block of a standing phase counts, and not all of them together as one reading.
         """
         blocks = self.recording.blocks
         force_in, force_out = (
@@ -227,16 +230,17 @@ class BlockGroups:
             "input_noise": np.where(sliding, force_in - likely, 0.0),
             "output_force": force_out,
             "velocity": self.mean(blocks.velocity),
-            "n_effective": self._count_effective(usable & ~off, lost),
+            "n_effective": self._count_effective(usable & ~off, lost, counts_turns),
             "restart": find_restarts(lost),
             "drift": np.gradient(drive.reading(force_out), self.mean(blocks.time)),
         }
 
-    def _count_effective(self, counted: np.ndarray, lost: np.ndarray) -> np.ndarray:
+    def _count_effective(self, counted: np.ndarray, lost: np.ndarray, counts_turns: bool) -> np.ndarray:
         """Return how many independent readings each group counts for; 0 where its input is not known."""
         contact = self.recording.strokes.contact
         effective = effective_counts(self.recording, np.arange(len(contact))) * (counted & is_inside_phase(contact))
-        return np.add.reduceat(effective * standing_share(contact, self.recording.blocks.input_force), self.starts) * ~lost
+        share = 1.0 if counts_turns else standing_share(contact, self.recording.blocks.input_force)
+        return np.add.reduceat(effective * share, self.starts) * ~lost
 
     def _censored(self, saturated: np.ndarray, force_out: np.ndarray, lost: np.ndarray) -> dict[str, np.ndarray]:
         """Return which end of the range the output lies beyond, and the weight of that bound.
@@ -291,6 +295,11 @@ def pad_columns(columns: Sequence[np.ndarray], mode: Literal["edge", "constant"]
     """Put columns side by side, the shorter ones kept at their last value or ("constant") followed by zeros."""
     longest = max(len(column) for column in columns)
     return np.stack([np.pad(column, (0, longest - len(column)), mode) for column in columns], axis=1)
+
+
+def block_steps(time: np.ndarray) -> np.ndarray:
+    """Return the time since the block before [s]; 0 of the first."""
+    return np.diff(time, prepend=time[:1])
 
 
 def group_starts(state: np.ndarray, most: int) -> np.ndarray:

@@ -21,12 +21,14 @@ from typing_extensions import override
 from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.conditions import LEAST_SHARE
 from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
+from bowdenfit.cable.friction_options import FRICTION_OPTIONS, friction_options
 from bowdenfit.cable.sensors import BLOCK_NOISE, DELAY_ERROR, RUN_SCATTER, LoadCells
 from bowdenfit.description import Description
 from bowdenfit.errors import DatasetError
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     SelectedBlocks,
+    block_steps,
     effective_counts,
     find_restarts,
     is_input_saturated,
@@ -39,6 +41,7 @@ from bowdenfit.kinds.recordings.blocks import (
     standing_share,
 )
 from bowdenfit.kinds.recordings.reader import RecordingsTable, angles_of_recordings
+from bowdenfit.kinds.recordings.turns import TurnsTerm, stack_turns
 from bowdenfit.kinds.recordings.whole_recordings import (
     LoopRecordingsTerm,
     WholeRecordingsTerm,
@@ -115,12 +118,20 @@ class RecordingTerms(TermKind[Recordings]):
             return super().events(term, description)
         settings = description.table(RecordingsTable)
         whole = float(settings is not None and settings.likelihood == "whole")
-        return np.column_stack([term.data["n"], np.full(len(term.labels), whole)])
+        return np.column_stack([term.data["n"], np.full(len(term.labels), 2.0 if isinstance(term, TurnsTerm) else whole)])
 
     @override
     def why_events_differ(self, readings: str, descriptions: Mapping[str, Description]) -> str:
         if readings != RECORDED:
             return super().why_events_differ(readings, descriptions)
+        of_turns = [
+            any(FRICTION_OPTIONS[name].of_turns for name in friction_options(d.friction_model)) for d in descriptions.values()
+        ]
+        if len(set(of_turns)) > 1:
+            return (
+                "friction that builds up after a turn is seen in blocks that the other fits do not count; what dahl and lugre "
+                "are compared with is a fit with --friction play, or play with other options, such as play+rate-dependent"
+            )
         if len({table.likelihood for d in descriptions.values() if (table := d.table(RecordingsTable))}) > 1:
             return (
                 "some fits take the sliding blocks of runs and others whole recordings, which are not the same readings"
@@ -145,14 +156,18 @@ def make_recordings_term(
     if recordings.loop:
         censored = settings is not None and _is_censored(settings, recordings)
         return make_loop_recordings_term(cable, recordings, rows, labels, censored)
+    noise_ratio = cable.description.sensors.noise_ratio
+    if cable.friction.counts_turns:
+        _require_reversals(recordings)
+        censored = settings is not None and _is_censored(settings, recordings)
+        return TurnsTerm(cable, stack_turns(recordings, rows, censored, noise_ratio), labels)
     if settings is None or settings.likelihood == "runs":
         parts = [select_sliding_blocks(r, cable.description) for r in recordings.items]
         _require_blocks(recordings, parts)
         blocks = _make_sliding_rows(recordings, parts, rows)
         return RunsTerm(cable, sum_runs(cable, blocks), labels, RECORDED, BLOCK_NOISE, rows=blocks)
-    for recording in recordings.items:
-        _require_reversal(recording)
-    censored, noise_ratio = _is_censored(settings, recordings), cable.description.sensors.noise_ratio
+    _require_reversals(recordings)
+    censored = _is_censored(settings, recordings)
     if not (cable.friction.options or cable.description.fits_offsets or censored):
         # On a scale that no parameter changes, the operator is linear in the exponent: it need not be run again.
         parts = [_select_all_blocks(r, noise_ratio) for r in recordings.items]
@@ -186,12 +201,14 @@ def _require_blocks(recordings: Recordings, parts: list[SelectedBlocks]) -> None
             )
 
 
-def _require_reversal(recording: Recording) -> None:
-    if len(set(recording.strokes.stroke) - {0}) < 2:
-        raise DatasetError(
-            f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to show "
-            'without one; record a pull and a return, or set likelihood = "runs" for the recordings.'
-        )
+def _require_reversals(recordings: Recordings) -> None:
+    for recording in recordings.items:
+        if len(set(recording.strokes.stroke) - {0}) < 2:
+            raise DatasetError(
+                f"{recording.file}: the recording {recording.name!r} has no reversal, and the play operator has nothing to "
+                'show without one; record a pull and a return, or set likelihood = "runs" for the recordings, without the '
+                "friction models play, dahl and lugre."
+            )
 
 
 def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBlocks:
@@ -274,7 +291,8 @@ def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array
     exponent = cable.friction_exponent(values, angles + scale * error)
     force = jnp.asarray(pad_columns([smooth_input(r.blocks.input_force) for r in recordings.items]))
     velocity = jnp.asarray(pad_columns([r.blocks.velocity for r in recordings.items]))
-    cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent)
+    step = jnp.asarray(pad_columns([block_steps(r.blocks.time) for r in recordings.items], "constant"))
+    cells, drive = LoadCells.of(values), make_drive(cable, values, angles, velocity, exponent, step)
     at_least = jnp.maximum(force, drive.least_force)
     output, _ = drive.follow(at_least, scale * mounting, _start_positions(drive, recordings, at_least, scale * mounting))
     error_numbers = pad_columns(

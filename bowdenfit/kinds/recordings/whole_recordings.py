@@ -21,6 +21,7 @@ from bowdenfit.cable.sensors import BLOCK_NOISE, RUN_SCATTER, LoadCells, noise_l
 from bowdenfit.kinds.recordings.blocks import (
     RECORDED,
     WITHOUT_WEIGHT,
+    block_steps,
     group_blocks,
     is_under_tension,
     pad_columns,
@@ -117,7 +118,8 @@ class BlocksTerm(ABC):
     def _drive(self, values: Values, data: Data) -> tuple[Any, Array, Array]:
         """Return the cable at each recording's conditions, its wrap angles and their variances."""
         angles, variance = resolve_angles(self.cable, values, data)
-        return make_drive(self.cable, values, angles, data["velocity"]), angles, variance
+        drive = make_drive(self.cable, values, angles, data["velocity"], step=data.get("step", 0.0))
+        return drive, angles, variance
 
     def _follow(
         self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
@@ -235,29 +237,37 @@ class WholeRecordingsTerm(BlocksTerm):
 
 
 def stack_rope_recordings(
-    recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
+    recordings: Recordings,
+    angles: Mapping[str, np.ndarray],
+    censored: bool,
+    noise_ratio: float,
+    *,
+    counts_turns: bool = False,
 ) -> dict[str, Any]:
     """Stack recordings of a rope into arrays over time and recordings; shorter ones stand still at their end, without weight.
 
-    The noise ratio is that of the input over that of the output.
+    The noise ratio is that of the input over that of the output; for `counts_turns` see `BlockGroups.arrays`.
     """
-    data = stack_recordings(recordings, [_rope_blocks(r, censored, noise_ratio) for r in recordings.items], angles)
+    parts = [_rope_blocks(r, censored, noise_ratio, counts_turns) for r in recordings.items]
+    data = stack_recordings(recordings, parts, angles)
     speeds = [np.abs(r.blocks.velocity[r.strokes.used_sliding]) for r in recordings.items]
     return data | {
         "reading": np.log(data["output_force"]),
         "newtons": data["output_force"],
         "exponent": np.array([r.strokes.exponent for r in recordings.items]),
         "speed": np.array([float(speed.mean()) if len(speed) else float("nan") for speed in speeds]),
+        "step": pad_columns([part["step"] for part in parts], "constant"),
     }
 
 
-def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float) -> dict[str, Any]:
+def _rope_blocks(recording: Recording, censored: bool, noise_ratio: float, counts_turns: bool) -> dict[str, Any]:
     """Return the blocks of one recording; while the rope stands still the input's noise is not in the output."""
     groups = group_blocks(recording)
-    arrays = groups.arrays(RopeDrive, is_under_tension(recording), censored)
+    arrays = groups.arrays(RopeDrive, is_under_tension(recording), censored, counts_turns=counts_turns)
     likely_in, likely_out = (groups.mean(force) for force in smooth_forces(recording.blocks))
     of_input = noise_ratio * (recording.strokes.contact[groups.starts] != 0)
-    return arrays | {"weight": arrays["n_effective"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)}
+    weight = arrays["n_effective"] / ((of_input / likely_in) ** 2 + 1 / likely_out**2)
+    return arrays | {"weight": weight, "step": block_steps(groups.mean(recording.blocks.time))}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ import numpy as np
 from jax import Array
 
 from bowdenfit.cable.drive import LEAST_EXPONENT
-from bowdenfit.cable.friction import DRAG, LOAD_EXPONENT, STRIBECK, STRIBECK_SPEED, VISCOUS, FrictionModel
+from bowdenfit.cable.friction import FrictionModel
+from bowdenfit.cable.friction_options import DRAG, LOAD_EXPONENT, STRIBECK, STRIBECK_SPEED, VISCOUS
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.models import Model

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from bowdenfit.cable.friction import DRAG, STRIBECK, STRIBECK_SPEED, VISCOUS
+from bowdenfit.cable.friction_options import DRAG, STRIBECK, STRIBECK_SPEED, VISCOUS
 from bowdenfit.inference.draws import for_each_value, output_force_at
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.kinds import iterate_tables

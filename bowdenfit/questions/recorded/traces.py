@@ -17,7 +17,7 @@ from bowdenfit.cable.drive import LoopDrive, RopeDrive, make_drive
 from bowdenfit.cable.sensors import BLOCK_NOISE, RUN_SCATTER, LoadCells, noise_law
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import for_each_value
-from bowdenfit.kinds.recordings.blocks import RECORDED, pad_columns
+from bowdenfit.kinds.recordings.blocks import RECORDED, block_steps, pad_columns
 from bowdenfit.kinds.recordings.reader import angles_of_recordings
 from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.tables import AngleTable
@@ -216,7 +216,8 @@ def _step_arrays(
         for name in ("input_force", "output_force", "velocity")
     }
     likely = pad_columns([step.input_force for step in steps])
-    return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant")}
+    times = pad_columns([block_steps(r.blocks.time[s.block]) for r, s in chosen], "constant")
+    return rows | held | {"likely_force": likely, "drift": pad_columns(rates, "constant"), "step": times}
 
 
 def _make_follow_function(
@@ -225,7 +226,8 @@ def _make_follow_function(
     """Return the output force and exponent as a function of one draw's values, of mounting effects and of the blocks."""
 
     def follow(values: Mapping[str, Array], mounting: Array, data: Mapping[str, Any]) -> tuple[Array, Array]:
-        drive = make_drive(model.cable, values, resolve_angles(model.cable, values, data)[0], data["velocity"])
+        angles = resolve_angles(model.cable, values, data)[0]
+        drive = make_drive(model.cable, values, angles, data["velocity"], step=data["step"])
         cells, least = LoadCells.of(values), drive.least_force
         start = drive.scaled(cells.true_output(data["output_force"][0], least))
         output, _ = drive.follow(cells.true_input(data["likely_force"], least), mounting, start)

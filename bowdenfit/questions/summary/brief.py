@@ -16,6 +16,7 @@ from bowdenfit.questions.error_budget import KEY_ROLES, error_budget, widening_s
 from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
+from bowdenfit.questions.recorded.presliding import estimate_presliding
 from bowdenfit.questions.summary.verdict import (
     BETWEEN_MOUNTINGS,
     assess_fit,
@@ -271,7 +272,8 @@ def _loss_sentence(fit: Record) -> list[str]:
 
 
 def _option_sentences(fit: Record) -> list[str]:
-    """Say what was found of drag, of speed and of groups, where the fit asked for them."""
+    """Say what was found of drag, of speed, of turns and of groups, where the fit asked for them."""
     groups = contrast_groups(fit)
     contrasts = [f"Friction {c.coefficient}, {c.sentence()}." for c in (groups.contrasts if groups else ())[:_FEW]]
-    return [effect.sentence() for effect in (compute_lost_force(fit), compare_speeds(fit)) if effect is not None] + contrasts
+    effects = (compute_lost_force(fit), compare_speeds(fit), estimate_presliding(fit))
+    return [effect.sentence() for effect in effects if effect is not None] + contrasts

@@ -25,6 +25,7 @@ from bowdenfit.questions.recorded.friction_effects import (
     compute_lost_force,
     predict_stick_slip,
 )
+from bowdenfit.questions.recorded.presliding import estimate_presliding
 from bowdenfit.questions.summary.methods import describe_fitted_data, sampler_sentences, sampler_text
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import (
@@ -228,6 +229,8 @@ def _friction_model_block(fit: Record) -> str:
         lines.append(effect.sentence())
     if (falls := predict_stick_slip(fit)) is not None:
         lines.append(falls.sentence())
+    if (presliding := estimate_presliding(fit)) is not None:
+        lines.append(presliding.sentence())
     return "\n".join(filled(line) for line in lines)
 
 

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from bowdenfit.cable.friction import FrictionOption
+from bowdenfit.cable.friction_options import FrictionOption
 from bowdenfit.parameters.priors import HalfNormal
 from bowdenfit.parameters.space import Parameter
 

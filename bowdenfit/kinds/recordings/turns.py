@@ -1,0 +1,109 @@
+r"""Every block of whole recordings, those after each turn of the motion too: where friction builds up shows there.
+
+A play operator stands where the highest (or lowest) input left it, with its noise: all blocks of a standing phase have one
+error in common, and together they are worth no more than one reading of where the output stands (`standing_share`). But how
+the output moves on meanwhile is known from each of them. With weights w of sum W in a phase the common error is integrated out,
+
+.. math:: \sum w (d - \bar d)^2 + \alpha^2 W \bar d^2 = \sum w \left(d - (1 - \alpha) \bar d\right)^2, \quad
+          \bar d = \sum w d / W
+
+where :math:`\alpha^2` is what the mean is still worth. So a deviation d counts less what its phase has in common, and the
+likelihood is otherwise that of `WholeRecordingsTerm`. A play operator that is counted so is `friction_model = "play"`.
+
+A turn lies somewhere inside a block, and where it lies matters as much as how the rope creeps. So the operator takes `_PARTS`
+steps a block, along the parabola that has the means of the block and of its neighbors.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from typing_extensions import override
+
+from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive
+from bowdenfit.cable.sensors import LoadCells
+from bowdenfit.kinds.recordings.blocks import group_blocks, pad_columns, standing_share
+from bowdenfit.kinds.recordings.whole_recordings import Data, WholeRecordingsTerm, stack_rope_recordings
+from bowdenfit.recordings.preparation.hysteresis import smooth_input
+from bowdenfit.recordings.recording import Recording, Recordings
+
+_PARTS = {"early_force": -1 / 3, "middle_force": 0.0, "late_force": 1 / 3}  # middles of parts of a block, in blocks
+_SAME_STEP = 1e-3  # relative difference of times between blocks that are evenly spaced
+
+
+@dataclass(frozen=True)
+class TurnsTerm(WholeRecordingsTerm):
+    """Likelihood of every block of whole recordings of a single rope, standing phases by how the output moves in them."""
+
+    @override
+    def _follow(
+        self, drive: RopeDrive | LoopDrive, cells: LoadCells, data: Data, mounting: PerRecording
+    ) -> tuple[PerTime, PerTime]:
+        assert isinstance(drive, RopeDrive)  # friction models of turns are refused for loops
+        stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
+        parts = jnp.stack([data[name] for name in _PARTS], axis=1)
+        force = cells.true_input(parts.reshape(-1, parts.shape[2]), drive.least_force)
+        in_parts = replace(drive, rate=_repeat(drive.rate), step=_repeat(data["step"]) / len(_PARTS))
+        anew = jnp.full(parts.shape, jnp.nan).at[:, 0].set(jnp.where(data["restart"], stands, jnp.nan))
+        followed = in_parts.follow(force, mounting, stands[0], anew.reshape(force.shape), _repeat(data["input_noise"]))
+        output, slope = (values.reshape(parts.shape).mean(axis=1) for values in followed)
+        expected, loading = drive.shown(cells, output, slope)
+        deviation = data["reading"] + cells.late(data["drift"]) - expected
+        return _subtract_common(deviation, data), _subtract_common(loading, data)
+
+
+def _repeat(values: PerTime) -> Array:
+    """Return values of blocks for each part of theirs."""
+    return jnp.repeat(values, len(_PARTS), axis=0)
+
+
+def _subtract_common(values: PerTime, data: Data) -> PerTime:
+    """Return values of blocks less the part of their phase's mean that stands for one error."""
+    return values - data["common"] * _phase_sum(data["weight"] * values, data) / jnp.maximum(
+        _phase_sum(data["weight"], data), 1e-300
+    )
+
+
+def _phase_sum(values: PerTime, data: Data) -> PerTime:
+    """Return the sum over the phase of each block."""
+    total = jnp.concatenate([jnp.zeros_like(values[:1]), jnp.cumsum(values, axis=0)])
+    return jnp.take_along_axis(total, data["phase_stop"], axis=0) - jnp.take_along_axis(total, data["phase_start"], axis=0)
+
+
+def stack_turns(
+    recordings: Recordings, angles: Mapping[str, np.ndarray], censored: bool, noise_ratio: float
+) -> dict[str, Any]:
+    """Stack recordings of a rope as `stack_rope_recordings` does, with what `TurnsTerm` takes besides."""
+    data = stack_rope_recordings(recordings, angles, censored, noise_ratio, counts_turns=True)
+    parts = [_find_phases(recording) | _divide_blocks(recording) for recording in recordings.items]
+    return data | {name: pad_columns([part[name] for part in parts]) for name in parts[0]}
+
+
+def _find_phases(recording: Recording) -> dict[str, np.ndarray]:
+    """Return where the phase of each group of blocks starts and stops, and the part of its mean that is one error."""
+    groups = group_blocks(recording)
+    contact = recording.strokes.contact
+    share = np.minimum(groups.mean(standing_share(contact, recording.blocks.input_force)), 1.0)
+    changes = np.flatnonzero(np.diff(contact[groups.starts])) + 1
+    ends = np.concatenate([[0], changes, [len(groups.starts)]])
+    phase = np.searchsorted(changes, np.arange(len(groups.starts)), side="right")
+    return {"phase_start": ends[phase], "phase_stop": ends[phase + 1], "common": 1 - np.sqrt(share)}
+
+
+def _divide_blocks(recording: Recording) -> dict[str, np.ndarray]:
+    """Return the likely input force in each part of the blocks, with the mean of the block [N]."""
+    groups, force = group_blocks(recording), recording.blocks.input_force
+    likely, time = groups.mean(smooth_input(force)), groups.mean(recording.blocks.time)
+    before, after = np.roll(likely, 1), np.roll(likely, -1)
+    even = np.zeros(len(likely), dtype=bool)
+    if len(likely) > 2:
+        even[1:-1] = np.abs(np.diff(time, 2)) < _SAME_STEP * np.diff(time)[1:]
+    slope, curvature = (np.where(even, values, 0.0) for values in ((after - before) / 2, (after + before) / 2 - likely))
+    mean_square = np.mean(np.square(list(_PARTS.values())))
+    least = RopeDrive.least_share * np.max(np.abs(force))
+    return {
+        name: np.maximum(likely + slope * at + curvature * (at**2 - mean_square), least) for name, at in _PARTS.items()
+    }

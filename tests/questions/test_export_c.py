@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
+from exported import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
 
 from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.tables import LEVELS
@@ -21,13 +21,23 @@ DRIVER = r"""
 
 int main(int n_arguments, char **arguments)
 {
-    double in[6], out[5], state = NAN;
+    double in[6], out[5];
+#if BOWDEN_PRESLIDING
+    bowden_state state = BOWDEN_START;
+#else
+    double state = NAN;
+#endif
     (void)arguments;
     while (fread(in, sizeof *in, 5, stdin) == 5) {
         int flags = 0, more = 0;
         if (n_arguments > 1) {
+#if BOWDEN_PRESLIDING
+            out[0] = bowden_move((int)in[0], in[1], in[2], in[3], in[4], &state, &flags);
+            out[1] = state.output_force;
+#else
             out[0] = bowden_step((int)in[0], in[1], in[2], in[3], &state, &flags);
             out[1] = state;
+#endif
             out[2] = out[3] = 0.0;
         } else {
             out[0] = bowden_output((int)in[0], in[1], in[2], in[3], (int)in[4], &flags);
@@ -102,6 +112,30 @@ def test_c_follows_twenty_thousand_steps_as_the_play_operator_does(case, build):
         np.testing.assert_array_equal(stepped, state)
         assert np.ptp(stepped) > 50  # it moved, and stood still
         assert np.mean(np.diff(stepped) == 0) > 0.02
+
+
+@pytest.mark.parametrize("case", CREEPING)
+def test_c_follows_a_rope_that_creeps_as_the_package_does(case, build):
+    found, n, step = cable(case), 20_000, 0.001
+    force, ask = motion(found, n), build(found)
+    for level in (1, 4, 6):
+        place, speed = float(np.mean(found.points.values)), 31.0
+        same = {"level": level, "place": place, "speed": speed, "stroke": step}
+        asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force}
+        stepped, state, *_ = ask(asked, "step")
+        np.testing.assert_allclose(stepped, crept(found, level, place, speed, force, step), rtol=1e-10, atol=1e-9)
+        np.testing.assert_array_equal(stepped, state)
+        assert np.ptp(stepped) > 50 and np.mean(np.diff(stepped) == 0) < 0.02
+
+
+def test_a_rope_that_creeps_recovers_from_what_is_no_number_and_from_slack(build):
+    found = cable("dahl")
+    force = np.array([50.0, np.nan, 60.0, 0.0, 40.0, 80.0])
+    asked = {"level": [1] * 6, "place": [1.0] * 6, "speed": [0.0] * 6, "force": force, "stroke": [0.0] * 6}
+    stepped, state, _, _, flags = build(found)(asked, "step")
+    np.testing.assert_array_equal(flags, [0, 4, 0, 2, 0, 0])
+    assert np.isnan(stepped[1]) and state[1] == state[0] and stepped[3] == 0.0
+    assert np.all(np.isfinite(stepped[[0, 2, 4, 5]])) and stepped[5] > stepped[4] > 0
 
 
 def test_c_tells_what_it_cannot_answer(build):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import CASES, HOSTILE, cable, followed, motion, of_equations, points
+from exported import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.matlab import function_name, matlab_function
@@ -99,3 +99,35 @@ def test_a_function_is_named_as_its_file_and_names_stay_comments():
     about = replace(cable("rope").about, cable=HOSTILE)
     top = matlab_function(replace(cable("rope"), about=about), "bowden").splitlines()[1:8]
     assert all(line.startswith("%") for line in top)
+
+
+CREEPS = """
+for name = {%s}
+  f = str2func(name{1});
+  force = dlmread([name{1} '.motion']);
+  state = [];
+  for i = 2:numel(force)
+    [force(i), flags, state] = f('step', force(1), 1.5, 31, force(i), 0.01, state);
+    assert(flags, 0);
+  end
+  dlmwrite([name{1} '.stepped'], force(2:end), 'precision', '%%.17g');
+  [pair, flags, state] = f('step', force(1), 1.5, 31, [50 NaN; 60 0], 0.01, []);
+  assert(flags, [0 4; 0 2]);
+  assert(size(state.friction), [2 2]);
+end
+"""
+
+
+@needs_octave
+def test_octave_follows_a_rope_that_creeps_as_the_package_does(tmp_path):
+    for case in CREEPING:
+        found = cable(case)
+        (tmp_path / f"{case}.m").write_text(matlab_function(found, case))
+        np.savetxt(tmp_path / f"{case}.motion", [3, *motion(found, 4000)[::100]], fmt="%.17g")
+    (tmp_path / "ask.m").write_text(CREEPS % ", ".join(f"'{name}'" for name in CREEPING))
+    assert OCTAVE is not None
+    done = subprocess.run([OCTAVE, "--norc", "--quiet", "ask.m"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for case in CREEPING:
+        stepped, force = np.loadtxt(tmp_path / f"{case}.stepped"), motion(cable(case), 4000)[::100]
+        np.testing.assert_allclose(stepped, crept(cable(case), 2, 1.5, 31.0, force, 0.01), rtol=1e-10)

@@ -9,6 +9,7 @@ import numpy as np
 
 from bowdenfit.physics.friction import force_from_scale, force_scale, play_operator, rate_factor
 from bowdenfit.physics.loop import loop_input_force, loop_output_force
+from bowdenfit.physics.presliding import presliding_operator
 from bowdenfit.questions.export.tables import (
     DRAW,
     LEVELS,
@@ -23,21 +24,24 @@ HOSTILE = (
     "!!python/object/apply:os.system ['true'] \x00 \u03b8"
 )
 CASES = ("loop", "rope", "load", "rate", "stroke", "one place")
+CREEPING = ("dahl", "lugre")  # with drag and load dependence, and with the rate
 
 
 def cable(case: str, draws: int = 3, name: str = "test cable") -> TransmissionTables:
     """A cable of one of the `CASES`, with friction that differs by level and place."""
-    rng = np.random.default_rng(CASES.index(case))
+    rng = np.random.default_rng((*CASES, *CREEPING).index(case))
     at = np.sort(rng.uniform(0.2, 3.0, 1 if case == "one place" else 37))
     levels = []
     for i, called in enumerate([*LEVELS, *(f"{DRAW}{k + 1}" for k in range(draws))]):
         exponent = (0.05 + 0.02 * i) * at * (1 + 0.1 * rng.standard_normal(at.shape))
-        both = np.stack([exponent, exponent * (0.9 if case == "stroke" else 1.0)])
+        both = np.stack([exponent, exponent * (0.9 if case in ("stroke", "dahl") else 1.0)])
         levels.append(
             FrictionLevel(
                 called, both, 2 * (10 + i + at) * exponent if case == "loop" else 0 * at,
-                (0.0 if i == 1 else 0.1 * i) if case == "load" else 0.0, 0.5 * i if case == "load" else 0.0,
-                (0.3 + 0.01 * i, 4.0, 0.002) if case == "rate" else (0.0, 1.0, 0.0),
+                (0.0 if i == 1 else 0.1 * i) if case in ("load", "dahl") else 0.0,
+                0.5 * i if case in ("load", "dahl") else 0.0,
+                (0.3 + 0.01 * i, 4.0, 0.002) if case in ("rate", "lugre") else (0.0, 1.0, 0.0),
+                presliding={"dahl": (20.0 + i, 0.0), "lugre": (30.0, 0.004)}.get(case, (0.0, 0.0)),
             )
         )  # fmt: skip
     places = TablePoints("place", "", np.zeros(1)) if case == "one place" else TablePoints("wrap_angle", "rad", at)
@@ -45,7 +49,7 @@ def cable(case: str, draws: int = 3, name: str = "test cable") -> TransmissionTa
     options = {"load": ("drag", "load-dependent"), "rate": ("rate-dependent",), "stroke": ("stroke-dependent",)}.get(
         case, ()
     )
-    speed = (20.0, "mm/s") if case == "rate" else (0.0, "")
+    speed = (20.0, "mm/s") if case in ("rate", "lugre") else (0.0, "")
     return TransmissionTables(about, places, tuple(levels), case == "loop", options, 50.0, *speed, 1e-6)
 
 
@@ -124,6 +128,21 @@ def followed(found: TransmissionTables, level: int, place: float, speed: float, 
     low, high = (force_scale(jnp.asarray(end), *scale) for end in ends)
     start = force_scale(jnp.asarray(0.5 * (ends[0][0] + ends[1][0])), *scale)
     return np.asarray(force_from_scale(play_operator(low, high, start)[0], *scale))
+
+
+def crept(found: TransmissionTables, level: int, place: float, speed: float, force: np.ndarray, step: float) -> np.ndarray:
+    """Output forces through a motion, from the middle of the band on, of a rope whose friction builds up."""
+    n, one = len(force), found.levels[level]
+    asked = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
+    limits = tuple(jnp.asarray(_there(found, asked, np.full(n, stroke))[0]) for stroke in (1.0, -1.0))
+    reference = replace(found, speed_unit="")
+    at_reference = sum(_there(reference, asked, np.full(n, stroke))[0] for stroke in (1.0, -1.0))
+    scale = jnp.asarray(one.load_exponent), jnp.asarray(one.drag), found.reference_force
+    x = force_scale(jnp.asarray(force), *scale)
+    stiffness = one.presliding[0] * jnp.asarray(at_reference) / (limits[0] + limits[1])
+    start = x[0] - (limits[0] - limits[1])[0] / 2
+    y = presliding_operator(x, limits, stiffness, start, None, one.presliding[1] / step)
+    return np.asarray(force_from_scale(y, *scale))
 
 
 def motion(found: TransmissionTables, n: int) -> np.ndarray:

@@ -60,7 +60,16 @@ def c_header(tables: TransmissionTables) -> str:
         exponent=",\n".join(_format_strokes(level.exponent) for level in levels),
         more_tables=_format_optional_tables(tables),
         law=fill_template("loop.h" if tables.is_loop else "rope.h"),
+        of_turns=int(tables.builds_up),
+        motion=_format_motion(tables),
     )
+
+
+def _format_motion(tables: TransmissionTables) -> str:
+    """Return the function that follows any motion."""
+    if not tables.builds_up:
+        return fill_template("step.h")
+    return fill_template("creep.h", presliding=_format_tuples([level.presliding for level in tables.levels]))
 
 
 def format_hexadecimal(values: Iterable[float], before: str) -> str:

@@ -13,6 +13,13 @@ from bowdenfit.questions.export.text import ascii_text, fill_template, format_co
 _ACROSS = 5  # numbers in a line
 _NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
 
+_PLAY_WORDS = """%  output = {function}('step', level, place, speed, input_force, 0, output_before)
+%     Force at the load side during any motion; call it once per sample, with output_before = NaN for the first one."""
+_CREEP_WORDS = """%  [output, flags, state] = {function}('step', level, place, speed, input_force, seconds, state)
+%     Force at the load side during any motion, friction building up after a turn (docs/theory.md, presliding); call it once
+%     per sample, with the seconds since the one before (0 if not known: bristles are then not damped), and state = [] for
+%     the first one. The state holds the force at the load side and the friction."""
+
 
 def matlab_function(tables: TransmissionTables, name: str) -> str:
     """Return the MATLAB function.
@@ -39,6 +46,9 @@ def matlab_function(tables: TransmissionTables, name: str) -> str:
         is_loop=_format_logical(tables.is_loop),
         of_load=_format_logical(tables.depends_on_load),
         of_rate=_format_logical(tables.depends_on_rate),
+        of_turns=_format_logical(tables.builds_up),
+        presliding=_format_matrix([level.presliding for level in levels]),
+        step_words=(_CREEP_WORDS if tables.builds_up else _PLAY_WORDS).format(function=name),
         varies=int(bool(points.unit)),
         reference_force=repr(float(tables.reference_force)),
         reference_speed=repr(float(tables.reference_speed)),

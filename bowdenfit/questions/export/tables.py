@@ -14,7 +14,15 @@ from jax import Array
 
 from bowdenfit.cable.drive import LEAST_EXPONENT
 from bowdenfit.cable.friction import FrictionModel
-from bowdenfit.cable.friction_options import DRAG, LOAD_EXPONENT, STRIBECK, STRIBECK_SPEED, VISCOUS
+from bowdenfit.cable.friction_options import (
+    BRISTLE_DAMPING,
+    DRAG,
+    LOAD_EXPONENT,
+    PRESLIDING_STIFFNESS,
+    STRIBECK,
+    STRIBECK_SPEED,
+    VISCOUS,
+)
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.models import Model
@@ -29,11 +37,12 @@ MOUNTING = "mounting_"
 LEVELS = (*QUANTILES, f"{MOUNTING}q05", f"{MOUNTING}q95")
 DRAW = "draw_"
 # Options of friction that tables can express.
-SUPPORTED_OPTIONS = ("drag", "load-dependent", "rate-dependent", "stroke-dependent", "by-group")
+SUPPORTED_OPTIONS = ("drag", "load-dependent", "rate-dependent", "stroke-dependent", "by-group", "play", "dahl", "lugre")
 _LEAST_BEND = 1e-3  # rad that a range of bends has at least; a judgement
 _LEAST_SHARE = 1e-9  # of the reference force, which is left of it at least, so that its logarithm is finite
 # What stands for each parameter where friction does not depend on speed.
 _RATE = {STRIBECK: 0.0, STRIBECK_SPEED: 1.0, VISCOUS: 0.0}
+_PRESLIDING = {PRESLIDING_STIFFNESS: 0.0, BRISTLE_DAMPING: 0.0}  # where friction is there at once after a turn
 LoadLaw = tuple[float, float]
 Arrays = Mapping[str, np.ndarray]
 
@@ -95,6 +104,7 @@ class FrictionLevel:
         rate: Stribeck rise [1], Stribeck speed and viscous coefficient, see `bowdenfit.physics.friction.rate_factor`.
         stiffness: Of a taut loop, or of a rope under the reference force, seen at the load side with the motor held, by place
             [N/mm]; empty where nothing tells it.
+        presliding: Presliding stiffness [1], 0 of a play operator, and damping of the bristles over their stiffness [s].
     """
 
     name: str
@@ -102,8 +112,9 @@ class FrictionLevel:
     taut_loss: np.ndarray
     load_exponent: float = 0.0
     drag: float = 0.0
-    rate: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    rate: tuple[float, ...] = (0.0, 1.0, 0.0)
     stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    presliding: tuple[float, ...] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -148,6 +159,11 @@ class TransmissionTables:
     def depends_on_rate(self) -> bool:
         """Whether friction depends on speed."""
         return bool(self.speed_unit)
+
+    @property
+    def builds_up(self) -> bool:
+        """Whether friction builds up after a turn of the motion."""
+        return any(level.presliding[0] for level in self.levels)
 
     @property
     def sentences(self) -> list[str]:
@@ -284,7 +300,7 @@ def _tabulate_draws(
         exponent = jnp.maximum(exponent + z_and_mounting[-1], LEAST_EXPONENT)
         own = jnp.stack(friction.shifts(values, exponent))
         load_exponent, drag, _ = friction.scale(values)
-        rate = {name: values[name] for name in _RATE if name in values}
+        rate = {name: values[name] for name in (*_RATE, *_PRESLIDING) if name in values}
         return {
             "own": own,
             "effective": _compute_effective_exponents(friction, values, own, middle) if friction.depends_on_load else own,
@@ -345,25 +361,18 @@ def _median_load_law(fit: Record) -> LoadLaw:
     return median_of(LOAD_EXPONENT), median_of(DRAG)
 
 
-def _median_rates(tables: Arrays, which: slice) -> tuple[float, float, float]:
-    """Return medians of the rate coefficients over some of the draws."""
-    a, v, c = (float(np.median(tables[name][which])) if name in tables else default for name, default in _RATE.items())
-    return a, v, c
+def _median_of(tables: Arrays, which: slice, names: Mapping[str, float]) -> tuple[float, ...]:
+    """Return medians of parameters over some of the draws; what stands for them where there are none."""
+    return tuple(float(np.median(tables[name][which])) if name in tables else default for name, default in names.items())
 
 
 def _quantile_levels(tables: Arrays, middle: LoadLaw, before: str = "") -> list[FrictionLevel]:
     """Return levels at quantiles over the draws."""
-    effective, taut_loss, rate = tables["effective"], tables["taut_loss"], _median_rates(tables, slice(None))
-    stiffness = np.median(tables["stiffness"], axis=0)
+    effective, taut_loss = tables["effective"], tables["taut_loss"]
+    rate, presliding = (_median_of(tables, slice(None), names) for names in (_RATE, _PRESLIDING))
+    shared = (*middle, rate, np.median(tables["stiffness"], axis=0), presliding)
     return [
-        FrictionLevel(
-            before + name,
-            np.quantile(effective, q, axis=0),
-            np.quantile(taut_loss, q, axis=0),
-            *middle,
-            rate,
-            stiffness,
-        )
+        FrictionLevel(before + name, np.quantile(effective, q, axis=0), np.quantile(taut_loss, q, axis=0), *shared)
         for name, q in QUANTILES.items()
         if before + name in LEVELS
     ]
@@ -379,8 +388,9 @@ def _draw_levels(tables: Arrays, n: int, seed: int) -> list[FrictionLevel]:
             tables["taut_loss"][k],
             float(tables["load_exponent"][k]),
             float(tables["drag"][k]),
-            _median_rates(tables, slice(k, k + 1)),
+            _median_of(tables, slice(k, k + 1), _RATE),
             tables["stiffness"][k],
+            _median_of(tables, slice(k, k + 1), _PRESLIDING),
         )
         for i, k in enumerate(picked)
     ]

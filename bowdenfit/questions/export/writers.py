@@ -65,6 +65,7 @@ def draws_table(tables: TransmissionTables) -> str:
         if tables.depends_on_rate
         else []
     )
+    heads += ["presliding_stiffness", "bristle_damping_s"] if tables.builds_up else []
     rows: list[list[object]] = []
     for level in (level for level in tables.levels if level.name.startswith(DRAW)):
         for i, point in enumerate(points.values):
@@ -73,6 +74,7 @@ def draws_table(tables: TransmissionTables) -> str:
             cells += [level.taut_loss[i]] if tables.is_loop else []
             cells += [level.load_exponent, level.drag] if tables.depends_on_load else []
             cells += level.rate if tables.depends_on_rate else ()
+            cells += level.presliding if tables.builds_up else ()
             rows.append(cells)
     return _table_text(tables, heads, rows)
 
@@ -90,6 +92,7 @@ _ENDINGS: Mapping[str, str] = {
     "mujoco": ".xml",
     "yaml": ".yaml",
 }
+_OF_TURNS = ("c", "csv", "matlab")  # which have friction that builds up after a turn
 NAMES: Mapping[str, str] = MappingProxyType(
     {"c": "a C header", "csv": "CSV", "fmu": "an FMU", "matlab": "MATLAB", "mujoco": "MuJoCo", "yaml": "YAML"}
 )
@@ -106,11 +109,12 @@ def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
     Raises:
         UsageError: It cannot; another that can is named.
     """
-    unsupported = [name for name in fit.model.cable.friction.options if name not in SUPPORTED_OPTIONS]
+    supported = [name for name in SUPPORTED_OPTIONS if to in _OF_TURNS or name not in ("dahl", "lugre")]
+    unsupported = [name for name in fit.model.cable.friction.options if name not in supported]
     if unsupported and (to != "csv" or draws):
         raise UsageError(
             f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unsupported)}; export "
-            "the lookup table instead, with --to csv."
+            "the lookup table instead, with --to csv, or a program that has a state for it, with --to c or --to matlab."
         )
 
 

@@ -24,6 +24,7 @@ $about
 #define BOWDEN_LOOP $is_loop /* 1: a pull-pull loop; 0: a single rope */
 #define BOWDEN_LOAD_DEPENDENT $of_load
 #define BOWDEN_RATE_DEPENDENT $of_rate
+#define BOWDEN_PRESLIDING $of_turns /* 1: bowden_move has friction build up after a turn; 0: bowden_step */
 #define BOWDEN_REFERENCE_SPEED $reference_speed
 
 enum bowden_level { BOWDEN_Q05, BOWDEN_Q50, BOWDEN_Q95, BOWDEN_MOUNTING_Q05, BOWDEN_MOUNTING_Q95, BOWDEN_DRAW };
@@ -137,30 +138,7 @@ static inline double bowden_input(int level, double place, double speed, double 
     return bowden_slid(level, place, speed, output_force, stroke, -1.0, flags);
 }
 
-/*
- * Force at the load side during any motion; call it once per sample. The force stays constant until the input has crossed
- * the friction band. output_force: the force at the previous sample on entry, the new one on return; also returned.
- * If it is NAN (before the first sample), the force starts in the middle of the band.
- */
-static inline double bowden_step(int level, double place, double speed, double input_force, double *output_force, int *flags)
-{
-    const double low = bowden_output(level, place, speed, input_force, 1, flags);
-    const double high = bowden_output(level, place, speed, input_force, -1, flags);
-
-    if (isnan(low) || isnan(high)) {
-        return NAN; /* the state is unchanged */
-    }
-    if (isnan(*output_force)) {
-        *output_force = 0.5 * (low + high);
-    } else if (*output_force < low) {
-        *output_force = low;
-    } else if (*output_force > high) {
-        *output_force = high;
-    }
-    return *output_force;
-}
-
-/*
+$motion/*
  * Force to add at the motor so that output_force arrives at the load, for the friction that any one mounting of the cable
  * exceeds with a probability of 95 %: the most that can be compensated without overcompensation, considering one place and
  * one mounting. With the unknown inertia, dead zone and damping of a device, less is safe: see bowdenfit compensate.

@@ -1,4 +1,4 @@
-function [answer, flags] = $function(what, level, place, speed, force, stroke, state)
+function [answer, flags, state] = $function(what, level, place, speed, force, stroke, state)
 %$function  Forces of a fitted cable.
 %
 $about
@@ -7,8 +7,7 @@ $about
 %     Force at the load side while the cable slides, computed from the force at the motor side.
 %  input = $function('input', level, place, speed, output_force, stroke)
 %     Force at the motor side that gives output_force at the load side: the inverse of 'output'.
-%  output = $function('step', level, place, speed, input_force, 0, output_before)
-%     Force at the load side during any motion; call it once per sample, with output_before = NaN for the first one.
+$step_words
 %  more = $function('compensation', 0, place, speed, output_force, stroke)
 %     Force to add at the motor so that output_force arrives at the load, for the friction that any one mounting exceeds
 %     with a probability of 95 %.
@@ -31,7 +30,12 @@ $about
         flags = T.place;
         return
     end
-    if strcmp(what, 'step')
+    if nargin < 7
+        state = [];
+    end
+    if strcmp(what, 'step') && T.of_turns
+        [answer, flags, state] = crept(T, level, place, speed, force, stroke, state);
+    elseif strcmp(what, 'step')
         [low, first] = slid(T, level, place, speed, force, ones(size(force)), 1);
         [high, second] = slid(T, level, place, speed, force, -ones(size(force)), 1);
         flags = bitor(first, second);
@@ -91,15 +95,8 @@ function [other, flags] = slid(T, level, place, speed, force, stroke, sign)
         if T.of_load
             p = T.load(level, 1);
             d = T.load(level, 2);
-            y = log((max(force, 0) + d) / T.reference_force);
-            if p < 1e-6
-                g = y .* (1 + p * y / 2 .* (1 + p * y / 3)) - shift;
-                y = g .* (1 - p * g .* (1 / 2 - p * g / 3));
-            else
-                g = expm1(p * y) / p - shift;
-                y = log1p(max(p * g, 1e-9 - 1)) / p;
-            end
-            other = T.reference_force * exp(y) - d;
+            g = to_scale(max(force, 0), p, d, T.reference_force) - shift;
+            other = from_scale(g, p, d, T.reference_force);
         end
         none = ~(other > 0);
         other(none) = 0;
@@ -108,6 +105,84 @@ function [other, flags] = slid(T, level, place, speed, force, stroke, sign)
     end
     bad = isnan(other);
     flags(bad) = 4;
+end
+
+function [output, flags, state] = crept(T, level, place, speed, force, seconds, state)
+    if ischar(level)
+        level = find(strcmp(T.names, level));
+    end
+    if numel(level) ~= 1 || level < 1 || level > numel(T.names)
+        error('$function:level', 'unknown level; see $function(''levels'')');
+    end
+    [force, place, speed, seconds] = same_size(force, place, speed, seconds);
+    flags = (place < T.place(1) | place > T.place(end)) * T.varies;
+    x = min(max(place, T.place(1)), T.place(end));
+    c = T.rate(level, :);
+    factor = @(v) 1 + c(1) * exp(-(v / c(2)).^2) + c(3) * abs(v);
+    rate = ones(size(force));
+    if T.of_rate
+        rate = factor(speed) / factor(T.reference_speed);
+    end
+    pulling = rate .* at(T.place, T.pull(level, :), x);
+    returning = rate .* at(T.place, T.returning(level, :), x);
+    half = (pulling + returning) / 2;
+    p = T.load(level, 1);
+    d = T.load(level, 2);
+    x = to_scale(max(force, 0), p, d, T.reference_force) - (pulling - returning) / 2;
+    if isempty(state)
+        state = struct('output', NaN(size(force)), 'friction', zeros(size(force)));
+    end
+    y = to_scale(max(state.output, 0), p, d, T.reference_force);
+    friction = min(max(state.friction, -half), half);
+    new = isnan(state.output);
+    y(new) = x(new);
+    friction(new) = 0;
+    slack = state.output <= 0;
+    y(slack) = x(slack) - half(slack);
+    friction(slack) = half(slack);
+    lead = x - y - friction;
+    s = ones(size(lead));
+    s(lead < 0) = -1;
+    build_up = half - s .* friction;
+    lag = zeros(size(seconds));
+    lag(seconds > 0) = T.presliding(level, 2) ./ seconds(seconds > 0);
+    k = T.presliding(level, 1) ./ rate;
+    a = build_up .* (1 + lag);
+    w = log(max(k .* a, 1e-300)) + k .* (a - abs(lead));
+    log_w = w;
+    log_w(w > 1) = log(w(w > 1));
+    for i = 1:5
+        log_w = log_w - (exp(log_w) + log_w - w) ./ (exp(log_w) + 1);
+    end
+    moved = min(max(abs(lead) - a + exp(log_w) ./ k, 0), abs(lead));
+    output = from_scale(y + s .* moved, p, d, T.reference_force);
+    none = ~(force > 0) | ~(output > 0);
+    output(none) = 0;
+    flags = flags + 2 * none;
+    bad = isnan(force) | isnan(half);
+    output(bad) = NaN;
+    flags(bad) = 4;
+    after = s .* (half - build_up .* exp(-k .* moved));
+    state.output(~bad) = output(~bad);
+    state.friction(~bad) = after(~bad);
+end
+
+function g = to_scale(force, p, d, reference)
+    y = log((force + d) / reference);
+    if p < 1e-6
+        g = y .* (1 + p * y / 2 .* (1 + p * y / 3));
+    else
+        g = expm1(p * y) / p;
+    end
+end
+
+function force = from_scale(g, p, d, reference)
+    if p < 1e-6
+        y = g .* (1 - p * g .* (1 / 2 - p * g / 3));
+    else
+        y = log1p(max(p * g, 1e-9 - 1)) / p;
+    end
+    force = reference * exp(y) - d;
 end
 
 function y = at(places, table, x)
@@ -140,9 +215,11 @@ function T = tables()
     T.taut_loss = [$taut_loss];
     T.load = [$load];
     T.rate = [$rate];
+    T.presliding = [$presliding];
     T.is_loop = $is_loop;
     T.of_load = $of_load;
     T.of_rate = $of_rate;
+    T.of_turns = $of_turns;
     T.varies = $varies;
     T.reference_force = $reference_force;
     T.reference_speed = $reference_speed;

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from bowdenfit.questions.simulate.verb import simulate
     from bowdenfit.questions.summary.verb import plot
     from bowdenfit.questions.teleoperate.verb import teleoperate
+    from bowdenfit.questions.watch.verb import watch
     from bowdenfit.reading import read
     from bowdenfit.run.verb import fit
 
@@ -65,6 +66,7 @@ _WHERE = {
     "schema": "bowdenfit.questions.schema.verb",
     "simulate": "bowdenfit.questions.simulate.verb",
     "teleoperate": "bowdenfit.questions.teleoperate.verb",
+    "watch": "bowdenfit.questions.watch.verb",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
         "bowdenfit.errors",
@@ -99,6 +101,7 @@ __all__ = [
     "schema",
     "simulate",
     "teleoperate",
+    "watch",
 ]
 
 

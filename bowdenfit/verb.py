@@ -2,7 +2,7 @@
 
 import io
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +21,7 @@ class Reply:
         page: Gives the answer for programs, asked only for `--json`.
         csv: Gives it as CSV, asked only for `--csv`.
         notes: Lines beside the answer, on standard error.
+        pieces: Parts of lines that are printed as they come, before the text.
         exit_code: 0; 3 for an answer that must not be trusted, 2 for what is said of input that cannot be used.
     """
 
@@ -29,6 +30,7 @@ class Reply:
     notes: tuple[str, ...] = ()
     exit_code: int = 0
     csv: Callable[[], str] | None = None
+    pieces: Iterable[str] = ()
 
 
 @dataclass(frozen=True)

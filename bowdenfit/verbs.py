@@ -18,9 +18,10 @@ from bowdenfit.questions.simulate.verb import VERB as SIMULATE
 from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.questions.teleoperate.verb import VERB as TELEOPERATE
+from bowdenfit.questions.watch.verb import VERB as WATCH
 from bowdenfit.run.verb import VERB as FIT
 
 VERBS = (
-    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, COMPARE, COMPENSATE, TELEOPERATE, EXPORT, CALIBRATE, FLEET, POOL,
-    PLOT, REPORT, SIMULATE, METABOLIC, SCHEMA,
+    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, WATCH, COMPARE, COMPENSATE, TELEOPERATE, EXPORT, CALIBRATE, FLEET,
+    POOL, PLOT, REPORT, SIMULATE, METABOLIC, SCHEMA,
 )  # fmt: skip

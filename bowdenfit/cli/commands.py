@@ -155,6 +155,8 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
     if verb.warns and isinstance(source, Path):
         troubles = answers["troubles"] if "troubles" in answers else _list_troubles(request[first], source)
         reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
+    for piece in reply.pieces:
+        say(piece, nl=False)
     say(_to_json(reply) if form == "json" else reply.csv() if form == "csv" and reply.csv else reply.text, nl=False)
     for note in reply.notes:
         say(note, err=True)
@@ -197,6 +199,8 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     function = unwrap(verb.function)  # whose arguments have been read
     if "report" in parameters_of(function):
         request["report"] = say_beside_stages
+    if "is_stopped" in parameters_of(function):
+        request["is_stopped"] = requested.is_set
     if verb.watch is None:
         with show_stages(None):
             answer = function(**request)

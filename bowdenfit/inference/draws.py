@@ -14,6 +14,7 @@ from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.models import Model
 
+PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
 BATCH = 1024  # draws that a compiled program takes at a time
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
 Function = Callable[..., Any]
@@ -98,6 +99,22 @@ def compile_replicator(posterior: LogDensity, seed: int, beside: Executor | None
     small = sum(np.size(array) for array in jax.tree.leaves(posterior.data)) < _SMALL
     program = for_each_draw(predict, model.space.size + 1, posterior.data, key, run_once=small, beside=beside)
     return lambda z: program(np.column_stack([z, np.arange(len(z), dtype=float)]))
+
+
+def imply_groups(model: Model, z: np.ndarray, implied: DrawFunction, seed: int) -> dict[str, Any]:
+    """Return what draws imply by group (see `compile_replicator`), and draws of the parameters from the prior ("prior").
+
+    Args:
+        model: The model.
+        z: Draws, (chain, draw, parameter).
+        implied: Of `compile_replicator`.
+        seed: Of the draws from the prior.
+    """
+    chains, draws, size = z.shape
+    prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, size))
+    of_all = implied(np.concatenate([z.reshape(-1, size), prior_z]))
+    groups = jax.tree.map(lambda v: v[: chains * draws].reshape(chains, draws, *v.shape[1:]), of_all)
+    return groups | {"prior": {p.name: of_all["values"][p.name][chains * draws :][None] for p in model.space.free}}
 
 
 def curve_function(model: Model, route: np.ndarray) -> Callable[[Float[Array, " free"]], dict[str, Array]]:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.kinds.term import COUNTS
 from bowdenfit.models import Model
 
 
@@ -48,6 +49,14 @@ class LogDensity:
         """
         return tuple(getattr(term, "padded", term.data) for term in self.model.terms)
 
+    @cached_property
+    def with_spare_rows(self) -> tuple[dict[str, Any], ...]:
+        """Padded data with room for more mountings, so that one program serves a table that grows.
+
+        The log density is the same to rounding: copies of readings fill the room, and do not count.
+        """
+        return tuple(getattr(term, "with_spare_rows", data) for term, data in zip(self.model.terms, self.padded, strict=True))
+
     def values(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
         """Return named values of all parameters [internal units] at z; a subclass may scale them by `data`."""
         del data
@@ -61,7 +70,8 @@ class LogDensity:
     def log_density(self, z: Float[Array, " free"], data: Any) -> Float[Array, ""]:
         """Return the log posterior density in z, up to the evidence; minus infinity where it cannot be computed."""
         log_prior = -0.5 * jnp.sum(z**2 + jnp.log(2 * jnp.pi))
-        total = log_prior + sum(jnp.sum(term) for term in self.log_likelihoods(z, data).values())
+        likelihoods = zip(self.log_likelihoods(z, data).values(), data, strict=False)
+        total = log_prior + sum(jnp.sum(_counted(likelihood, term)) for likelihood, term in likelihoods)
         return jnp.where(jnp.isnan(total), -jnp.inf, total)
 
     def residuals(self, z: Float[Array, " free"], data: Any) -> dict[str, Array]:
@@ -71,3 +81,8 @@ class LogDensity:
     def residuals_at(self, values: Mapping[str, Array], data: Any) -> dict[str, Array]:
         """Return standardized residuals by term at named values of all parameters [internal units]."""
         return {t.name: t.residuals(values, d) for t, d in zip(self.model.terms, data, strict=False)}
+
+
+def _counted(likelihood: Array, term: Mapping[str, Any]) -> Array:
+    """Return the log likelihoods of a term's readings, 0 of those that do not count."""
+    return jnp.where(term[COUNTS], likelihood, 0.0) if COUNTS in term else likelihood

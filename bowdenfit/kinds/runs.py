@@ -14,7 +14,7 @@ from bowdenfit.cable.cable import Cable
 from bowdenfit.cable.sensors import FORCE_NOISE, OUTPUT_OFFSET, RUN_SCATTER, LoadCells, noise_law, scatter
 from bowdenfit.kinds.row_angles import resolve_angles
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, InsideRuns, SlidingRows, list_readings_inside_runs
-from bowdenfit.kinds.term import round_up_count
+from bowdenfit.kinds.term import repeat_rows, round_up_count, spare_count
 from bowdenfit.physics.friction import transmission_efficiency
 from bowdenfit.types import Labels, Vector
 
@@ -86,6 +86,15 @@ class RunsTerm:
         return pad_cells(self.data, runs, round_up_count(len(self.data["mean"]) // runs))
 
     @property
+    def with_spare_rows(self) -> dict[str, Any]:
+        """See `LogDensity.with_spare_rows`: padded runs followed by copies of them that do not count."""
+        runs, data = len(self.labels), self.padded
+        spare = spare_count(runs)
+        source = np.arange(len(data["mean"])).reshape(runs, -1)[np.arange(spare) % runs].ravel()
+        cells = {name: values[source] for name, values in data.items() if name not in _OF_RUNS}
+        return cells | repeat_rows({name: data[name] for name in _OF_RUNS}, runs, spare)
+
+    @property
     def inside(self) -> InsideRuns | None:
         """Single readings, with the cell of each among the residuals inside runs."""
         if self.rows is None:
@@ -139,14 +148,14 @@ class RunsTerm:
         inside = data["load_squares"] * by_load**2 - 2 * data["load_products"] * by_load
         late = LoadCells.of(values).delay_error
         inside += late * (late * data["drift_squares"] - 2 * data["drift_products"] + 2 * by_load * data["drift_loads"])
-        by_run = jnp.sum(inside.reshape(len(self.labels), -1), axis=1)
+        by_run = jnp.sum(inside.reshape(len(data["n"]), -1), axis=1)
         # Cells are equally many for each run: repeating is quicker than indexing.
-        of_cell = jnp.repeat(mounting, deviation.shape[0] // len(self.labels))
+        of_cell = jnp.repeat(mounting, deviation.shape[0] // len(data["n"]))
         return _Deviations(deviation - slope * of_cell, mounting, sd, total, plain, by_run)
 
     def _per_run(self, data: Mapping[str, Any], cells: Float[Array, " cells"]) -> Float[Array, " runs"]:
         """Return the weighted sum over the cells of each run."""
-        return jnp.sum((data["weight"] * cells).reshape(len(self.labels), -1), axis=1)
+        return jnp.sum((data["weight"] * cells).reshape(len(data["n"]), -1), axis=1)
 
     def scatter_of_single_readings(self, values: Mapping[str, Array]) -> dict[str, float]:
         """Split the scatter of single-reading runs into that of mountings [1] and the noise of the load cells [N].

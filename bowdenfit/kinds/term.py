@@ -33,6 +33,8 @@ from bowdenfit.kinds.tables import AngleTable, Measurements
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 AnyTable = TypeVar("AnyTable")
+COUNTS = "counts"  # array of the data: which readings count in the log density; all where there is none
+_FEWEST_SPARE = 16  # rows for which a program with room for more is compiled at least; a judgement
 LOAD, WRAP_ANGLE, GROUP = "Load (N)", "Wrap angle (deg)", "Group"  # labels of covariates
 
 
@@ -335,6 +337,23 @@ def deviations_of_bounds(bound: Float[Array, " bounds"], expected: Float[Array, 
 def join_contributions(*parts: tuple[Array, Array]) -> Float[Array, " entries"]:
     """Concatenate the contributions of readings and bounds; 0 where there is none."""
     return jnp.concatenate([jnp.where(jnp.isnan(known), 0.0, contributed) for known, contributed in parts])
+
+
+def repeat_rows(data: Mapping[str, Any], rows: int, spare: int) -> dict[str, Any]:
+    """Return arrays of rows followed by copies of them that do not count, by `COUNTS`.
+
+    Args:
+        data: Arrays, one entry a row.
+        rows: How many rows there are.
+        spare: How many there are to be.
+    """
+    source = np.arange(spare) % rows
+    return {name: values[source] for name, values in data.items()} | {COUNTS: np.arange(spare) < rows}
+
+
+def spare_count(count: int) -> int:
+    """Return a number of rows with room for more, which hardly ever changes: 16, and twice as many where they are full."""
+    return max(_FEWEST_SPARE, 1 << (count - 1).bit_length())
 
 
 def round_up_count(count: int) -> int:

@@ -1,6 +1,6 @@
 """What the draws imply along the route: curves, the optimal length of each draw, and efficiencies at chosen lengths."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -32,7 +32,13 @@ def route_grid(model: Model, points: int = GRID_POINTS) -> np.ndarray:
 
 
 def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Array, Array]]:
-    """Return a function of z that gives the optimal route value and the efficiency there.
+    """Return a function of z that gives the optimal route value and the efficiency there."""
+    optimum = make_optimizer_of_values(model)
+    return lambda z: optimum(model.space.constrain(z))
+
+
+def make_optimizer_of_values(model: Model) -> Callable[[Mapping[str, Array]], tuple[Array, Array]]:
+    """Return a function of named values [internal units] that gives the optimal route value and the efficiency there.
 
     Grid search, then golden section between the neighbors of the best grid point; at a jump of a published geometry the
     grid point itself is kept where it is better.
@@ -40,9 +46,7 @@ def make_optimizer(model: Model) -> Callable[[Float[Array, " free"]], tuple[Arra
     grid = route_grid(model)
     step = float(grid[1] - grid[0])
 
-    def optimum(z: Float[Array, " free"]) -> tuple[Array, Array]:
-        values = model.space.constrain(z)
-
+    def optimum(values: Mapping[str, Array]) -> tuple[Array, Array]:
         def loss(route: Array) -> Array:
             return model.cable.loss_at(values, route[None])[0]
 

@@ -16,7 +16,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.chain import Chain, SamplingRequest
-from bowdenfit.inference.draws import compile_replicator, for_each_draw
+from bowdenfit.inference.draws import compile_replicator, for_each_draw, imply_groups
 from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
@@ -32,7 +32,6 @@ from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 from bowdenfit.stages import announce_stage
 
 _SLOW_IMPORTS = ("emcee", "arviz_stats.base", "arviz_stats.ecdf_utils")  # which get their time while XLA compiles
-PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
 LIBRARIES = {"emcee": "emcee", "nuts": "blackjax"}
 _MODULES = {"emcee": "bowdenfit.inference.ensemble", "nuts": "bowdenfit.inference.nuts"}
 
@@ -219,12 +218,7 @@ def _posterior(model: Model, chain: Chain, implied: Callable[[np.ndarray], Any],
 
     These have seven digits, far more than the Monte Carlo error leaves, and take half the room in the results folder.
     """
-    z, space, (walkers, draws, size) = round_to_single(chain.z), model.space, chain.z.shape
-    optimum = {name: round_to_single(values) for name, values in chain.quantities.items()}
-    n, of_chain = walkers * draws, vars(chain) | {"z": z, "optimum": optimum}
-    prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, size))
-    of_all = jax.tree.map(round_to_single, implied(np.concatenate([z.reshape(n, size), prior_z])))
-    groups = jax.tree.map(lambda v: v[:n].reshape(walkers, draws, *v.shape[1:]), of_all)
-    prior = {p.name: of_all["values"][p.name][n:][None] for p in space.free}
+    z, optimum = round_to_single(chain.z), {name: round_to_single(values) for name, values in chain.quantities.items()}
+    of_chain = vars(chain) | {"z": z, "optimum": optimum}
     kept = {name: value for name, value in of_chain.items() if name not in ("quantities", "reasons")}
-    return Draws(**kept, **groups, prior=prior)
+    return Draws(**kept, **jax.tree.map(round_to_single, imply_groups(model, z, implied, seed)))

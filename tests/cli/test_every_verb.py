@@ -19,6 +19,7 @@ COMMANDS = {  # what is typed behind each verb, and a word of what it prints
     "length": (("FIT",), "mm"),
     "identify": (("FIT",), "mu1"),
     "next": (("FIT", "--top", "2"), "next, mounted anew"),
+    "watch": (("DATASETS/on-body-exoskeleton", "--until", "100mm"), "4 mountings: the best cable length"),
     "compare": (("FIT", "OTHER"), "predict"),
     "compensate": (("LOOP", "--device", "DATASETS/haptic-teleoperation/device.toml"), "friction"),
     "teleoperate": (("LOOP", "DATASETS/haptic-teleoperation/device.toml"), "wall"),

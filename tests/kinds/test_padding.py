@@ -47,9 +47,11 @@ def test_padded_data_have_the_log_density_of_the_data_themselves(case):
     posterior, places = longer(case)
     density = jax.jit(posterior.log_density)
     for z in places:
-        value, padded = (float(density(z, data)) for data in (posterior.data, posterior.padded))
+        shapes = posterior.data, posterior.padded, posterior.with_spare_rows
+        value, padded, spare = (float(density(z, data)) for data in shapes)
         assert np.isfinite(value)
         assert padded == pytest.approx(value, rel=1e-12)
+        assert spare == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("case", ["angles too small to detect", pytest.param("a slack rope", marks=pytest.mark.slow)])

@@ -20,7 +20,6 @@ import numpy as np
 from bowdenfit.inference import nuts
 from bowdenfit.inference.batch.laplace import StudentMixture, fit_mixtures
 from bowdenfit.inference.batch.programs import (
-    CHUNK,
     STATES_PER_ROUND,
     STEPS_PER_ROUND,
     BatchPrograms,
@@ -112,8 +111,9 @@ class DatasetOutcome(NamedTuple):
 
 def start_chunk(programs: BatchPrograms, parts: list[tuple[Any, int]]) -> list[DatasetStart]:
     """Fit the first proposals of a chunk of data sets with their seeds."""
-    seeds, data = np.array([seed for _, seed in parts]), stack_data([data for data, _ in parts], CHUNK)
-    padded = np.concatenate([seeds, np.repeat(seeds[-1:], CHUNK - len(seeds))])
+    chunk = programs.settings.chunk
+    seeds, data = np.array([seed for _, seed in parts]), stack_data([data for data, _ in parts], chunk)
+    padded = np.concatenate([seeds, np.repeat(seeds[-1:], chunk - len(seeds))])
     mixtures = fit_mixtures(lambda z: programs.gradients(z, data), programs.noise, programs.friction, padded)
     return [DatasetStart(*part, first) for part, first in zip(parts, mixtures, strict=False)]
 
@@ -314,7 +314,8 @@ def fit_batch(
         needed = ("gradients", "evaluate_points", "noise", "friction", "names")  # by all, so before any
         for future in [pool.submit(_in_64_bits, attrgetter(name), programs) for name in needed]:
             future.result()
-        chunks = [pool.submit(_in_64_bits, partial(start_chunk, programs), chunk) for chunk in _split(parts, CHUNK)]
+        start = partial(_in_64_bits, partial(start_chunk, programs))
+        chunks = [pool.submit(start, chunk) for chunk in _split(parts, programs.settings.chunk)]
         drawing = partial(_in_64_bits, partial(sample_dataset, programs, stopped=stop.is_set))
         futures = [pool.submit(drawing, dataset) for chunk in chunks for dataset in chunk.result()]
         outcomes = [future.result() for future in futures]

@@ -59,11 +59,12 @@ class ShapedDataset:
     key: str
 
 
-def shape_dataset(dataset: Dataset) -> ShapedDataset:
+def shape_dataset(dataset: Dataset, spare: bool = False) -> ShapedDataset:
     """Return a data set with the scales of its priors as data.
 
     Args:
         dataset: What was measured.
+        spare: Whether its data have room for more mountings, so that the program serves them too.
     """
     model = build_model(dataset)
     units = [_to_unit_scale(parameter) for parameter in model.space.parameters]
@@ -71,7 +72,8 @@ def shape_dataset(dataset: Dataset) -> ShapedDataset:
     scales = np.array(
         [scale for parameter, scale in units if parameter.fixed is None and scale is not None], dtype=float
     )
-    data = (*LogDensity(model).padded, scales)
+    density = LogDensity(model)
+    data = (*(density.with_spare_rows if spare else density.padded), scales)
     cable = replace(model.cable, nominal=dict.fromkeys(model.cable.nominal, 1.0)) if _has_angles(model) else model.cable
     posterior = ScaledDensity(_with_cable(cable, space, model.terms), data)
     return ShapedDataset(posterior, data, _program_key(posterior))
@@ -151,7 +153,7 @@ def _relevant_parts(page: Any) -> Any:
 
 def _describe_term(term: Term) -> str:
     """Describe a term apart from its data; arrays by their content."""
-    parts = [f"{type(term).__name__} {len(term.labels)}"]
+    parts = [type(term).__name__]
     for term_field in fields(term):  # type: ignore[arg-type]
         if term_field.name not in _DATA_FIELDS:
             leaves, tree = jax.tree.flatten(getattr(term, term_field.name))

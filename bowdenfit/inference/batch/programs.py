@@ -111,6 +111,7 @@ class BatchSettings:
             Long tails need many more draws for it than for a mean or a rank.
         n_kept: Number of equally weighted draws that weighted ones are resampled to.
         nuts: Whether NUTS samples what the ensembles leave.
+        chunk: Data sets that climb together.
         threads: Data sets sampled at a time; if omitted one more than there are cores, because threads wait for each other, but
             `MOST_AT_ONCE` at most.
     """
@@ -123,6 +124,7 @@ class BatchSettings:
     target_sd_error: float = 0.033
     n_kept: int = 2048
     nuts: bool = True
+    chunk: int = CHUNK
     threads: int = 0
 
     def __post_init__(self) -> None:
@@ -149,8 +151,9 @@ class BatchPrograms:
     def gradients(self) -> Callable[..., Any]:
         """Log density and gradient, for climbing to maxima."""
         size, gradient = self.posterior.model.space.size, jax.value_and_grad(self.posterior.log_density)
-        shape = jax.ShapeDtypeStruct((CHUNK, count_climb_points(size), size), np.dtype(float))
-        return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack_data([self.posterior.data], CHUNK))
+        chunk = self.settings.chunk
+        shape = jax.ShapeDtypeStruct((chunk, count_climb_points(size), size), np.dtype(float))
+        return compile_program(jax.vmap(jax.vmap(gradient, (0, None))), shape, stack_data([self.posterior.data], chunk))
 
     @cached_property
     def evaluate_points(self) -> Callable[..., Any]:

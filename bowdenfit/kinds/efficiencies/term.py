@@ -22,7 +22,7 @@ from bowdenfit.kinds.row_angles import collect_row_angles, resolve_angles
 from bowdenfit.kinds.rows import UnusedColumn
 from bowdenfit.kinds.shared_parameters import declare_run_scatter
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth
+from bowdenfit.kinds.term import Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 from bowdenfit.physics.friction import transmission_efficiency
 
@@ -61,6 +61,11 @@ class EfficienciesTerm:
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
         """One block: all rows scatter alike."""
         return ((len(self.labels), len(self.labels)),)
+
+    @property
+    def with_spare_rows(self) -> dict[str, Any]:
+        """See `LogDensity.with_spare_rows`: the rows followed by copies of them that do not count."""
+        return repeat_rows(self.data, len(self.labels), spare_count(len(self.labels)))
 
     def _mean_and_sd(
         self, values: Mapping[str, Array], data: Mapping[str, Any], weights: Mapping[str, Array]

@@ -25,7 +25,7 @@ from bowdenfit.kinds.runs import RunsTerm, sum_runs
 from bowdenfit.kinds.shared_parameters import declare_force_noise, declare_offsets, declare_run_scatter
 from bowdenfit.kinds.sliding_rows import ROW_ARRAYS, ExpectedForces, SlidingRows, expected_forces
 from bowdenfit.kinds.tables import AngleTable
-from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth
+from bowdenfit.kinds.term import GROUP, LOAD, Circumstances, Term, TermKind, Truth, repeat_rows, spare_count
 from bowdenfit.parameters.priors import HalfCauchy
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.types import Labels, Vector
@@ -69,6 +69,11 @@ class HeldForcesTerm:
     def residual_blocks(self) -> tuple[tuple[int, int], ...]:
         """One block without degrees of freedom, because an interval has no scatter."""
         return ((len(self.labels), 0),)
+
+    @property
+    def with_spare_rows(self) -> dict[str, Any]:
+        """See `LogDensity.with_spare_rows`: the rows followed by copies of them that do not count."""
+        return repeat_rows(self.data, len(self.labels), spare_count(len(self.labels)))
 
     def _difference(
         self, values: Mapping[str, Array], data: Mapping[str, Any]

@@ -89,7 +89,7 @@ def rank_measurements(
     ranked = _rank(fit, target, chosen, explained, costs)
     route = fit.dataset.description.route
     route_axis = (route.label, route.range) if route else ("", (0.0, 0.0))
-    loads, stop = _load_range(fit), _stopping_advice(fit, target)
+    loads, stop = _load_range(fit), stopping_advice(fit, target)
     if (second := _second_mounting(fit, target, chosen, readings)) is not None:
         return NextMeasurement(
             target, ranked, None, (), *route_axis, fit.converged, loads, stop="", second_mounting=second
@@ -121,9 +121,18 @@ def _load_range(fit: Record) -> tuple[float, float] | None:
     return (float(run.input_force.min()), float(run.input_force.max())) if run is not None else None
 
 
-def _stopping_advice(fit: Record, target: TargetQuantity) -> str:
+def is_good_enough(fit: Record, target: TargetQuantity) -> bool:
+    """Return whether nothing needs to be measured, which can be said of the best length alone."""
+    return _is_optimum(target) and fit.optimal_length().is_certain
+
+
+def _is_optimum(target: TargetQuantity) -> bool:
+    return target.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-"))
+
+
+def stopping_advice(fit: Record, target: TargetQuantity) -> str:
     """Say whether more needs to be measured at all."""
-    if target.name in (OPTIMAL_LENGTH.replace("_", "-"), OPTIMAL_EFFICIENCY.replace("_", "-")):
+    if _is_optimum(target):
         best = fit.optimal_length()
         return (
             f"You may stop: {best.good_enough[0].lower()}{best.good_enough[1:]}"

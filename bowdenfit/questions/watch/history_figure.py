@@ -1,0 +1,70 @@
+"""How an answer became known: its interval against the number of mountings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bowdenfit.plots.layout import TITLE, legend_above, panels
+from bowdenfit.plots.panels import show_plain_numbers
+from bowdenfit.plots.style import BLACK, SERIES_COLORS, axis_label, in_paper_style
+from bowdenfit.words import counted
+
+if TYPE_CHECKING:
+    from bowdenfit.plots.layout import Figure
+    from bowdenfit.questions.watch.answer import History
+
+HEADING = "How the answer became known"
+WIDTH = 5.6  # in
+_WHOLE_STEPS = 15  # mountings up to which each has its own mark on the axis
+
+
+def caption(history: History) -> str:
+    """Say what is drawn, in plain words."""
+    last = history.answers[-1]
+    what = "mounting" if last.mountings else "reading"
+    return (
+        f"The answer ({last.words}) after each {what}: median and 90 % interval of all that was measured by then. Filled: a "
+        "fit that may be trusted; open: one that must not be, or was not checked since more was measured. Ring: from here on "
+        f"enough is known. n = {counted(len(history.answers), 'fit')}."
+    )
+
+
+@in_paper_style
+def draw(history: History) -> Figure:
+    """Draw the median with its interval against the number of mountings."""
+    answers = history.answers
+    by_mounting = answers[-1].mountings > 0
+    count = np.array([one.mountings if by_mounting else one.readings for one in answers])
+    median, low, high = (np.array([getattr(one.interval, name) for one in answers]) for name in ("median", "q05", "q95"))
+    trusted = np.array([one.trusted is True for one in answers])
+    figure, (axes,) = panels([2.4], 1, TITLE, (0, 0), WIDTH)
+    axes.errorbar(
+        count, median, (median - low, high - median), linestyle="none", color=SERIES_COLORS[0], capsize=2, linewidth=1.1,
+        label="90 % interval",
+    )  # fmt: skip
+    marks = (("Trusted", trusted, SERIES_COLORS[0]), ("Not trusted, or not checked", ~trusted, "white"))
+    for label, which, face in marks:
+        if which.any():
+            axes.plot(
+                count[which], median[which], "o", markersize=4.5, color=SERIES_COLORS[0], markerfacecolor=face, label=label
+            )
+    if answers[-1].may_stop:
+        first = next(i for i in range(len(answers)) if all(one.may_stop for one in answers[i:]))
+        axes.plot(
+            count[first], median[first], "o", markersize=11, color=BLACK, markerfacecolor="none", label="Enough is known"
+        )
+    axes.set_xlabel("Mountings" if by_mounting else "Readings")
+    words = answers[-1].words.removeprefix("the ")
+    axes.set_ylabel(axis_label(words[:1].upper() + words[1:] if " " in words else words, _unit(answers[-1].unit)))
+    axes.set_xlim(count.min() - 0.7, count.max() + 0.7)
+    if np.ptp(count) <= _WHOLE_STEPS:
+        axes.set_xticks(np.arange(count.min(), count.max() + 1))
+    show_plain_numbers(axes, "y")
+    legend_above(figure, [axes], columns=4)
+    return figure
+
+
+def _unit(unit: str) -> str:
+    return "%" if unit == "points" else unit

@@ -13,7 +13,14 @@ from bowdenfit.errors import DescriptionError, UsageError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.questions.next.answer import TargetQuantity
 from bowdenfit.questions.summary.verdict import assess_fit
-from bowdenfit.questions.watch import History, Refusal, WatchedAnswer, history_figure, watch_answers, watch_lines
+from bowdenfit.questions.watch import (
+    History,
+    UnreadableFiles,
+    WatchedAnswer,
+    history_figure,
+    watch_answers,
+    watch_lines,
+)
 from bowdenfit.questions.watch.fitting import GrowingFit
 from bowdenfit.questions.watch.watching import read_until
 
@@ -53,7 +60,7 @@ def test_why_not_to_trust_a_fit_is_said_once():
 def test_the_advice_to_stop_is_said_once_and_refusals_stand_on_lines_of_their_own():
     enough = replace(ANSWER, may_stop=True, stop=STOP)
     checked, next_one = replace(enough, troubles={}), replace(enough, mountings=6)
-    lines = printed(enough, Refusal("Row 3 is wrong."), enough, checked, next_one, replace(next_one, troubles={}))
+    lines = printed(enough, UnreadableFiles("Row 3 is wrong."), enough, checked, next_one, replace(next_one, troubles={}))
     assert lines.count(STOP) == 1
     assert "Row 3 is wrong." in lines
 
@@ -127,11 +134,11 @@ def test_a_bench_is_watched_from_a_wrong_row_to_the_advice_to_stop(bench, tmp_pa
     closed, answers = threading.Event(), []
     for answer in watch_answers(bench.folder, until=0.006, is_stopped=closed.is_set):
         answers.append(answer)
-        if isinstance(answer, Refusal):
+        if isinstance(answer, UnreadableFiles):
             bench.write(2)
         elif answer.trusted is not None:
             bench.write(12)
-    assert isinstance(answers[0], Refusal)
+    assert isinstance(answers[0], UnreadableFiles)
     assert "forces.csv" in answers[0].why and "a lot" in answers[0].why and str(tmp_path) not in answers[0].why
     last = answers[-1]
     assert (last.mountings, last.trusted, last.may_stop) == (12, True, True)

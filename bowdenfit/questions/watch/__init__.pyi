@@ -1,6 +1,6 @@
 from . import history_figure as history_figure
 from .answer import History as History
-from .answer import Refusal as Refusal
+from .answer import UnreadableFiles as UnreadableFiles
 from .answer import WatchedAnswer as WatchedAnswer
 from .watching import watch_answers as watch_answers
 from .words import watch_lines as watch_lines

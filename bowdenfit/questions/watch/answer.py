@@ -8,7 +8,7 @@ from bowdenfit.inference.interval import Interval
 
 
 @dataclass(frozen=True, repr=False)
-class Refusal(Display):
+class UnreadableFiles(Display):
     """Files that cannot be read as they are now; they are watched on.
 
     Args:

@@ -16,7 +16,7 @@ from bowdenfit.reading import Reading
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.watch.answer import History, Refusal, WatchedAnswer
+    from bowdenfit.questions.watch.answer import History, UnreadableFiles, WatchedAnswer
 
 NAME = "history"
 
@@ -34,7 +34,7 @@ def watch(
     seed: Annotated[Seed, Parameter(show_default="0")] = None,
     is_stopped: Annotated[Callable[[], bool], HIDDEN] = lambda: False,
     **reading: Unpack[Reading],
-) -> "Iterator[WatchedAnswer | Refusal]":
+) -> "Iterator[WatchedAnswer | UnreadableFiles]":
     """Read and fit a data set again whenever its files have a new complete row or recording, for ever.
 
     Args:
@@ -65,7 +65,7 @@ def _keep(output: str | Path, history: "History") -> None:
     write_answer(output, NAME, history, str(history) + "\n", {NAME: room.history_figure}, history.answers[-1].cable)
 
 
-def _reply(answers: "Iterator[WatchedAnswer | Refusal]", options: dict[str, Any]) -> Reply:
+def _reply(answers: "Iterator[WatchedAnswer | UnreadableFiles]", options: dict[str, Any]) -> Reply:
     return Reply("", pieces=room.watch_lines(answers, options["dataset"].name))
 
 

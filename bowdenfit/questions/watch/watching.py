@@ -20,7 +20,7 @@ from bowdenfit.questions.next.answer import TargetQuantity, choose_target
 from bowdenfit.questions.next.candidates import rests_on_one_mounting
 from bowdenfit.questions.next.ranking import is_good_enough, stopping_advice
 from bowdenfit.questions.summary.verdict import assess_fit, distrust_warning
-from bowdenfit.questions.watch.answer import History, Refusal, WatchedAnswer
+from bowdenfit.questions.watch.answer import History, UnreadableFiles, WatchedAnswer
 from bowdenfit.questions.watch.files import BenchFiles
 from bowdenfit.questions.watch.fitting import GrowingFit
 from bowdenfit.reading import Reading, read
@@ -40,14 +40,14 @@ def watch_answers(
     seed: int = 0,
     is_stopped: Callable[[], bool] = lambda: False,
     keep: Callable[[History], None] = lambda _: None,
-) -> Iterator[WatchedAnswer | Refusal]:
+) -> Iterator[WatchedAnswer | UnreadableFiles]:
     """Yield what is known of a cable whenever its files have a new complete row or recording, for ever.
 
     Each answer comes twice: at once with its interval (`trusted` is None), and once more when the verdict is worked out, unless
     more was measured meanwhile. A program with a page of its own iterates in a thread of its own:
 
         for answer in watch_answers(Path("my-cable"), until=(10, "mm"), is_stopped=closed.is_set):
-            show(answer)  # a `WatchedAnswer`, or a `Refusal` where the files cannot be read as they are
+            show(answer)  # a `WatchedAnswer`, or a `UnreadableFiles` where the files cannot be read as they are
 
     Args:
         path: Folder with a cable.toml, or one table or recording.
@@ -97,7 +97,7 @@ class _Bench:
         self.job: Future[tuple[WatchedAnswer, WatchedAnswer]] | None = None
         self.is_assessed = True
 
-    def look(self) -> Iterator[WatchedAnswer | Refusal]:
+    def look(self) -> Iterator[WatchedAnswer | UnreadableFiles]:
         """Look at the files once; yield what has become known."""
         if self.job is not None and self.job.done():
             before, answer = self.job.result()
@@ -111,7 +111,7 @@ class _Bench:
         if is_idle and not self.is_assessed and self.latest is not None:
             self.job = self.assessing.submit(self._assess, *self.latest, self.history)
 
-    def _read_and_fit(self) -> Iterator[WatchedAnswer | Refusal]:
+    def _read_and_fit(self) -> Iterator[WatchedAnswer | UnreadableFiles]:
         """Read what is settled, and fit it; what is missing while files change is waited for."""
         begin = time.perf_counter()
         try:
@@ -125,7 +125,7 @@ class _Bench:
             why = str(error).replace(str(self.files.copy), str(self.files.path))
             if why != self.refused and not self.files.unsettled(time.monotonic()):
                 self.refused = why
-                yield Refusal(why)
+                yield UnreadableFiles(why)
             return
         answer = self._describe(fit, time.perf_counter() - begin)
         self.refused, self.latest, self.is_assessed = "", (answer, fit), False

@@ -3,13 +3,13 @@
 from collections.abc import Iterable, Iterator
 
 from bowdenfit.display import text_of
-from bowdenfit.questions.watch.answer import History, Refusal, WatchedAnswer
+from bowdenfit.questions.watch.answer import History, UnreadableFiles, WatchedAnswer
 from bowdenfit.words import counted, filled, listed, significant, table
 
 NOT_LOOKED_AT = "not checked, since more was measured"
 
 
-def watch_lines(answers: Iterable[WatchedAnswer | Refusal], name: str) -> Iterator[str]:
+def watch_lines(answers: Iterable[WatchedAnswer | UnreadableFiles], name: str) -> Iterator[str]:
     """Yield what to print, in pieces: of each number of mountings the answer at once, and behind it the verdict.
 
     Args:
@@ -19,7 +19,7 @@ def watch_lines(answers: Iterable[WatchedAnswer | Refusal], name: str) -> Iterat
     yield f"Watching {name}; Ctrl-C ends it.\n"
     is_open, shown, open_readings, reasons, stop = False, (-1, -1), -1, tuple[str, ...](), ""
     for answer in answers:
-        if isinstance(answer, Refusal):
+        if isinstance(answer, UnreadableFiles):
             yield f"{_end(is_open)}{filled(answer.why)}\n"
             is_open = False
             continue

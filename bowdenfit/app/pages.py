@@ -6,16 +6,21 @@ from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 from nicegui import ui
 
+from bowdenfit.app.ask import export_file
 from bowdenfit.app.bring import show_data_set, show_draft, show_start
 from bowdenfit.app.frame import frame, refused, style_and_script
 from bowdenfit.app.see import show_fit
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inputs import refuse_special
-from bowdenfit.results.folder import REPORT
+from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY, SUMMARY_TEXT
 
 _REFUSED, _MISSING = 422, 404
-_REPORT_POLICY = "sandbox allow-scripts"  # what is in a results folder may come from elsewhere, and reaches nothing of the app
+_POLICY_OF_FILES = "sandbox allow-scripts"  # what is in a results folder may come from elsewhere: it reaches nothing of the app
+_KEPT = {
+    REPORT: "text/html", SUMMARY: "application/json", SUMMARY_TEXT: "text/plain; charset=utf-8",
+    DETAILS_TEXT: "text/plain; charset=utf-8", POSTERIOR: "application/x-netcdf",
+}  # fmt: skip
 
 
 def register_pages(workbench: Workbench, application: FastAPI) -> None:
@@ -87,11 +92,24 @@ def _register_files(workbench: Workbench, application: FastAPI) -> None:
     @application.get("/kept/{fit}/{name}")
     async def get_kept(fit: str, name: str) -> Response:
         try:
-            if name == REPORT:
-                return _report(workbench.results(fit) / REPORT)
+            if name in _KEPT:
+                return _kept(workbench.results(fit) / name)
             return Response(await workbench.draw_figure(fit, name.removesuffix(".png")), media_type="image/png")
         except BowdenfitError as error:
             return PlainTextResponse(str(error), _MISSING)
+
+
+    @application.get("/export/{fit}/{target}")
+    async def get_export(fit: str, target: str) -> Response:
+        try:
+            name, content = await workbench.compute(export_file, await workbench.open_fit(fit), target)
+        except BowdenfitError as error:
+            return PlainTextResponse(str(error), _REFUSED)
+        return Response(content, media_type="application/octet-stream", headers=_as_attachment(name))
+
+
+def _as_attachment(name: str) -> dict[str, str]:
+    return {"content-disposition": f"attachment; filename={name}"}
 
 
 async def _write_upload(path: Path, request: Request) -> None:
@@ -107,9 +125,9 @@ async def _write_upload(path: Path, request: Request) -> None:
             path.unlink(missing_ok=True)
 
 
-def _report(path: Path) -> Response:
-    """Return the report of a fit."""
+def _kept(path: Path) -> Response:
+    """Return a file of a results folder."""
     if not path.is_file():
-        return PlainTextResponse("This fit has no report; `bowdenfit report` writes it.", _MISSING)
+        return PlainTextResponse(f"This fit has no {path.name}; it was removed, or could not be written.", _MISSING)
     refuse_special(path)
-    return FileResponse(path, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})
+    return FileResponse(path, media_type=_KEPT[path.name], headers={"content-security-policy": _POLICY_OF_FILES})

@@ -2,10 +2,11 @@
 
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from nicegui import ui
 
+from bowdenfit.app.ask import show_arriving, show_files, show_next
 from bowdenfit.app.elements import block, button, choice, field, link, markup, text
 from bowdenfit.app.fit_job import FitJob
 from bowdenfit.app.frame import attempt, frame, refused, section
@@ -16,10 +17,13 @@ from bowdenfit.pages.page import render_section
 from bowdenfit.questions import report as report_room
 from bowdenfit.questions.summary.verb import reply, summary
 from bowdenfit.results.folder import FIT as FIT_FILE
-from bowdenfit.results.folder import REPORT
 from bowdenfit.verb import Reply
 
+if TYPE_CHECKING:
+    from bowdenfit.results.record import Record
+
 Again: TypeAlias = Callable[[], Awaitable[None]]
+FIGURES_TITLE, NEXT_TITLE = "Figures", "What to measure next"  # of sections of the report that have their own places here
 _TICK = 0.5  # s between two looks at a fit that runs; a judgement
 
 
@@ -103,22 +107,48 @@ def _show_interrupted(workbench: Workbench, name: str, show: Again) -> None:
 
 
 async def _show_answer(workbench: Workbench, name: str) -> None:
-    """Show what a fit says: sentences, figures, and links."""
+    """Show what a fit says: its summary at once, and when it is loaded all that the report says, and what can be asked."""
     folder = workbench.results(name)
     try:
         printed = await workbench.compute(_read_summary, folder)
+        with block("div", "columns-of-page"):
+            with block("div") as left, section("The answer", "answer"):
+                answer = markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
+                loading = text("Loading the fit, for what can be asked of it ...", classes="hint", role="status")
+                with block("details"):
+                    text("As the command line prints it", "summary")
+                    text(printed.text, "pre", tabindex="0", id="printed")
+            with block("div") as right:
+                pass
+        below = block("div", id="everything")
+        fit = await workbench.open_fit(name)
+        figures = await workbench.figure_data(name)
+        first, *others, pictures = await workbench.compute(_render_report, name, fit, figures)
     except BowdenfitError as error:
         refused(str(error))
         return
-    with block("div", "columns-of-page"):
-        with block("div"):
-            with section("The answer", "answer"):
-                markup(as_html(printed.text), "div", f"answer verdict {_kind_of(printed)}", id="answer-text")
-            with block("ul", "links"), block("li"):
-                link("Report", f"/kept/{name}/{REPORT}", target="_blank")
-        with block("div"), section("Figures", "figures"):
-            figures = markup("<p>Loading ...</p>", "div")
-    figures.set_content(await workbench.compute(_render_figures, name, await workbench.figure_data(name)))
+    answer.classes(remove="answer verdict good bad doubtful")
+    answer.set_content(first)
+    loading.delete()
+    with left:
+        show_arriving(workbench, fit)
+        show_next(workbench, fit)
+        show_files(name)
+    with right, section("Figures", "figures"):
+        markup(pictures, "div")
+    with below:
+        for heading, html in others:
+            with section(heading, f"part-{heading.lower().replace(' ', '-')}"):
+                markup(html, "div")
+
+
+def _render_report(name: str, fit: "Record", figures: dict[str, Any]) -> list[Any]:
+    """Return the answer, (heading, HTML) of what else the report says but what to measure next, and the figures, as HTML."""
+    drawings = {figure: f"/kept/{name}/{figure}.png" for figure in figures}
+    sections = {part.title: render_section(part, drawings) for part in report_room.report_page(fit, figures).sections}
+    first, *others = sections
+    shown = [(title, sections[title]) for title in others if title not in {FIGURES_TITLE, NEXT_TITLE}]
+    return [sections[first], *shown, sections.get(FIGURES_TITLE, "")]
 
 
 def _kind_of(printed: Reply) -> str:
@@ -130,10 +160,3 @@ def _kind_of(printed: Reply) -> str:
 def _read_summary(folder: Path) -> Reply:
     """Return what `bowdenfit summary` prints."""
     return reply(summary(folder), {})
-
-
-def _render_figures(name: str, figures: dict[str, Any]) -> str:
-    """Return the figures as HTML, as the report has them."""
-    pictures = report_room.figures_section(figures)
-    drawings = {figure: f"/kept/{name}/{figure}.png" for figure in figures}
-    return render_section(pictures, drawings) if pictures is not None else ""

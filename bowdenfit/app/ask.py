@@ -1,0 +1,158 @@
+"""What is asked of a fit on its page: what arrives where dials stand, what to measure next, and files for other programs."""
+
+import asyncio
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+from nicegui import ui
+
+import bowdenfit as bf
+from bowdenfit.app.elements import block, button, choice, field, link, markup, text
+from bowdenfit.app.frame import refused, section
+from bowdenfit.app.workbench import Workbench
+from bowdenfit.display import as_html
+from bowdenfit.errors import BowdenfitError
+from bowdenfit.pages.page import render_section
+from bowdenfit.questions import next as next_room
+from bowdenfit.questions.export.verb import Target, export
+
+if TYPE_CHECKING:
+    from bowdenfit.app.dials import Dial
+    from bowdenfit.finished_fit import Fit
+
+_THROTTLE = 0.1  # s between two positions of a dial that is moved; a judgement
+_WAYS = (("in", "at the motor: what arrives"), ("out", "wanted at the load: what it takes"))
+_STROKES = (("pull", "pulling"), ("return", "returning"))
+
+
+class ArrivingForce:
+    """The dials, and what arrives where they stand; while an answer is worked out the newest question waits.
+
+    Args:
+        workbench: Which works it out.
+        fit: The fit.
+    """
+
+    def __init__(self, workbench: Workbench, fit: "Fit") -> None:
+        self._workbench, self._fit = workbench, fit
+        self._dials = import_module("bowdenfit.app.dials")  # which loads JAX
+        self._values: dict[str, float] = {}
+        self._way, self._stroke = "in", "pull"
+        self._asked, self._busy = 0, False
+
+    def show(self) -> None:
+        """Show the dials, and what arrives below them."""
+        dials: tuple[Dial, ...] = self._dials.list_dials(self._fit)
+        with block("div", "sliders"):
+            for number, dial in enumerate(dials):
+                self._show_dial(dial, f"dial-{number}")
+        with block("div", "row"):
+            with field("The force is", "dial-way"):
+                choice("dial-way", self._way, _WAYS, lambda way: self._change("_way", way))
+            with field("The rope is", "dial-stroke"):
+                choice("dial-stroke", self._stroke, _STROKES, lambda stroke: self._change("_stroke", stroke))
+        with block("div", role="status", aria_live="polite"):
+            self._place = markup("", "div", "arrives", id="arrives")
+        ui.timer(0.05, self._answer, once=True)
+
+    def _show_dial(self, dial: "Dial", key: str) -> None:
+        """Show a dial with its number."""
+        self._values[dial.key] = dial.value
+        with field(f"{dial.label} ({dial.unit})", key), block("div", "dial"):
+            knob = block("input", id=key, type="range", data_key=key, min=f"{dial.low:.12g}", max=f"{dial.high:.12g}")
+            knob.props["step"], knob.props["value"] = f"{dial.step:.12g}", f"{dial.value:.12g}"
+            number = text(f"{dial.value:g}", "output", for_=key)
+
+        async def turn(event: Any) -> None:
+            self._values[dial.key] = float(event.args)
+            number.set_content(f"{float(event.args):g}")
+            await self._answer()
+
+        knob.on("input", turn, throttle=_THROTTLE, js_handler="event => emit(event.target.value)")
+
+    async def _change(self, name: str, value: str) -> None:
+        setattr(self, name, value)
+        await self._answer()
+
+    async def _answer(self) -> None:
+        """Answer where the dials stand; of questions that come meanwhile the last."""
+        self._asked += 1
+        if self._busy:
+            return
+        self._busy, answered = True, 0
+        try:
+            while answered != self._asked:
+                answered = self._asked
+                question = partial(self._dials.answer_dials, self._fit, dict(self._values), self._way == "in", self._stroke)
+                try:
+                    words = as_html(await self._workbench.compute(question))
+                except BowdenfitError as error:
+                    words = as_html(str(error))
+                self._place.set_content(words)
+                await asyncio.sleep(0)
+        finally:
+            self._busy = False
+
+
+def show_arriving(workbench: Workbench, fit: "Fit") -> None:
+    """Show what arrives at a length or bend, of a fit with draws."""
+    with section("What arrives", "arriving"):
+        if fit.sampled is None:
+            text("This fit has no posterior, because it was made without MCMC; fit again for intervals.")
+        else:
+            ArrivingForce(workbench, fit).show()
+
+
+def show_next(workbench: Workbench, fit: "Fit") -> None:
+    """Show what to measure next, where it is asked for."""
+
+    async def rank() -> None:
+        place.clear()
+        with place:
+            text("Ranking what could be measured ...")
+        try:
+            ranking = await workbench.compute(bf.next_measurement, fit)
+            words = render_section(next_room.ranking_section(ranking), {})
+        except BowdenfitError as error:
+            place.clear()
+            with place:
+                refused(str(error))
+            return
+        place.clear()
+        with place:
+            markup(words, "div", id="ranking")
+
+    with section("What to measure next", "next"), block("div", role="status") as place:
+        button("Rank what could be measured next", rank)
+
+
+def show_files(name: str) -> None:
+    """Show links to the report, to the data of a fit, and to what other programs read of it."""
+    with section("Files", "kept-files"), block("ul", "links"):
+        for words, address in (
+            ("Report", f"/kept/{name}/report.html"), ("Everything it says", f"/kept/{name}/details.txt"),
+            ("summary.json", f"/kept/{name}/summary.json"), ("Draws, posterior.nc", f"/kept/{name}/posterior.nc"),
+            *((f"For {target}", f"/export/{name}/{target}") for target in get_args(Target)),
+        ):  # fmt: skip
+            with block("li"):
+                link(words, address, target="_blank")
+
+
+def export_file(fit: "Fit", target: str) -> tuple[str, bytes]:
+    """Return name and contents of the file that `bowdenfit export` writes.
+
+    Args:
+        fit: The fit.
+        target: The format.
+
+    Raises:
+        UsageError: There is no such format, or it cannot express the cable.
+    """
+    with TemporaryDirectory() as folder:
+        endings = {"c": "h", "mujoco": "xml" if fit.model.cable.is_loop else "py", "matlab": "m"}
+        name = f"cable.{endings.get(target, target)}"
+        export(fit, cast("Target", target), output=Path(folder) / name)
+        return name, (Path(folder) / name).read_bytes()

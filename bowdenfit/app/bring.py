@@ -8,14 +8,17 @@ from typing import TypeAlias
 from nicegui import ui
 
 from bowdenfit.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
-from bowdenfit.app.elements import block, button, choice, field, link, text, text_input
+from bowdenfit.app.elements import block, button, choice, field, link, markup, text, text_input
 from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.app.sheet import FILE as TYPED
+from bowdenfit.app.sheet import TypedSheet
 from bowdenfit.app.workbench import Workbench, refuse_folder_name
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 
+_BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
 Again: TypeAlias = Callable[[], Awaitable[None]]
 _HEADS = ("column", "unit", "read as", "first", "last", "lowest", "highest")
 
@@ -93,9 +96,16 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
         place.clear()
         with place:
             _show_understanding(workbench, draft, understanding, look_again)
+        sheet.mark(understanding.refusals)
 
+    sheet = TypedSheet(draft, look_again)
     with zone:
         _show_drop_zone(draft, look_again)
+        with block("details") as typing:
+            text("Or type or paste a table", "summary")
+            sheet.show()
+        if any(path.name == TYPED for path in draft.files):
+            typing.props["open"] = True
     ui.timer(0.05, look_again, once=True)
 
 
@@ -187,9 +197,29 @@ def _show_column(draft: Draft, file: UnderstoodFile, column: UnderstoodColumn, n
 
 
 def _show_refusals(refusals: tuple[Refusal, ...]) -> None:
-    """Show why a draft cannot be fitted yet."""
-    if refusals:
-        refused("\n".join(refusal.sentence for refusal in refusals))
+    """Show why a draft cannot be fitted yet, beside the cells that the refusals speak of."""
+    if others := [refusal.sentence for refusal in refusals if not refusal.cells]:
+        refused("\n".join(others))
+    for file in dict.fromkeys(refusal.file for refusal in refusals if refusal.cells):
+        _show_refused_rows(file, [refusal for refusal in refusals if refusal.cells and refusal.file == file])
+
+
+def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
+    """Show rows of a file with cells that cannot be read, and why."""
+    with block("div", "verdict bad", role="alert"):
+        text(f"{file}: cells that cannot be read.")
+        with block("div", "wide", role="region", tabindex="0", aria_label=f"Cells of {file}"), block("table", "cells"):
+            with block("thead"), block("tr"):
+                for head in ("row", *(heading for heading, _ in refusals[0].cells), "why"):
+                    text(head, "th", scope="col")
+            with block("tbody"):
+                for refusal in refusals:
+                    with block("tr"):
+                        text(str(refusal.row), "th", scope="row")
+                        for heading, cell in refusal.cells:
+                            text(cell or "blank", "td", "wrong" if heading == refusal.column else "")
+                        with block("td", "left"):
+                            text(refusal.sentence, "p", "fault")
 
 
 def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
@@ -202,6 +232,7 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
         await look_again()
 
     with section("What the files do not say", "questions"):
+        markup(_BENCH, "figure", "bench-figure")
         for number, entry in enumerate(understanding.entries):
             key = f"question-{number}"
             with field(entry.words, key, entry.hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):

@@ -1,12 +1,15 @@
 """A data set that is being brought: its files, what they say, what is asked, and what `check` says of all that."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bowdenfit.app.form import Form, FormEntry, UnansweredError
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.files.cells import Cell
+from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.check.verb import check
@@ -19,7 +22,7 @@ from bowdenfit.words import printable, shown
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
 _DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
-_MOST_FAULTS = 40  # refusals beside cells; a judgement
+_MOST_FAULTS, _MOST_CELLS = 40, 12  # refusals beside cells, and cells of such a row; judgements
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,14 @@ class Refusal:
     Args:
         sentence: In words.
         file, row, column: The cell that it speaks of; empty, or 0, where it speaks of none.
+        cells: That row, as (heading, cell); empty where it cannot be shown.
     """
 
     sentence: str
     file: str = ""
     row: int = 0
     column: str = ""
+    cells: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -104,12 +109,14 @@ class Draft:
         folder: Where they lie.
         answers: What was answered, by question.
         stated: What was stated of columns, as (quantity, unit), by file and heading.
+        typed: Cells that are typed, the headings first; empty where nobody types.
         understanding: What was understood when it was last looked at.
     """
 
     folder: Path
     answers: dict[str, str] = field(default_factory=dict)
     stated: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
+    typed: list[list[str]] = field(default_factory=list)
     understanding: Understanding = Understanding()
 
     @property
@@ -164,7 +171,7 @@ class Draft:
         except UnansweredError:
             pass
         except BowdenfitError as error:
-            refusals = list_refusals(error)
+            refusals = add_cells(list_refusals(error), self.folder)
         files = tuple(map(_understood_file, measured_files))
         self.understanding = Understanding(files, tuple(form.entries), refusals, description, report)
         return self.understanding
@@ -209,6 +216,25 @@ def list_refusals(error: BowdenfitError) -> tuple[Refusal, ...]:
     """Return the refusals that an error combines, each with the cell that it speaks of."""
     faults = error.faults or (error,)
     return tuple(_refusal(fault) for fault in faults[:_MOST_FAULTS])
+
+
+def add_cells(refusals: Sequence[Refusal], folder: Path) -> tuple[Refusal, ...]:
+    """Return refusals with the rows that they speak of.
+
+    Args:
+        refusals: The refusals.
+        folder: Where the files lie.
+    """
+    rows: dict[str, dict[int, tuple[Cell, ...]]] = {}
+    for name in {refusal.file for refusal in refusals if refusal.row}:
+        with suppress(BowdenfitError):
+            rows[name] = {row[0].row: row for row in read_table(folder / name).rows}
+    with_cells = []
+    for refusal in refusals:
+        row = rows.get(refusal.file, {}).get(refusal.row, ())
+        shown_cells = tuple((cell.column, cell.text) for cell in row[:_MOST_CELLS])
+        with_cells.append(replace(refusal, cells=shown_cells))
+    return tuple(with_cells)
 
 
 def _refusal(fault: BowdenfitError) -> Refusal:

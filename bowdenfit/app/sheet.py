@@ -1,0 +1,127 @@
+"""A table that is typed or pasted, like that of a spreadsheet."""
+
+import csv
+import io
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+from nicegui.element import Element
+
+from bowdenfit.app.draft import Draft, Refusal
+from bowdenfit.app.elements import block, button, text, text_input
+
+FILE = "typed.csv"
+_HEADINGS = ("input_force_N", "output_force_N", "run", "stroke", "wrap_angle_deg", "")
+_ROWS, _MORE = 8, 8  # at first, and each time more are wanted
+_MOST_ROWS, _MOST_COLUMNS = 500, 24  # that a page shows as cells; files may have more
+_PASTED = """event => {
+  const words = event.clipboardData.getData("text");
+  if (!/[\\t\\n]/.test(words.trim())) return;
+  event.preventDefault();
+  emit([words, event.target.dataset.row, event.target.dataset.column]);
+}"""
+
+
+def paste_cells(cells: list[list[str]], pasted: str, row: int, column: int) -> list[list[str]]:
+    """Return cells with what was pasted from a spreadsheet at a place; they grow where it needs more.
+
+    Args:
+        cells: Rows of equal length, the headings first.
+        pasted: Cells between tabs, or between commas or semicolons where there are no tabs.
+        row, column: Where its first cell goes.
+    """
+    lines = pasted.strip("\r\n").splitlines()
+    separator = next((mark for mark in "\t;," if mark in lines[0]), "\t")
+    new = [line[:_MOST_COLUMNS] for line in csv.reader(lines, delimiter=separator)][:_MOST_ROWS]
+    height, width = max(len(cells), row + len(new)), max([len(cells[0]), *(column + len(line) for line in new)])
+    grown = [[*line, *[""] * (width - len(line))] for line in cells] + [[""] * width for _ in range(height - len(cells))]
+    for i, line in enumerate(new):
+        grown[row + i][column : column + len(line)] = [cell.strip() for cell in line]
+    return grown
+
+
+def to_csv(cells: Sequence[Sequence[str]]) -> str:
+    """Return typed cells as CSV, without columns that are empty below their heading; empty where nothing is typed."""
+    filled = [i for i, _ in enumerate(cells[0]) if any(line[i].strip() for line in cells[1:])]
+    rows = [[line[i].strip() for i in filled] for line in cells]
+    last = max((number for number, line in enumerate(rows) if any(line)), default=0)
+    if not filled or last == 0:
+        return ""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows[: last + 1])
+    return stream.getvalue()
+
+
+class TypedSheet:
+    """The cells on the page of a draft.
+
+    Args:
+        draft: Which keeps them.
+        look_again: Called when one has changed.
+    """
+
+    def __init__(self, draft: Draft, look_again: Callable[[], Awaitable[None]]) -> None:
+        self._draft, self._look_again = draft, look_again
+        self._inputs: dict[tuple[int, int], Element] = {}
+        if not draft.typed:
+            draft.typed = [list(_HEADINGS), *([""] * len(_HEADINGS) for _ in range(_ROWS))]
+
+    def show(self) -> None:
+        """Show the cells below their headings."""
+        text("The first row holds the headings, with units. Cells can be pasted from a spreadsheet.", classes="hint")
+        with block("div", "wide", role="region", tabindex="0", aria_label="Table to type in"):
+            self._place = block("table", "sheet")
+        button("More rows", self._add_rows)
+        self._draw()
+
+    def mark(self, refusals: Sequence[Refusal]) -> None:
+        """Mark the cells that refusals speak of."""
+        wrong = {(refusal.row - 1, refusal.column): refusal.sentence for refusal in refusals if refusal.file == FILE}
+        for (row, column), made in self._inputs.items():
+            sentence = wrong.get((row, self._draft.typed[0][column].strip()), "")
+            made.props["aria-invalid"], made.props["title"] = str(bool(sentence)).lower(), sentence
+            made.update()
+
+    def _draw(self) -> None:
+        """Draw all cells anew."""
+        self._place.clear()
+        self._inputs = {}
+        with self._place, block("tbody"):
+            for row, line in enumerate(self._draft.typed):
+                with block("tr"):
+                    for column, cell in enumerate(line):
+                        self._draw_cell(row, column, cell)
+
+    def _draw_cell(self, row: int, column: int, cell: str) -> None:
+        """Draw one cell."""
+
+        async def change(typed: str) -> None:
+            self._draft.typed[row][column] = typed
+            await self._write()
+
+        async def paste(event: Any) -> None:
+            words, at_row, at_column = event.args
+            self._draft.typed = paste_cells(self._draft.typed, str(words), int(at_row), int(at_column))
+            self._draw()
+            await self._write()
+
+        with block("th" if row == 0 else "td"):
+            label = f"Heading of column {column + 1}" if row == 0 else f"Row {row}, column {column + 1}"
+            made = text_input(f"cell-{row}-{column}", cell, change, label=label)
+            made.props["data-row"], made.props["data-column"] = row, column
+            made.on("paste", paste, js_handler=_PASTED)
+        self._inputs[row, column] = made
+
+    def _add_rows(self) -> None:
+        width = len(self._draft.typed[0])
+        self._draft.typed += [[""] * width for _ in range(_MORE if len(self._draft.typed) < _MOST_ROWS else 0)]
+        self._draw()
+
+    async def _write(self) -> None:
+        """Write what is typed as a file of the draft, and look at it."""
+        typed = to_csv(self._draft.typed)
+        if typed:
+            self._draft.new_file(FILE).write_text(typed, encoding="utf-8")
+        else:
+            self._draft.remove_file(FILE)
+        await self._look_again()

@@ -12,7 +12,7 @@ from bowdenfit.app.elements import block, button, choice, field, link, markup, t
 from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
 from bowdenfit.app.sheet import FILE as TYPED
 from bowdenfit.app.sheet import TypedSheet
-from bowdenfit.app.workbench import Workbench, refuse_folder_name
+from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.check.verb import check
@@ -71,7 +71,15 @@ def _show_fits(workbench: Workbench) -> None:
     running = [name for name, job in workbench.jobs.items() if job.running]
     if not (fits or running):
         return
-    with section("Fits", "fits"), block("ul", "cards"):
+    with section("Fits", "fits"):
+        if sum(fit.finished for fit in fits) > 1:
+            link("Two cables side by side", "/compare")
+        _show_fit_cards(fits, running)
+
+
+def _show_fit_cards(fits: list[KeptFit], running: list[str]) -> None:
+    """Show a card for each fit."""
+    with block("ul", "cards"):
         for name in dict.fromkeys([*running, *(fit.name for fit in fits)]):
             finished = any(fit.name == name and fit.finished for fit in fits)
             with block("li"):

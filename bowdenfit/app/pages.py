@@ -9,7 +9,8 @@ from nicegui import ui
 from bowdenfit.app.ask import export_file
 from bowdenfit.app.bring import show_data_set, show_draft, show_start
 from bowdenfit.app.frame import frame, refused, style_and_script
-from bowdenfit.app.see import show_fit
+from bowdenfit.app.see import FitPage
+from bowdenfit.app.side_by_side import TwoFitsPage
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.inputs import refuse_special
@@ -53,13 +54,18 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
             await show_data_set(workbench, name)
 
     @ui.page("/fit/{name}")
-    async def fit(name: str) -> None:
+    def fit(name: str) -> None:
         try:
             workbench.results(name)
         except BowdenfitError as error:
             _show_refusal(name, str(error))
         else:
-            await show_fit(workbench, name)
+            FitPage(workbench, name)
+
+
+    @ui.page("/compare")
+    def compare(one: str = "", other: str = "") -> None:
+        TwoFitsPage(workbench, (one, other))
 
 
 def _show_refusal(title: str, sentence: str) -> None:

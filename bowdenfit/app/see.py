@@ -1,13 +1,14 @@
 """The page of a fit: how far it is, then what it says."""
 
-from collections.abc import Awaitable, Callable
+from functools import partial
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from bowdenfit.app.ask import show_arriving, show_files, show_next
-from bowdenfit.app.elements import block, button, choice, field, link, markup, text
+from bowdenfit.app.elements import block, button, choice, field, markup, text
 from bowdenfit.app.fit_job import FitJob
 from bowdenfit.app.frame import attempt, frame, refused, section
 from bowdenfit.app.workbench import Workbench
@@ -22,88 +23,97 @@ from bowdenfit.verb import Reply
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
-Again: TypeAlias = Callable[[], Awaitable[None]]
 FIGURES_TITLE, NEXT_TITLE = "Figures", "What to measure next"  # of sections of the report that have their own places here
 _TICK = 0.5  # s between two looks at a fit that runs; a judgement
 
 
-async def show_fit(workbench: Workbench, name: str) -> None:
-    """Show a fit: while it runs its stage and clock, and then its answer."""
-    with frame(name):
-        place = block("div")
-        with place:
-            text("Reading ...")
+class FitPage:
+    """The page of a fit, drawn anew when the fit ends or goes on.
 
-    async def show() -> None:
-        place.clear()
-        job = workbench.jobs.get(name)
-        with place:
+    Args:
+        workbench: Where the fit is.
+        name: Of the fit.
+    """
+
+    def __init__(self, workbench: Workbench, name: str) -> None:
+        self._workbench, self._name = workbench, name
+        self._running: tuple[tuple[ui.html, ui.html, ui.html], FitJob] | None = None
+        with frame(name):
+            self._place = block("div")
+            with self._place:
+                text("Reading ...")
+            ui.timer(0.05, self.show, once=True)
+            ui.timer(_TICK, self._look)  # outside of what is drawn anew, with which it would end
+
+    async def show(self) -> None:
+        """Show the fit: while it runs its stage and clock, and then its answer."""
+        self._place.clear()
+        self._running, job = None, self._workbench.jobs.get(self._name)
+        with self._place:
             if job is not None and (job.running or job.refusal or job.cancelled):
-                _show_job(workbench, name, job, show)
-            elif (workbench.results(name) / FIT_FILE).is_file():
-                await _show_answer(workbench, name)
+                self._show_job(job)
+            elif (self._workbench.results(self._name) / FIT_FILE).is_file():
+                await _show_answer(self._workbench, self._name)
             else:
-                _show_interrupted(workbench, name, show)
+                self._show_interrupted()
 
-    ui.timer(0.05, show, once=True)
-
-
-def _show_job(workbench: Workbench, name: str, job: FitJob, show: Again) -> None:
-    """Show a fit that runs, or why it ended without an answer."""
-    if not job.running:
-        if job.refusal:
-            refused(job.refusal)
-        elif job.cancelled:
-            text("It was cancelled; what was sampled is kept.")
-        if (workbench.results(name) / FIT_FILE).is_file():
-            link("See the earlier answer", f"/fit/{name}")
-        _show_interrupted(workbench, name, show)
-        return
-    with section("Being fitted", "running"):
-        with block("div", "stage", role="status"):
-            stage = text(job.stage, "span", "state")
-            progress = text(job.progress, "span")
-            clock = text(_clock(job.seconds), "span", "clock")
-        with block("div", "row"):
-            button("Cancel", lambda: workbench.compute(job.cancel))
-        text("It goes on if this page is closed; what is sampled is kept.", classes="hint")
-
-    async def look() -> None:
-        if not job.running:
-            timer.cancel()
-            await show()
+    async def _look(self) -> None:
+        """Show how far the fit is."""
+        if self._running is None:
             return
-        for element, words in ((stage, job.stage), (progress, job.progress), (clock, _clock(job.seconds))):
-            element.set_content(words)
+        elements, job = self._running
+        if not job.running:
+            await self.show()
+            return
+        for element, words in zip(elements, (job.stage, job.progress, _clock(job.seconds)), strict=True):
+            element.set_content(escape(words))
 
-    timer = ui.timer(_TICK, look)
+    def _show_job(self, job: FitJob) -> None:
+        """Show a fit that runs, or why it ended without an answer."""
+        if not job.running:
+            if job.refusal:
+                refused(job.refusal)
+            elif job.cancelled:
+                text("It was cancelled; what was sampled is kept.")
+            self._show_interrupted()
+            return
+        with section("Being fitted", "running"):
+            with block("div", "stage", role="status"):
+                stage = text(job.stage, "span", "state")
+                progress = text(job.progress, "span")
+                clock = text(_clock(job.seconds), "span", "clock")
+            with block("div", "row"):
+                button("Cancel", lambda: self._workbench.compute(job.cancel))
+            text("It goes on if this page is closed; what is sampled is kept.", classes="hint")
+        self._running = (stage, progress, clock), job
+
+    def _show_interrupted(self) -> None:
+        """Show how an interrupted fit goes on."""
+        names, job = self._workbench.data_sets(), self._workbench.jobs.get(self._name)
+        if not names:
+            text("The data set that it is of does not lie in this folder any more.")
+            return
+        before = next((one for one in names if job is not None and self._workbench.data_set(one) == job.request.dataset), None)
+        fitting = [one for one in names if self._name.startswith(self._workbench.title_of(one))]
+        likely = before or max(fitting, key=len, default=names[0])
+        chosen = {"name": likely}
+
+        async def start(resume: bool) -> None:
+            request = partial(self._workbench.start_fit, self._name, chosen["name"], resume=resume, force=not resume)
+            if await attempt(request):
+                await self.show()
+
+        with section("This fit has no answer yet", "interrupted"):
+            with field("Data set that it is of", "data-set"):
+                options = [(one, self._workbench.title_of(one)) for one in names]
+                choice("data-set", likely, options, lambda one: chosen.update(name=one))
+            with block("div", "row"):
+                button("Resume", lambda: start(True), "primary")
+                button("Start over", lambda: start(False))
 
 
 def _clock(seconds: float) -> str:
     return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
-
-
-def _show_interrupted(workbench: Workbench, name: str, show: Again) -> None:
-    """Show how an interrupted fit goes on."""
-    names = workbench.data_sets()
-    if not names:
-        return
-    job = workbench.jobs.get(name)
-    before = next((one for one in names if job is not None and workbench.data_set(one) == job.request.dataset), None)
-    likely = before or max((one for one in names if name.startswith(workbench.title_of(one))), key=len, default=names[0])
-    chosen = {"name": likely}
-
-    async def start(resume: bool) -> None:
-        if await attempt(lambda: workbench.start_fit(name, chosen["name"], resume=resume, force=not resume)):
-            await show()
-
-    with section("This fit has no answer yet", "interrupted"):
-        with field("Data set that it is of", "data-set"):
-            options = [(one, workbench.title_of(one)) for one in names]
-            choice("data-set", likely, options, lambda one: chosen.update(name=one))
-        with block("div", "row"):
-            button("Resume", lambda: start(True), "primary")
-            button("Start over", lambda: start(False))
 
 
 async def _show_answer(workbench: Workbench, name: str) -> None:

@@ -55,6 +55,7 @@
         ["Zoom in", "+", () => this.zoom(1 / STEP)], ["Zoom out", "\u2212", () => this.zoom(STEP)], ["Show all", "All", () => this.whole()],
       ]) make("button", this.tools, { type: "button", textContent: name, title: words, ariaLabel: words, onclick: act });
       this.swap = make("button", this.tools, { type: "button", className: "swap", onclick: () => this.show(this.area.hidden) });
+      this.swap.hidden = !this.drawing.firstElementChild;
       this.area = make("div", box, { className: "area", tabIndex: 0 });
       this.area.setAttribute("role", "application");
       this.area.setAttribute("aria-label", "Chart. Left and right arrow read values, plus and minus zoom, zero shows all.");

@@ -52,13 +52,13 @@ def render_section(section: PageSection, addresses: Mapping[str, str]) -> str:
 
     Args:
         section: What is shown.
-        addresses: Where its drawings are, by name; a figure without one is left out.
+        addresses: Where its drawings are, by name; empty for a figure that is charts alone; one without is left out.
     """
     shown_section = section.with_pictures(addresses)
     pieces = _render_body(_make_environment(), shown_section).split(_MARK)
     for i, picture in enumerate(shown_section.pictures):
         alt, source = escape(printable(picture.title)), escape(addresses[picture.name])
-        pieces[2 * i + 1] = f'<img class="wide" alt="{alt}" src="{source}" loading="lazy">'
+        pieces[2 * i + 1] = f'<img class="wide" alt="{alt}" src="{source}" loading="lazy">' if source else ""
     return "".join(pieces)
 
 

@@ -171,7 +171,8 @@ def main() -> None:
     rows, wrong = [], False
     for kind in options.kinds or KINDS:
         ends = try_kind(kind, options.benches, options.verdicts, options.seed)
-        wrong = wrong or ends["refused"] > 0 or binom.sf(ends["not trusted"] - 1, ends["judged"], RATE) < CHANCE
+        too_many = binom.sf(ends["not trusted"] - 1, ends["judged"], RATE) < CHANCE
+        wrong = wrong or ends["refused"] > 0 or bool(too_many)
         rows.append((kind, *(str(ends[end]) for end in ("read", "refused", "judged", "not trusted"))))
         print(" | ".join(rows[-1]), flush=True)
     print("\n" + table(("kind", "read", "refused", "judged", "not trusted"), rows))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from kills.blow import Blow
 from kills.jobs import START
-from kills.runs import Known
+from kills.runs import LONGEST, Known
 
 PYTHONS = "Could not import runpy module", "Fatal Python error: init_import_site"  # how it ends where it has just begun
 OURS = re.compile(r"Interrupted|Error: |Warning: |Wrote |\S+ holds the whole fit, but ")  # how what is said begins
@@ -46,7 +46,11 @@ def go_on(blow: Blow, known: Known, folder: Path) -> None:
         blow.said += ", and nothing is left"
         return
     more = ["--resume"] if (folder / job.kept).exists() else ["--force"] if any(folder.iterdir()) else []
-    again = subprocess.run(job.command(folder, *more), capture_output=True, text=True, check=False, timeout=300)
+    try:
+        again = subprocess.run(job.command(folder, *more), capture_output=True, text=True, check=False, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        blow.wrong = f"which goes on for more than {LONGEST:g} s"
+        return
     blow.said += f", then {more[0] if more else 'anew'}"
     if again.returncode not in {0, 3}:
         blow.wrong = f"which ended with {again.returncode}: {again.stderr[-200:]}"

@@ -20,6 +20,7 @@ HEAR = (
     "r.setrlimit(r.RLIMIT_DATA, (int(sys.argv[1]),) * 2); os.execv(sys.argv[2], sys.argv[2:])"
 )
 MUCH = 1100e6  # bytes, with which a fit has enough
+LONGEST = 1800.0  # s that anything may take, on a machine that others keep busy; a judgement
 
 
 @dataclass
@@ -74,13 +75,13 @@ class Watched:
     def end(self) -> tuple[str, str]:
         """What it prints; waits for it, and ends it where its output stays open."""
         try:
-            said = self.process.communicate(timeout=60)
+            said = self.process.communicate(timeout=LONGEST)
             if self.process.returncode in {0, 3} and len(self.began) == len(PHASES):
                 self.began.append(time.monotonic())  # which ends the last
             return said
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, signal.SIGKILL)
-            return "", "its output stayed open for 60 s"
+            return "", f"its output stayed open for {LONGEST:g} s"
 
 
 def run_whole(job: Job, folder: Path) -> Known:

@@ -224,3 +224,25 @@ def test_a_fit_whose_report_cannot_be_written_is_kept(on_body, tmp_path, monkeyp
 def test_a_fit_by_itself_needs_a_file_for_its_report(recorded, tmp_path):
     with pytest.raises(bf.UsageError, match="name a file for the report"):
         bf.report(bf.load(recorded))
+
+
+def test_the_report_says_what_changed_since_an_earlier_fit(routed, recorded, tmp_path):
+    same = bf.report(routed, tmp_path / "same.html", compare=routed).read_text()
+    assert "What changed" in same and "The input files are the same." in same
+    assert same.count("optimal_length") > 1
+    other = bf.report(routed, tmp_path / "other.html", compare=recorded).read_text()
+    assert "New: efficiencies.csv." in other and "No longer read: " in other and "In the description: " in other
+    assert "What changed" not in (routed / REPORT).read_text()
+
+
+def test_on_a_phone_panels_stand_below_each_other_and_a_cut_table_has_a_shadow(chromium, routed):
+    """The shadow of what scrolls is at its right end until it is scrolled there; what fits has none."""
+    shade = "e => getComputedStyle(e).backgroundImage.includes('gradient') && e.scrollWidth > e.clientWidth"
+    with opened(chromium, routed / REPORT, width=390) as reader:
+        ratio = "e => e.naturalHeight / e.naturalWidth"
+        assert reader.page.locator("#figure-wrap_angles img").evaluate(ratio) > 1
+        assert reader.page.locator("#figure-pairs").is_visible()
+        assert reader.page.locator(".part-coefficients .wide").first.evaluate(shade)
+        assert reader.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    with opened(chromium, routed / REPORT, width=1200) as reader:
+        assert reader.page.locator("#figure-wrap_angles img").evaluate(ratio) < 1

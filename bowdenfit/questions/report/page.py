@@ -27,6 +27,7 @@ from bowdenfit.questions.next.answer import NextMeasurement
 from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import ranking_section
 from bowdenfit.questions.recorded.recordings_figure import describe_recordings_charts, make_recordings_charts
+from bowdenfit.questions.report.changes import changes_section
 from bowdenfit.questions.summary.methods import methods_section
 from bowdenfit.questions.summary.sections import (
     answer_section,
@@ -44,8 +45,9 @@ from bowdenfit.results.store import load
 
 ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, budget_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
+_PHONE, _PHONE_WIDTHS = 3.0, {"pairs": 3.6}  # in, so that panels stand one below the other and letters can be read
 FIRST = ("efficiency",)  # the answer
-FOLDED = ("coefficients", "pairs", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
+FOLDED = ("coefficients", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
 CHARTS: dict[str, tuple[Callable[[Any], tuple[Chart, ...]], Callable[[Any], str]]] = {  # charts of a figure, and their caption
     "efficiency": (make_efficiency_chart, describe_efficiency_chart),
     "recordings": (make_recordings_charts, describe_recordings_charts),
@@ -71,29 +73,35 @@ def _figure_picture(name: str, data: Any) -> Picture:
     return Picture(name, heading, caption, make_charts(data), describe_charts(data), folded)
 
 
-def report_page(fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None) -> HtmlPage:
+def report_page(
+    fit: Record, figures: dict[str, Any], ranking: NextMeasurement | None = None, changes: PageSection | None = None
+) -> HtmlPage:
     """Return the report of a fit.
 
     Args:
         fit: The fit.
         figures: Data of the figures that are on it, by name.
         ranking: What to measure next; a sentence says how to ask if omitted.
+        changes: What changed since an earlier fit; nothing is said of any if omitted.
     """
-    above, below = ([make_section(fit) for make_section in group] for group in (ABOVE_FIGURES, BELOW_FIGURES))
+    (answer, *above), below = ([make_section(fit) for make_section in group] for group in (ABOVE_FIGURES, BELOW_FIGURES))
     following = next_step_section(fit) if ranking is None else ranking_section(ranking)
-    sections = [*above, figures_section(figures), checks_section(fit), following, *below]
+    sections = [answer, changes, *above, figures_section(figures), checks_section(fit), following, *below]
     when = f", {fit.provenance.created[:10]}" if fit.provenance.created else ""
     subtitle = f"Report of a fit by bowdenfit {fit.provenance.versions.get('bowdenfit', '')}{when}"
     return HtmlPage(fit.name, subtitle, tuple(section for section in sections if section is not None))
 
 
-def write_report(fit: Record | str | Path, output: str | Path | None, rank_next: bool = False) -> Path:
+def write_report(
+    fit: Record | str | Path, output: str | Path | None, rank_next: bool = False, earlier: Record | str | Path | None = None
+) -> Path:
     """Write the report of a fit to one HTML file.
 
     Args:
         fit: The fit, or its results folder.
         output: The file, or a folder for report.html; the results folder if None.
         rank_next: Whether to rank what could be measured next.
+        earlier: A fit, or its results folder, since which it is said what changed.
 
     Returns:
         The file written.
@@ -113,8 +121,31 @@ def write_report(fit: Record | str | Path, output: str | Path | None, rank_next:
     ranking = rank_measurements(fit) if rank_next else None
     figures, path, mark = figures or dict(collect_figure_data(fit)), Path(output), warning_mark(assess_fit(fit).troubles)
     path = path / REPORT if path.is_dir() else path
+    changes = changes_section(fit, *_load_earlier(earlier)) if earlier is not None else None
     with guard, file_to_write(path) as temporary, TemporaryDirectory() as figures_folder:
         for name, data in figures.items():
             write_figure_files(name, data, Path(figures_folder), (PNG,), fit.name, mark=mark)
-        write_page(report_page(fit, figures, ranking), Path(figures_folder), temporary)
+        narrow = draw_for_phones(figures, mark)
+        write_page(report_page(fit, figures, ranking, changes), Path(figures_folder), temporary, narrow)
     return path
+
+
+def _load_earlier(earlier: Record | str | Path) -> tuple[Record, str]:
+    """Return an earlier fit and its name."""
+    return (load(Path(earlier)), str(earlier)) if isinstance(earlier, str | Path) else (earlier, earlier.name)
+
+
+def draw_for_phones(figures: dict[str, Any], mark: str) -> dict[str, bytes]:
+    """Return narrow drawings, of panels one below the other, of the figures that a report shows without charts.
+
+    Args:
+        figures: Data by name.
+        mark: See `warning_mark`.
+    """
+    with TemporaryDirectory() as folder:
+        names = [name for name in figures if name not in FOLDED and name not in CHARTS]
+        files = {
+            name: write_figure_files(name, figures[name], Path(folder), (PNG,), "", _PHONE_WIDTHS.get(name, _PHONE), mark)
+            for name in names
+        }
+        return {name: file.read_bytes() for name, (file, *_) in files.items()}

@@ -20,6 +20,7 @@ def report(
     output: Annotated[Output, Parameter(metavar="FILE", show_default="RESULTS/report.html")] = None,
     *,
     ranked: Annotated[bool, Parameter("--next")] = False,
+    compare: Annotated["Record | str | Path | None", PATH, Parameter(metavar="EARLIER")] = None,
 ) -> Path:
     """Write everything that a fit found on one page: a file that stands alone, to read in a browser, print and hand on.
 
@@ -27,6 +28,7 @@ def report(
         fit: The fit, or its results folder.
         output: The file, one that is there is replaced; or a folder for report.html.
         ranked: Rank what could be measured next too, which takes a few seconds.
+        compare: An earlier fit, or its results folder: the report says what changed since.
 
     Returns:
         The file written.
@@ -35,7 +37,7 @@ def report(
         UsageError: A fit is given without a file.
         StoreError: The results folder is missing or damaged, or the file cannot be written.
     """
-    return room.write_report(fit, output, rank_next=ranked)
+    return room.write_report(fit, output, rank_next=ranked, earlier=compare)
 
 
 def _reply(path: Path, _: Mapping[str, Any]) -> Reply:

@@ -25,6 +25,7 @@ from bowdenfit.plots.layout import (
 )
 from bowdenfit.plots.style import BLUE, LEAST, SMALL, WIDE, in_paper_style
 from bowdenfit.questions import summary
+from bowdenfit.words import decimals
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
@@ -39,6 +40,7 @@ LEFT, BOTTOM, GAP = 0.62, 0.62, 0.09  # in, margins at least, and between panels
 NAMES = 0.38  # in, of the left margin, for names in two lines and the marks of the axis
 UPRIGHT = 0.07  # in, height of a number that does not stand upright
 LARGEST, SMALLEST = 1.45, 0.66  # in, of a panel with its gap
+HEADROOM = 1.55  # height of a panel on the diagonal over that of its highest bar
 MARK = 0.26  # in, of a color in the key, with the gap to its words
 BINS = 32  # of each axis, in two dimensions
 SMOOTHING = 6.5  # bins, of one draw; less of n by the rate of the best kernel in two dimensions, n to the power of -1/6
@@ -97,8 +99,8 @@ def caption(data: Pairs) -> str:
     return (
         "Every two parameters of the posterior against each other, and the distribution of each on the diagonal. Dark and "
         "light blue: the smallest areas that hold the truth with 68 % and 95 % probability; a long slanted area means that two "
-        "parameters are correlated: the measurements determine a combination of them better than either. Dashed: median and "
-        "90 % interval. "
+        "parameters are correlated: the measurements determine a combination of them better than either. Dashed, and "
+        "written above: median and 90 % interval. "
         f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
         f"n = {data.quantities[0].draws.size} draws from the posterior."
     )
@@ -126,7 +128,7 @@ def draw(data: Pairs, width: float | None = None) -> Figure:
         axes.xaxis.set_visible(row == n - 1)
         axes.yaxis.set_visible(row > column == 0)
         if row == column:
-            _draw_marginal(axes, quantities[row])
+            _draw_marginal(axes, quantities[row], size - GAP)
         else:
             axes.set_ylim(quantities[row].limits(SHARE))
             _draw_credible_regions(axes, quantities[column], quantities[row])
@@ -150,14 +152,22 @@ def _height_of_upright_numbers(quantities: list[SampledQuantity], width: float) 
     return max(text_width(text, LEAST) for q in quantities for text in ticks_left(q.limits(SHARE), width)[1])
 
 
-def _draw_marginal(axes: Axes, quantity: SampledQuantity) -> None:
-    """Draw the histogram of a quantity, with its median and 90 % interval."""
+def _draw_marginal(axes: Axes, quantity: SampledQuantity, width: float) -> None:
+    """Draw the histogram of a quantity, and above it its median and 90 % interval, as far as a panel of some width [in] has
+    room.
+    """
     n_bins = round(2 * quantity.draws.size ** (1 / 3))  # Rice's rule
     axes.hist(
         quantity.draws.ravel(), n_bins, range=axes.get_xlim(), histtype="stepfilled", facecolor=FILLS[0.95], edgecolor=BLUE
     )
-    for value in np.quantile(quantity.draws, (0.05, 0.5, 0.95)):
-        axes.axvline(value, color=BLUE, linewidth=0.7, linestyle="--")
+    low, median, high = np.quantile(quantity.draws, (0.05, 0.5, 0.95))
+    for value in (low, median, high):
+        axes.axvline(value, 0, 1 / HEADROOM, color=BLUE, linewidth=0.7, linestyle="--")
+    digits = decimals(high - low, median)
+    interval = f"{low:z.{digits}f} to {high:z.{digits}f}"
+    texts = [f"{median:z.{digits}f}", *([interval] if text_width(interval, LEAST) < width else [])]
+    axes.set_ylim(0, HEADROOM * axes.get_ylim()[1])
+    axes.text(0.5, 0.97, "\n".join(texts), transform=axes.transAxes, ha="center", va="top", fontsize=LEAST, linespacing=1.1)
 
 
 def _draw_credible_regions(axes: Axes, across: SampledQuantity, up: SampledQuantity) -> None:

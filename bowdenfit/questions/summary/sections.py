@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.pages.section import PageSection, PageTable, prose_section
 from bowdenfit.questions.check.answer import check_readings
@@ -31,6 +33,7 @@ from bowdenfit.results.record import Record
 from bowdenfit.words import counted
 
 _HEADS = ("coefficient", "value", "90 % interval", "unit", "what it is")
+_MOST_CORRELATED = 30  # parameters in a table of correlations
 _MOST_READINGS = 400  # readings in a table that someone may look through
 
 
@@ -69,8 +72,25 @@ def measured_section(fit: Record) -> PageSection:
 def coefficients_section(fit: Record) -> PageSection | None:
     """Return the coefficients of friction and of the rope; None where every one is stated."""
     rows = tuple((q.name, q.value, q.interval, q.unit, q.description) for q in key_quantities(fit))
-    folded = [("Every parameter, with what was assumed beforehand", parameters_text(fit)), ("Groups", groups_text(fit))]
+    folded: list[tuple[str, str | PageTable]] = [
+        ("Every parameter, with what was assumed beforehand", parameters_text(fit)),
+        ("Groups", groups_text(fit)),
+    ]
+    if fit.sampled is not None:
+        folded.append(("Correlations of all parameters", _correlation_table(fit)))
     return prose_section("Coefficients", (), [PageTable(_HEADS, rows, left=(0, 3, 4))], folded=folded) if rows else None
+
+
+def _correlation_table(fit: Record) -> PageTable:
+    """Return the correlations of the draws of all parameters, below the diagonal."""
+    draws = fit.posterior.values
+    names = [p.name for p in fit.model.space.free][:_MOST_CORRELATED]
+    matrix = np.atleast_2d(np.corrcoef([draws[name].ravel() for name in names]))
+    rows = tuple(
+        (name, *(f"{matrix[i, k]:z.2f}" for k in range(i)), "1", *([""] * (len(names) - i - 1))) for i, name in enumerate(names)
+    )
+    caption = "Close to 1 or -1: the readings determine a combination of the two, hardly each alone."
+    return PageTable(("", *names), rows, caption)
 
 
 def checks_section(fit: Record) -> PageSection | None:

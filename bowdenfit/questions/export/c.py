@@ -62,6 +62,7 @@ def c_header(tables: TransmissionTables) -> str:
         law=fill_template("loop.h" if tables.is_loop else "rope.h"),
         of_turns=int(tables.builds_up),
         motion=_format_motion(tables),
+        track="" if tables.is_loop else fill_template("track.h"),
     )
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _FILE = "the name of the cable, in this folder"
 _PLACE = Parameter(metavar="PLACE", show_default="the middle of the range")
-Target = Literal["c", "fmu", "mujoco", "matlab", "yaml", "csv"]
+Target = Literal["c", "fmu", "mujoco", "matlab", "python", "yaml", "csv"]
 
 
 @read_first
@@ -70,16 +70,17 @@ def _reply(answer: "ExportedFile", _: Mapping[str, Any]) -> Reply:
 VERB = Verb(
     export,
     _reply,
-    """Write a fitted cable for C, MuJoCo, FMI, MATLAB, ROS or as CSV.
+    """Write a fitted cable for C, MuJoCo, FMI, MATLAB, Python, ROS or as CSV.
 
     The file tabulates friction over lengths or wrap angles, with quantiles of the
     cable's mean and of any one mounting.
 
       c       a header (C99): output force, input force, friction while moving to
-              and fro, compensation
+              and fro, compensation; of a rope also friction followed online
       mujoco  a loop that stays taut as MJCF (cable.xml), or any cable whose stretch
               is known as a callback (--output cable.py)
       matlab  a function for MATLAB and Octave with the same answers
+      python  a module without dependencies, with what the header has
       fmu     a functional mock-up unit (FMI 2.0, co-simulation) of that header,
               compiled here, with its sources
       yaml    parameters of a controller, as ROS 2 reads them: friction by place,

@@ -14,6 +14,7 @@ from bowdenfit.questions.compensate.limits import estimate_compensation, parse_r
 from bowdenfit.questions.export.c import build_fmu, c_header
 from bowdenfit.questions.export.matlab import function_name, matlab_function
 from bowdenfit.questions.export.mujoco import mujoco_model
+from bowdenfit.questions.export.python import python_module
 from bowdenfit.questions.export.tables import (
     DRAW,
     LEVELS,
@@ -90,11 +91,20 @@ _ENDINGS: Mapping[str, str] = {
     "fmu": ".fmu",
     "matlab": ".m",
     "mujoco": ".xml",
+    "python": ".py",
     "yaml": ".yaml",
 }
-_OF_TURNS = ("c", "csv", "matlab")  # which have friction that builds up after a turn
+_OF_TURNS = ("c", "csv", "matlab", "python")  # which have friction that builds up after a turn
 NAMES: Mapping[str, str] = MappingProxyType(
-    {"c": "a C header", "csv": "CSV", "fmu": "an FMU", "matlab": "MATLAB", "mujoco": "MuJoCo", "yaml": "YAML"}
+    {
+        "c": "a C header",
+        "csv": "CSV",
+        "fmu": "an FMU",
+        "matlab": "MATLAB",
+        "mujoco": "MuJoCo",
+        "python": "Python",
+        "yaml": "YAML",
+    }
 )
 
 
@@ -114,7 +124,7 @@ def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
     if unsupported and (to != "csv" or draws):
         raise UsageError(
             f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unsupported)}; export "
-            "the lookup table instead, with --to csv, or a program that has a state for it, with --to c or --to matlab."
+            "the lookup table instead, with --to csv, or a program that has a state for it, with --to c, matlab or python."
         )
 
 
@@ -240,6 +250,10 @@ def _write_mujoco(request: ExportRequest) -> FileContent:
     return FileContent(text.encode("ascii"), remarks)
 
 
+def _write_python(request: ExportRequest) -> FileContent:
+    return FileContent(python_module(request.tables).encode("ascii"))
+
+
 def _write_yaml(request: ExportRequest) -> FileContent:
     return FileContent(yaml_parameters(request.tables, request.compensation).encode("ascii"))
 
@@ -251,6 +265,7 @@ WRITERS: Mapping[str, Callable[[ExportRequest], FileContent]] = MappingProxyType
         "fmu": _write_fmu,
         "matlab": _write_matlab,
         "mujoco": _write_mujoco,
+        "python": _write_python,
         "yaml": _write_yaml,
     }
 )

@@ -148,4 +148,4 @@ static inline double bowden_compensation(double place, double speed, double outp
     return bowden_input(BOWDEN_MOUNTING_Q05, place, speed, output_force, stroke, flags) - output_force;
 }
 
-#endif
+$track#endif

@@ -280,6 +280,7 @@ async def show_data_set(workbench: Workbench, name: str) -> None:
         with section("Fit it", "fit"):
             with block("div", "row"):
                 button("Fit", lambda: attempt(start), "primary")
+                link("Live: fit again after each mounting", f"/live/{name}", "button")
             with block("details"):
                 text("Name and seed", "summary")
                 with field("Kept as fits/", "fit-name"):

@@ -9,6 +9,7 @@ from nicegui import ui
 from bowdenfit.app.ask import export_file
 from bowdenfit.app.bring import show_data_set, show_draft, show_start
 from bowdenfit.app.frame import frame, refused, style_and_script
+from bowdenfit.app.live import LivePage
 from bowdenfit.app.see import FitPage
 from bowdenfit.app.side_by_side import TwoFitsPage
 from bowdenfit.app.workbench import Workbench
@@ -62,6 +63,15 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
         else:
             FitPage(workbench, name)
 
+
+    @ui.page("/live/{name}")
+    def live(name: str) -> None:
+        try:
+            workbench.data_set(name)
+        except BowdenfitError as error:
+            _show_refusal(name, str(error))
+        else:
+            LivePage(workbench, name)
 
     @ui.page("/compare")
     def compare(one: str = "", other: str = "") -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
 from threading import Event
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import bowdenfit as bf
 from bowdenfit.app.draft import Draft
@@ -50,6 +50,14 @@ class KeptFit:
     finished: bool
 
 
+class Watched(Protocol):
+    """A data set that is watched."""
+
+    def stop(self) -> None:
+        """Watch it no longer."""
+        ...
+
+
 class Workbench:
     """The folder of the app, the same for all tabs.
 
@@ -62,6 +70,7 @@ class Workbench:
         self.folder, self.stop = folder.resolve(), stop
         self.jobs: dict[str, FitJob] = {}
         self.drafts: dict[str, Draft] = {}
+        self.watched: dict[str, Watched] = {}
         self._temporary = TemporaryDirectory(prefix="bowdenfit-", ignore_cleanup_errors=True)  # of drafts
         self._open: dict[str, tuple[int, Fit]] = {}
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="answers")  # one, as libraries of files are not made for more
@@ -188,6 +197,8 @@ class Workbench:
         for job in self.jobs.values():
             if job.running:
                 job.cancel()
+        for bench in self.watched.values():
+            bench.stop()
         self._thread.shutdown(wait=False, cancel_futures=True)
         self._temporary.cleanup()
 

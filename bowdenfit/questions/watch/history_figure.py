@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.pages.section import Chart, Series, SeriesGroup
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import show_plain_numbers
-from bowdenfit.plots.style import BLACK, SERIES_COLORS, axis_label, in_paper_style
+from bowdenfit.plots.style import BLACK, MEDIAN, SERIES_COLORS, WIDE_INTERVAL, axis_label, in_paper_style
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
@@ -64,6 +65,31 @@ def draw(history: History) -> Figure:
     show_plain_numbers(axes, "y")
     legend_above(figure, [axes], columns=4)
     return figure
+
+
+def make_history_charts(history: History) -> tuple[Chart, ...]:
+    """Return the chart of the median with its interval against the number of mountings, or of readings; none of nothing.
+
+    Args:
+        history: With an answer for each number of mountings.
+    """
+    if not history.answers:
+        return ()
+    last = history.answers[-1]
+    count = np.array([one.mountings if last.mountings else one.readings for one in history.answers], dtype=float)
+    intervals = [one.interval for one in history.answers]
+    median, low, high = (np.array([getattr(interval, name) for interval in intervals]) for name in ("median", "q05", "q95"))
+    trusted = np.array([one.trusted is True for one in history.answers])
+    series = (
+        Series(WIDE_INTERVAL, "low", "blue", low),
+        Series(WIDE_INTERVAL, "high", "blue", high),
+        Series(MEDIAN, "line", "blue", median),
+        Series("Trusted", "points", "blue", np.where(trusted, median, np.nan)),
+        Series("Not trusted, or not checked", "hollow", "blue", np.where(trusted, np.nan, median)),
+    )
+    unit = f" ({_unit(last.unit)})" if last.unit else ""
+    what = "Mountings" if last.mountings else "Readings"
+    return (Chart("History", what, f"{last.words[:1].upper()}{last.words[1:]}{unit}", (SeriesGroup(count, series),)),)
 
 
 def _unit(unit: str) -> str:

@@ -1,0 +1,143 @@
+"""A bench that is watched: read and fitted again after each mounting, with the history of the answer on the page."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from bowdenfit.app.elements import block, button, field, markup, text, text_input
+from bowdenfit.app.frame import attempt, frame, section
+from bowdenfit.app.workbench import Workbench
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.pages.page import render_section
+from bowdenfit.pages.section import Picture, prose_section
+from bowdenfit.questions import watch as watch_room
+from bowdenfit.questions.watch.verb import watch
+
+_TICK = 0.5  # s between two looks at what is known; a judgement
+_MOST_LINES = 2000  # of what is printed, that a page keeps; a judgement
+_HEADING = "How the answer became known"
+
+
+class WatchedBench:
+    """One data set that is watched, in a thread of its own.
+
+    Args:
+        folder: The data set.
+        until: Standard deviation to which the answer is to be known, such as "10mm"; empty for what `next` calls enough.
+    """
+
+    def __init__(self, folder: Path, until: str) -> None:
+        self.until, self.printed, self.refusal, self.version = until, "", "", 0
+        self.history: Any = watch_room.History()
+        self._folder, self._stopped = folder, threading.Event()
+        answers = watch(folder, until=until or None, is_stopped=self._stopped.is_set)
+        self._thread = threading.Thread(target=self._follow, args=(answers,), daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it is still watched."""
+        return self._thread.is_alive()
+
+    def stop(self) -> None:
+        """Watch it no longer."""
+        self._stopped.set()
+
+    def _follow(self, answers: Iterator[Any]) -> None:
+        """Keep what is known, and the lines that a terminal shows of it."""
+        try:
+            for piece in watch_room.watch_lines(self._kept(answers), self._folder.name):
+                lines = f"{self.printed}{piece}".splitlines(keepends=True)
+                self.printed, self.version = "".join(lines[-_MOST_LINES:]), self.version + 1
+        except BowdenfitError as error:
+            self.refusal = str(error)
+        self.version += 1
+
+    def _kept(self, answers: Iterator[Any]) -> Iterator[Any]:
+        """Yield answers, which the history has from then on."""
+        for answer in answers:
+            if isinstance(answer, watch_room.WatchedAnswer):
+                self.history = self.history.add(answer)
+            yield answer
+
+
+class LivePage:
+    """The page of a data set that is, or can be, watched.
+
+    Args:
+        workbench: Where it lies.
+        name: Of the data set.
+    """
+
+    def __init__(self, workbench: Workbench, name: str) -> None:
+        self._workbench, self._name, self._shown, self._until = workbench, name, -1, ""
+        title = workbench.title_of(name)
+        with frame("Live", ((title, f"/data/{name}"),)):
+            text("Whenever a file of this data set has a new complete row or recording, it is read and fitted again.")
+            self._place = block("div")
+            self._known = block("div")
+            self._draw()
+            ui.timer(_TICK, self._look)
+
+    @property
+    def _bench(self) -> WatchedBench | None:
+        bench = self._workbench.watched.get(self._name)
+        return bench if isinstance(bench, WatchedBench) else None
+
+    def _draw(self) -> None:
+        """Show what can be switched."""
+        self._place.clear()
+        bench = self._bench
+        with self._place:
+            if bench is not None and bench.running:
+                with block("div", "row"):
+                    text("Watching.", classes="state good")
+                    button("Stop watching", self._stop)
+                return
+            with field("Known well enough at a standard deviation of", "until", "such as 10mm; empty for what next calls enough"):
+                text_input("until", self._until, lambda typed: setattr(self, "_until", typed.strip()))
+            with block("div", "row"):
+                button("Watch the bench", lambda: attempt(self._start), "primary")
+
+    def _start(self) -> None:
+        if self._bench is not None and self._bench.running:
+            raise UsageError(f"{self._workbench.title_of(self._name)} is watched already; stop that first.")
+        self._workbench.watched[self._name] = WatchedBench(self._workbench.data_set(self._name), self._until)
+        self._shown = -1
+        self._draw()
+
+    def _stop(self) -> None:
+        if self._bench is not None:
+            self._bench.stop()
+
+    async def _look(self) -> None:
+        """Show what is known by now."""
+        bench = self._bench
+        if bench is None or bench.version == self._shown:
+            return
+        self._shown = bench.version
+        if not bench.running:
+            self._draw()
+        words = await self._workbench.compute(_render_history, bench)
+        self._known.clear()
+        with self._known:
+            if bench.refusal:
+                text(bench.refusal, "p", "fault", role="alert")
+            markup(words, "div", id="history")
+            with section("As the command line prints it", "lines"):
+                text(bench.printed, "pre", tabindex="0", role="log", id="printed")
+
+
+def _render_history(bench: WatchedBench) -> str:
+    """Return what is known, and its history as a chart, as HTML."""
+    history = bench.history
+    if not history.answers:
+        return ""
+    last = history.answers[-1]
+    caption = watch_room.history_figure.caption(history)
+    picture = Picture("history", _HEADING, caption, watch_room.history_figure.make_history_charts(history), caption)
+    headline = last.stop or last.warning
+    return render_section(prose_section(_HEADING, history.sentences(), pictures=(picture,), headline=headline), {"history": ""})

@@ -19,6 +19,10 @@ from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 
 _BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
+_BENCH_WORDS = (
+    "A run is one mounting of the cable: taken off and put on again, it is the next one. The stroke is pull while the motor "
+    "pulls, and return while the load pulls back."
+)
 Again: TypeAlias = Callable[[], Awaitable[None]]
 _HEADS = ("column", "unit", "read as", "first", "last", "lowest", "highest")
 
@@ -218,7 +222,7 @@ def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
         text(f"{file}: cells that cannot be read.")
         with block("div", "wide", role="region", tabindex="0", aria_label=f"Cells of {file}"), block("table", "cells"):
             with block("thead"), block("tr"):
-                for head in ("row", *(heading for heading, _ in refusals[0].cells), "why"):
+                for head in ("row", *(heading for heading, _ in refusals[0].cells)):
                     text(head, "th", scope="col")
             with block("tbody"):
                 for refusal in refusals:
@@ -226,8 +230,8 @@ def _show_refused_rows(file: str, refusals: list[Refusal]) -> None:
                         text(str(refusal.row), "th", scope="row")
                         for heading, cell in refusal.cells:
                             text(cell or "blank", "td", "wrong" if heading == refusal.column else "")
-                        with block("td", "left"):
-                            text(refusal.sentence, "p", "fault")
+                    with block("tr"), block("td", "left", colspan=str(len(refusal.cells) + 1)):
+                        text(refusal.sentence, "p", "fault")
 
 
 def _show_questions(draft: Draft, understanding: Understanding, look_again: Again) -> None:
@@ -240,7 +244,9 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
         await look_again()
 
     with section("What the files do not say", "questions"):
-        markup(_BENCH, "figure", "bench-figure")
+        with block("figure", "bench-figure"):
+            markup(_BENCH, "div")
+            text(_BENCH_WORDS, "figcaption")
         for number, entry in enumerate(understanding.entries):
             key = f"question-{number}"
             with field(entry.words, key, entry.hint, entry.fault or ("" if entry.answer else "An answer is needed here.")):

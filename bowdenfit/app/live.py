@@ -97,7 +97,7 @@ class LivePage:
                     text("Watching.", classes="state good")
                     button("Stop watching", self._stop)
                 return
-            with field("Known well enough at a standard deviation of", "until", "such as 10mm; empty for what next calls enough"):
+            with field("Known well enough at a standard deviation of", "until", "such as 10mm; empty for what next says"):
                 text_input("until", self._until, lambda typed: setattr(self, "_until", typed.strip()))
             with block("div", "row"):
                 button("Watch the bench", lambda: attempt(self._start), "primary")

@@ -1,0 +1,129 @@
+"""Pages beside the way from an empty page to an answer: fits that end early, several tabs, two cables, a watched bench."""
+
+import shutil
+
+import pytest
+from app_in_browser import served, visiting, watch
+from reading_room import FAULTS, browser
+
+import bowdenfit as bf
+
+DESCRIPTION = """schema = 1
+name = "bench"
+[[contact]]
+name = "cable"
+friction = "mu"
+wrap_angle = { value = 180, unit = "deg" }
+[tables]
+forces = { file = "forces.csv" }
+[sampler]
+n_walkers = 64
+target_ess = 200
+target_r_hat = 1.05
+max_steps = 4000
+"""
+ALLOWED = ("acts", "not one header", "not one nav", "not one main", "not one footer")  # what an app has, and a report has not
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A browser; tests are skipped where there is none."""
+    with browser() as program:
+        yield program
+
+
+def write_bench(folder, share, runs=5):
+    """Write a data set of a cable that lets through a share of the force."""
+    folder.mkdir()
+    (folder / "cable.toml").write_text(DESCRIPTION.replace('"bench"', f'"{folder.name}"'))
+    (folder / "forces.csv").write_text("input_force_N,output_force_N,run\n")
+    for run in range(runs):
+        mount(folder, share, run)
+
+
+def mount(folder, share, run):
+    """Write the readings of one more mounting."""
+    with (folder / "forces.csv").open("a") as file:
+        for i, force in enumerate((20, 40, 60)):
+            file.write(f"{force},{share * force * (1 + 0.012 * ((run * 3 + i) % 5 - 2)):.2f},{run}\n")
+
+
+def faults_of(page):
+    """What is wrong with a page: contrast, names of controls, headings, width."""
+    return [fault for fault in page.evaluate(FAULTS) if not fault.startswith(ALLOWED)]
+
+
+@pytest.mark.slow
+def test_a_cancelled_fit_and_one_of_a_killed_app_are_resumed(chromium, tmp_path):
+    write_bench(tmp_path / "bench", 0.75)
+    description = tmp_path / "bench" / "cable.toml"
+    longer = description.read_text().replace("target_ess = 200", "target_ess = 6000").replace("steps = 4000", "steps = 60000")
+    description.write_text(longer)
+    checkpoint = tmp_path / "fits" / "bench" / "chain.checkpoint"
+    with served(tmp_path) as app, visiting(chromium, app) as visit:
+        page = visit.page
+        page.goto(f"{app.root}/data/bench")
+        page.get_by_role("button", name="Fit", exact=True).click()
+        page.get_by_text("sampling with").wait_for(timeout=180_000)
+        page.get_by_role("button", name="Cancel").click()
+        page.get_by_text("It was cancelled").wait_for()
+        assert checkpoint.is_file()
+        page.get_by_role("button", name="Resume").click()
+        page.locator(".stage .clock").wait_for()
+        app.process.kill()
+    with served(tmp_path) as app, visiting(chromium, app) as visit:
+        page = visit.page
+        page.get_by_text("Interrupted; it can be resumed.").wait_for()
+        page.get_by_role("link", name="Open", exact=True).click()
+        page.get_by_role("button", name="Resume").click()
+        page.locator("#answer-text").wait_for(timeout=240_000)
+    assert bf.load(tmp_path / "fits" / "bench").converged
+
+
+@pytest.mark.extended
+def test_two_tabs_show_the_same_and_every_page_can_be_read(chromium, tmp_path, quick_results):
+    write_bench(tmp_path / "bench", 0.75)
+    shutil.copytree(quick_results, tmp_path / "fits" / "on-body")
+    with served(tmp_path) as app, visiting(chromium, app, width=390, color_scheme="dark") as visit:
+        page, other = visit.page, visit.page.context.new_page()
+        watch(visit, other, app)
+        assert faults_of(page) == []
+        page.get_by_role("button", name="New data set").click()
+        page.get_by_text("Or type or paste a table").click()
+        page.get_by_label("Row 1, column 1", exact=True).fill("20")
+        page.get_by_label("Row 1, column 2", exact=True).fill("many")
+        page.keyboard.press("Tab")
+        page.get_by_label("By which angle").fill("180 deg")
+        page.keyboard.press("Tab")
+        page.get_by_text("cells that cannot be read").wait_for()
+        assert page.get_by_label("Row 1, column 2", exact=True).get_attribute("aria-invalid") == "true"
+        assert faults_of(page) == []
+        other.goto(page.url)
+        other.get_by_text("'many' is not a number").wait_for()
+        other.goto(f"{app.root}/fit/on-body")
+        other.locator("#arrives p").first.wait_for()
+        assert faults_of(other) == []
+        other.goto(f"{app.root}/fit/..%2F..")
+        assert other.locator("[role=alert]").count() == 1 or "Not Found" in other.content()
+
+
+@pytest.mark.slow
+def test_two_cables_stand_side_by_side_and_a_bench_is_watched(chromium, tmp_path):
+    for name, share in (("worn", 0.70), ("new", 0.80)):
+        write_bench(tmp_path / name, share)
+        bf.fit(tmp_path / name, output=tmp_path / "fits" / name, seed=1, figures=False)
+    with served(tmp_path) as app, visiting(chromium, app) as visit:
+        page = visit.page
+        page.get_by_role("link", name="Two cables side by side").click()
+        page.locator("#comparison .uplot").wait_for()
+        assert "new minus worn" in page.inner_text("#comparison")
+        assert "different (higher) with probability" in page.inner_text("#comparison")
+        assert faults_of(page) == []
+        page.goto(f"{app.root}/live/worn")
+        page.get_by_role("button", name="Watch the bench").click()
+        page.get_by_text("5 mountings: mu").wait_for(timeout=180_000)
+        mount(tmp_path / "worn", 0.70, 5)
+        page.get_by_text("6 mountings: mu").wait_for(timeout=180_000)
+        assert faults_of(page) == []
+        page.get_by_role("button", name="Stop watching").click()
+        page.get_by_role("button", name="Watch the bench").wait_for()

@@ -43,7 +43,7 @@ def serve_app(folder: Path, port: int, browser: bool, stop: Event, say: Callable
         register_pages(workbench, application)
         ui.run_with(
             application, title="bowdenfit", dark=None, language="en-US", tailwind=False, show_welcome_message=False,
-            reconnect_timeout=10.0,
+            reconnect_timeout=60.0,  # s; JAX loads slowly on a busy machine
         )  # fmt: skip
         address = f"http://{HOST}:{bound}/?key={key}"
         say(f"The app is open at {address}\nCtrl-C ends it.")

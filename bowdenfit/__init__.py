@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from bowdenfit.cable_model import model
+    from bowdenfit.described_cable import Cable, Contact
     from bowdenfit.errors import (
         BowdenfitError,
         ConvergenceError,
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     __version__: str
 
 _WHERE = {
+    "Cable": "bowdenfit.described_cable",
+    "Contact": "bowdenfit.described_cable",
     "Fit": "bowdenfit.finished_fit",
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "check": "bowdenfit.questions.check.verb",
@@ -75,6 +78,8 @@ _WHERE = {
 
 __all__ = [
     "BowdenfitError",
+    "Cable",
+    "Contact",
     "ConvergenceError",
     "DatasetError",
     "DescriptionError",

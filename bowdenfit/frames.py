@@ -23,7 +23,7 @@ def is_frame(value: Any) -> bool:
     return hasattr(value, "columns") and any(hasattr(value, method) for method in ("to_csv", "write_csv"))
 
 
-def write_frame(frame: Any, folder: Path) -> Path:
+def write_frame(frame: Any, folder: Path, name: str = FILE) -> Path:
     """Write a data frame as a table with one row of headings, and return the file.
 
     An index with a name is a column; one without is not. Units that `frame.attrs["units"]` has for columns stand behind their
@@ -32,11 +32,12 @@ def write_frame(frame: Any, folder: Path) -> Path:
     Args:
         frame: See `Frame`.
         folder: Where the file goes.
+        name: Of the file.
 
     Raises:
         UsageError: The columns have several levels of names, or the units are no dictionary.
     """
-    path = folder / FILE
+    path = folder / name
     if not hasattr(frame, "to_csv"):  # polars, which has neither an index nor attrs
         frame.write_csv(path)
         return path

@@ -27,6 +27,18 @@ def accepted(fit: bf.Fit) -> None:
     bf.pool("fits/my-fleet", until="60%", wrap_angles=["mu_sheath=180deg"], cycles=10_000)
     bf.identify("bench.toml", output=Path("answers"))
     fit.plot("efficiency", width=(3.5, "in"))
+    contacts = [bf.Contact("sheath", "mu", wrap_angle=(180, "deg"))]
+    cable = bf.Cable("my cable", contacts, friction_model="load-dependent")
+    data = cable.read(forces={"input force (N)": [20, 40], "output force (N)": np.array([17.2, 34.1])})
+    bf.fit(data, seed=1)
+    bf.model(data).log_likelihood({"mu": 0.1})
+    bf.report(fit, "report.html", compare="fits/before")
+    fit.correlation().round(2)
+    fit.posterior.to_frame()["mu1"].mean()
+    fit.parameter("mu1").median + 1
+    fit.summary()["seed"]
+    bf.check("my-cable")
+    bf.schema("cable")
 
 
 def wrong(fit: bf.Fit) -> None:

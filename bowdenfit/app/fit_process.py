@@ -69,13 +69,13 @@ def _end_with_reader() -> None:
 def _fit(request: dict[str, Any], announcer: Announcer) -> bool:
     """Fit, and return whether the answer may be trusted."""
 
-    class Bar(tqdm):
+    class AnnouncedBar(tqdm):
         monitor_interval = 0
 
         def display(self, msg: str | None = None, pos: int | None = None) -> None:  # noqa: ARG002
             announcer.send(progress=str(self) if msg is None else msg)
 
-    with Bar(file=io.StringIO(), **WATCH.bar) as bar:
+    with AnnouncedBar(file=io.StringIO(), **WATCH.bar) as bar:
         fit = bf.fit(**request, progress=partial(WATCH.show, bar), report=lambda sentence: announcer.send(note=sentence))
     return fit.verdict().trusted
 

@@ -77,15 +77,18 @@ def round_forces(rows: Readings, digits: int) -> Readings:
 
 
 def write_route(folder: Path, generator: np.random.Generator) -> Path:
-    """Write angles along a route, and efficiencies at ten lengths."""
+    """Write angles along a route, and efficiencies at ten lengths.
+
+    Mountings scatter by less than the least friction: an efficiency above 101 % without its error is refused on purpose.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    height, middle, width = generator.uniform(50, 120), generator.uniform(460, 520), generator.uniform(50, 120)
+    height, middle, width = generator.uniform(50, 120), generator.uniform(460, 520), generator.uniform(80, 160)
     angle = lambda at: height * np.exp(-(((at - middle) / width) ** 2))  # noqa: E731
     lengths, mounted = np.linspace(430, 550, 25), np.linspace(440, 540, 10).round()
     read = angle(lengths) + generator.uniform(0.5, 2.0) * generator.standard_normal(len(lengths))
     cells = [f"{at:g},{deg:.1f}" if deg >= 5 else f"{at:g},<5" for at, deg in zip(lengths, read, strict=True)]
-    exponent = log_uniform(generator, 0.05, 0.3) * np.deg2rad(angle(mounted))
-    exponent += log_uniform(generator, 0.003, 0.03) * generator.standard_normal(len(mounted))
+    exponent = log_uniform(generator, 0.08, 0.3) * np.deg2rad(angle(mounted))
+    exponent += log_uniform(generator, 0.003, 0.01) * generator.standard_normal(len(mounted))
     shares = [f"{at:g},{100 * np.exp(-loss):.1f}" for at, loss in zip(mounted, exponent, strict=True)]
     (folder / "cable.toml").write_text(ROUTE)
     (folder / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *cells]) + "\n")

@@ -68,17 +68,17 @@ def _followed(truth: Truth, time):
 @pytest.mark.parametrize(
     ("rate", "more", "most"),
     [
-        (100, {}, 4e-4),
-        pytest.param(20, {}, 4e-4, marks=pytest.mark.extended),
-        pytest.param(1000, {"stiffness": 200.0}, 4e-4, marks=pytest.mark.extended),
+        (100, {}, 5e-5),
+        pytest.param(20, {}, 5e-5, marks=pytest.mark.extended),
+        pytest.param(1000, {"stiffness": 200.0}, 5e-5, marks=pytest.mark.extended),
         pytest.param(20, {"damping": 0.02}, 6e-3, marks=pytest.mark.extended),
-        pytest.param(1000, {"damping": 0.02}, 4e-4, marks=pytest.mark.extended),
+        pytest.param(1000, {"damping": 0.02}, 1e-3, marks=pytest.mark.extended),
         pytest.param(20, RATE, 4e-3, marks=pytest.mark.extended),
-        pytest.param(100, RATE | {"damping": 0.01}, 1e-3, marks=pytest.mark.extended),
+        pytest.param(100, RATE | {"damping": 0.01}, 2e-3, marks=pytest.mark.extended),
     ],
 )
 def test_it_follows_the_differential_equation_at_any_sampling(rate, more, most):
-    """Without rate and damping the steps are exact: 3e-4 is the damper at the load, which the integrator needs."""
+    """Without rate and damping the steps are exact: what is left is the integrator's."""
     truth, time = Truth(**more), np.arange(0, 33.9, 1 / rate)
     by_solver = creep(truth, time)
     assert np.abs(np.log(_followed(truth, time) / by_solver)).max() < most

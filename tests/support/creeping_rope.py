@@ -1,8 +1,8 @@
 """Recordings of a rope whose friction builds up after a turn, by an ODE solver that shares no code with the package.
 
 Textbook LuGre (Canudas de Wit et al. 1995) with the motion of the load end, u = log F_out, in place of a displacement:
-z' = u' - stiffness |u'| z / g(v), friction = stiffness z + damping z'. With no damping and a constant g it is Dahl's model. The
-load end has a small damper, without which its speed would be a quotient of zeros while the rope slides.
+z' = u' - stiffness |u'| z / g(v), friction = stiffness z + damping z'. With no damping and a constant g it is Dahl's model.
+With damping the load end has a small damper, without which its speed would be a quotient of zeros while the rope slides.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-LOAD_DAMPER = 2e-4  # s; the output comes later by that, a thousandth of what friction does
+LOAD_DAMPER = 2e-5  # s; the output comes later by that
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,29 @@ def creep(truth: Truth, time, profile=pulled):
     """Output force [N] at some times, for the input force and speed that a profile gives."""
     stiffness, damping = truth.stiffness * truth.exponent, truth.damping
 
+    def grows(f, speed, sign):
+        """Friction gained for each bit that the load end moves."""
+        return stiffness * (1 - sign * f / float(truth.steady(speed)[0]))
+
     def change(t, state):
-        y, f = state  # log output force; stiffness times bristle deflection
+        """Without damping: x' = y' + f' and f' = grows y'."""
+        (before, force, after), speed = profile(np.array([t - 1e-5, t, t + 1e-5]))[0], profile(np.array([t]))[1]
+        pulls = (after - before) / 2e-5 / force
+        moves = pulls / (1 + grows(state[1], speed, 1.0 if pulls >= 0 else -1.0))
+        return [moves, pulls - moves]
+
+    def change_damped(t, state):
+        """With damping: x - y - f is that of the bristles and of the damper."""
+        y, f = state
         force, speed = profile(np.array([t]))
         lead = float(np.log(force[0])) - y - f
-        sign = 1.0 if lead >= 0 else -1.0
-        grows = stiffness * (1 - sign * f / float(truth.steady(speed)[0]))  # of f, by what the load end moves
-        moves = lead / (LOAD_DAMPER + damping * max(grows, 0.0))
-        return [moves, grows * moves]
+        gain = grows(f, speed, 1.0 if lead >= 0 else -1.0)
+        moves = lead / (LOAD_DAMPER + damping * max(gain, 0.0))
+        return [moves, gain * moves]
 
     x = float(np.log(profile(np.array([time[0]]))[0][0]))
     start = [x - 0.3 * truth.exponent, 0.3 * truth.exponent]
-    solved = solve_ivp(change, (time[0], time[-1]), start, "LSODA", time, rtol=1e-7, atol=1e-9, max_step=0.02)
+    function, method = (change_damped, "LSODA") if damping else (change, "RK45")
+    solved = solve_ivp(function, (time[0], time[-1]), start, method, time, rtol=1e-6, atol=1e-9, max_step=0.04)
     assert solved.success
     return np.exp(solved.y[0])

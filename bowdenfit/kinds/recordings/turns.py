@@ -11,11 +11,11 @@ where :math:`\alpha^2` is what the mean is still worth. So a deviation d counts 
 likelihood is otherwise that of `WholeRecordingsTerm`. A play operator that is counted so is `friction_model = "play"`.
 
 A turn lies somewhere inside a block, and where it lies matters as much as how the rope creeps. So the operator takes `_PARTS`
-steps a block, along the parabola that has the means of the block and of its neighbors.
+steps a block, along the parabola that has the means of the block and of its neighbors, with the velocity on a straight line.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import jax.numpy as jnp
@@ -23,20 +23,30 @@ import numpy as np
 from jax import Array
 from typing_extensions import override
 
-from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive
+from bowdenfit.cable.drive import LoopDrive, PerRecording, PerTime, RopeDrive, make_drive
 from bowdenfit.cable.sensors import LoadCells
 from bowdenfit.kinds.recordings.blocks import group_blocks, pad_columns, standing_share
-from bowdenfit.kinds.recordings.whole_recordings import Data, WholeRecordingsTerm, stack_rope_recordings
+from bowdenfit.kinds.recordings.whole_recordings import Data, Values, WholeRecordingsTerm, stack_rope_recordings
+from bowdenfit.kinds.row_angles import resolve_angles
 from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recording, Recordings
 
 _PARTS = {"early_force": -1 / 3, "middle_force": 0.0, "late_force": 1 / 3}  # middles of parts of a block, in blocks
+_VELOCITIES = ("early_velocity", "middle_velocity", "late_velocity")
 _SAME_STEP = 1e-3  # relative difference of times between blocks that are evenly spaced
 
 
 @dataclass(frozen=True)
 class TurnsTerm(WholeRecordingsTerm):
     """Likelihood of every block of whole recordings of a single rope, standing phases by how the output moves in them."""
+
+    @override
+    def _drive(self, values: Values, data: Data) -> tuple[RopeDrive | LoopDrive, Array, Array]:
+        angles, variance = resolve_angles(self.cable, values, data)
+        velocity = jnp.stack([data[name] for name in _VELOCITIES], axis=1)
+        step = _repeat(data["step"]) / len(_PARTS)
+        drive = make_drive(self.cable, values, angles, velocity.reshape(step.shape), step=step)
+        return drive, angles, variance
 
     @override
     def _follow(
@@ -46,9 +56,8 @@ class TurnsTerm(WholeRecordingsTerm):
         stands = drive.scaled(cells.true_output(data["output_force"], drive.least_force))
         parts = jnp.stack([data[name] for name in _PARTS], axis=1)
         force = cells.true_input(parts.reshape(-1, parts.shape[2]), drive.least_force)
-        in_parts = replace(drive, rate=_repeat(drive.rate), step=_repeat(data["step"]) / len(_PARTS))
         anew = jnp.full(parts.shape, jnp.nan).at[:, 0].set(jnp.where(data["restart"], stands, jnp.nan))
-        followed = in_parts.follow(force, mounting, stands[0], anew.reshape(force.shape), _repeat(data["input_noise"]))
+        followed = drive.follow(force, mounting, stands[0], anew.reshape(force.shape), _repeat(data["input_noise"]))
         output, slope = (values.reshape(parts.shape).mean(axis=1) for values in followed)
         expected, loading = drive.shown(cells, output, slope)
         deviation = data["reading"] + cells.late(data["drift"]) - expected
@@ -94,7 +103,7 @@ def _find_phases(recording: Recording) -> dict[str, np.ndarray]:
 
 
 def _divide_blocks(recording: Recording) -> dict[str, np.ndarray]:
-    """Return the likely input force in each part of the blocks, with the mean of the block [N]."""
+    """Return the likely input force [N] and the velocity in each part of the blocks, with the means of the block."""
     groups, force = group_blocks(recording), recording.blocks.input_force
     likely, time = groups.mean(smooth_input(force)), groups.mean(recording.blocks.time)
     before, after = np.roll(likely, 1), np.roll(likely, -1)
@@ -104,6 +113,11 @@ def _divide_blocks(recording: Recording) -> dict[str, np.ndarray]:
     slope, curvature = (np.where(even, values, 0.0) for values in ((after - before) / 2, (after + before) / 2 - likely))
     mean_square = np.mean(np.square(list(_PARTS.values())))
     least = RopeDrive.least_share * np.max(np.abs(force))
-    return {
+    forces = {
         name: np.maximum(likely + slope * at + curvature * (at**2 - mean_square), least) for name, at in _PARTS.items()
     }
+    velocity = groups.mean(recording.blocks.velocity)
+    to_here, from_here = velocity - np.roll(velocity, 1), np.roll(velocity, -1) - velocity
+    steady = even & (to_here * from_here > 0)  # not where the speed jumps
+    change = np.where(steady, np.sign(from_here) * np.minimum(np.abs(to_here), np.abs(from_here)), 0.0)
+    return forces | {name: velocity + change * at for name, at in zip(_VELOCITIES, _PARTS.values(), strict=True)}

@@ -110,8 +110,8 @@ def test_the_likelihood_has_its_top_at_the_stiffness_that_the_recording_was_made
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [100, 1000])
 def test_least_squares_return_what_another_simulator_put_in(rate):
-    truth = Truth(stiffness=25.0, stribeck=0.3, viscous=0.002, reference_speed=SPEED)
-    posterior = LogDensity(_model([_recorded(truth, rate, 2)], "lugre"))
+    truth = Truth(stiffness=25.0, reference_speed=SPEED)
+    posterior = LogDensity(_model([_recorded(truth, rate, 2)], "dahl"))
     objective = make_objective(posterior)
     start = find_maximum_posterior(posterior, objective).z
     estimate = fit_least_squares(posterior, objective, start, intervals=False).estimates["presliding_stiffness"]
@@ -125,6 +125,7 @@ def test_the_summary_says_how_far_the_rope_creeps_or_that_it_cannot_be_told_from
     assert known.sentence().startswith("After a turn friction builds up by 63 % while the output force changes by 4.0 % (90 %")
     unknown = Presliding(Interval.of(np.abs(0.01 * generator.standard_normal(4000))), 50.0)
     assert unknown.is_play and not known.is_play
+    assert "known worse under lugre" in Presliding(known.creep, float("nan"), lags=True).sentence()
     assert "cannot tell the presliding stiffness" in unknown.sentence() and "force at 50 N" in unknown.sentence()
 
 

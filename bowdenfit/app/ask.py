@@ -129,13 +129,19 @@ def show_next(workbench: Workbench, fit: "Fit") -> None:
         button("Rank what could be measured next", rank)
 
 
+_PROGRAMS = {
+    "c": "C", "fmu": "an FMU", "mujoco": "MuJoCo", "matlab": "MATLAB", "python": "Python", "yaml": "YAML",
+    "csv": "a spreadsheet",
+}  # fmt: skip
+
+
 def show_files(name: str) -> None:
     """Show links to the report, to the data of a fit, and to what other programs read of it."""
     with section("Files", "kept-files"), block("ul", "links"):
         for words, address in (
             ("Report", f"/kept/{name}/report.html"), ("Everything it says", f"/kept/{name}/details.txt"),
             ("summary.json", f"/kept/{name}/summary.json"), ("Draws, posterior.nc", f"/kept/{name}/posterior.nc"),
-            *((f"For {target}", f"/export/{name}/{target}") for target in get_args(Target)),
+            *((f"For {_PROGRAMS.get(target, target)}", f"/export/{name}/{target}") for target in get_args(Target)),
         ):  # fmt: skip
             with block("li"):
                 link(words, address, target="_blank")

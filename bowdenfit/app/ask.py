@@ -51,9 +51,9 @@ class ArrivingForce:
                 self._show_dial(dial, f"dial-{number}")
         with block("div", "row"):
             with field("The force is", "dial-way"):
-                choice("dial-way", self._way, _WAYS, lambda way: self._change("_way", way))
+                choice("dial-way", self._way, _WAYS, self._choose_way)
             with field("The rope is", "dial-stroke"):
-                choice("dial-stroke", self._stroke, _STROKES, lambda stroke: self._change("_stroke", stroke))
+                choice("dial-stroke", self._stroke, _STROKES, self._choose_stroke)
         with block("div", role="status", aria_live="polite"):
             self._place = markup("", "div", "arrives", id="arrives")
         ui.timer(0.05, self._answer, once=True)
@@ -73,8 +73,12 @@ class ArrivingForce:
 
         knob.on("input", turn, throttle=_THROTTLE, js_handler="event => emit(event.target.value)")
 
-    async def _change(self, name: str, value: str) -> None:
-        setattr(self, name, value)
+    async def _choose_way(self, way: str) -> None:
+        self._way = way
+        await self._answer()
+
+    async def _choose_stroke(self, stroke: str) -> None:
+        self._stroke = stroke
         await self._answer()
 
     async def _answer(self) -> None:

@@ -98,9 +98,12 @@ class LivePage:
                     button("Stop watching", self._stop)
                 return
             with field("Known well enough at a standard deviation of", "until", "such as 10mm; empty for what next says"):
-                text_input("until", self._until, lambda typed: setattr(self, "_until", typed.strip()))
+                text_input("until", self._until, self._state_until)
             with block("div", "row"):
                 button("Watch the bench", lambda: attempt(self._start), "primary")
+
+    def _state_until(self, typed: str) -> None:
+        self._until = typed.strip()
 
     def _start(self) -> None:
         if self._bench is not None and self._bench.running:

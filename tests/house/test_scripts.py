@@ -21,6 +21,7 @@ REQUIREMENTS = {
     "test": PROJECT["project"]["optional-dependencies"]["test"],
     "docs": PROJECT["project"]["optional-dependencies"]["docs"],
     "lab": PROJECT["project"]["optional-dependencies"]["lab"],
+    "app": PROJECT["project"]["optional-dependencies"]["app"],
     "cluster": PROJECT["project"]["optional-dependencies"]["cluster"],
     "build": PROJECT["build-system"]["requires"],
 }

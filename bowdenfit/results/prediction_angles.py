@@ -78,7 +78,7 @@ def split_lengths(lengths: np.ndarray) -> list[np.ndarray]:
 
 
 def choose_angles(
-    dataset: Dataset, route: np.ndarray, stated: Mapping[int, float], seed: int, bent: int | None = None
+    dataset: Dataset, route: np.ndarray, stated: Mapping[int, float | np.ndarray], seed: int, bent: int | None = None
 ) -> PredictionAngles:
     """Return the wrap angles that a prediction uses.
 
@@ -88,7 +88,8 @@ def choose_angles(
     Args:
         dataset: The data set.
         route: Route values.
-        stated: Stated wrap angles [rad], by number of the contact; they hold at all route values.
+        stated: Stated wrap angles [rad], by number of the contact: one that holds at all route values, or one for each, NaN
+            where the contact keeps its own.
         seed: Of the errors of measured angles.
         bent: Number of a contact that takes other wrap angles than these, so that none is needed; None without one.
 
@@ -98,12 +99,17 @@ def choose_angles(
     description, at = dataset.description, np.array(route, dtype=float)
     contacts, limits = description.contact, description.route
     outside = ["" if limits is None else limits.outside(value) for value in at]
-    curved = [k for k, c in enumerate(contacts) if c.wrap_angle.curve and c.wrap_angle.column and k not in (*stated, bent)]
+    angle_at = {k: np.broadcast_to(np.asarray(angle, dtype=float), at.shape) for k, angle in stated.items()}
+    fully_stated = [k for k, angle in angle_at.items() if not np.isnan(angle).any()]
+    curved = [
+        k for k, c in enumerate(contacts) if c.wrap_angle.curve and c.wrap_angle.column and k not in (*fully_stated, bent)
+    ]
     names = tuple(contacts[k].wrap_angle.column or "" for k in curved)
     own = OwnAngles.none(names, len(at))
     for i in [i for i, words in enumerate(outside) if words and curved]:
-        missing = []
-        for j, name in enumerate(names):
+        missing, own_curves = [], [j for j, k in enumerate(curved) if np.isnan(angle_at[k][i] if k in angle_at else np.nan)]
+        for j in own_curves:
+            name = names[j]
             measured = next(_measured_angles(dataset, name, at[i]), None)
             if measured is None:
                 missing.append(contacts[curved[j]].name)
@@ -111,13 +117,16 @@ def choose_angles(
                 own.angle[i, j], own.sd[i, j] = measured
         if missing:
             _refuse_unmeasured(f"{at[i]:.6g} {limits.unit if limits else ''}", outside[i], missing)
-        outside[i] += ": by the wrap angles measured there"
+        outside[i] += ": by the wrap angles measured there" if own_curves else ": by the wrap angles stated"
     rows = collect_row_angles(description, RowConditions(at, own), None)
-    for contact, angle in stated.items():
-        rows.own[:, contact], rows.is_own[:, contact] = angle, True
-        rows.known_sd[:, contact], rows.has_angle_noise[:, contact] = 0.0, False
-    words = listed([f"{contacts[k].name!r} bent by {np.rad2deg(angle):.4g} deg" for k, angle in stated.items()])
-    return PredictionAngles(replace(rows, route=at), seed, (words,) * len(at), tuple(outside))
+    words: list[list[str]] = [[] for _ in at]
+    for contact, angle in angle_at.items():
+        here = ~np.isnan(angle)
+        rows.own[here, contact], rows.is_own[here, contact] = angle[here], True
+        rows.known_sd[here, contact], rows.has_angle_noise[here, contact] = 0.0, False
+        for place in np.flatnonzero(here):
+            words[place].append(f"{contacts[contact].name!r} bent by {np.rad2deg(angle[place]):.4g} deg")
+    return PredictionAngles(replace(rows, route=at), seed, tuple(map(listed, words)), tuple(outside))
 
 
 def _measured_angles(dataset: Dataset, column: str, at: float) -> Iterator[tuple[float, float]]:
@@ -151,8 +160,8 @@ def predict_forces(
     model: Model,
     z: np.ndarray,
     angles: PredictionAngles,
-    force: float,
-    stroke: int,
+    force: float | np.ndarray,
+    stroke: int | np.ndarray,
     mountings: Sequence[np.ndarray],
     *,
     inverse: bool = False,
@@ -163,8 +172,8 @@ def predict_forces(
         model: The model.
         z: Draws, one a row.
         angles: Wrap angles at the route values.
-        force: Force at the motor side [N].
-        stroke: +1 pulling, -1 return.
+        force: Force at the motor side [N]: one, or one for each route value.
+        stroke: +1 pulling, -1 return; likewise.
         mountings: Effect of each mounting on the friction exponent of each draw [1].
         inverse: Return the input force instead, given the force at the load side.
     """
@@ -175,7 +184,7 @@ def predict_forces(
         z, mounting, errors_of_draw = jnp.split(draw, [model.space.size, model.space.size + 1])
         values = model.space.constrain(z)
         bends = angles.resolve(cable, values, errors_of_draw)
-        known = jnp.asarray(float(force)), jnp.asarray(float(stroke))
+        known = jnp.asarray(force, dtype=float), jnp.asarray(stroke, dtype=float)
         return function(values, bends, *known, mounting[0], jnp.asarray(angles.rows.route))
 
     errors = angles.draw_errors(len(z))

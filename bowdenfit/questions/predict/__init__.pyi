@@ -7,3 +7,4 @@ from .lengths import choose_route_values as choose_route_values
 from .lengths import predict_at_lengths as predict_at_lengths
 from .predictions import Predictions as Predictions
 from .predictions import predictions_text as predictions_text
+from .table import predict_table as predict_table

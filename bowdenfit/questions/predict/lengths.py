@@ -80,18 +80,8 @@ def _predict_part(
     rows = []
     for i, length in enumerate(lengths):
         row: dict[str, Any] = {} if route is None else {f"{route.variable}_{route.unit}": float(length)}
-        interval = Interval.of(mean[:, i])
-        mounting = np.quantile(mounted[:, i], (0.05, 0.95))
-        row |= {
-            name: interval.median,
-            "mean": interval.mean,
-            "sd": interval.sd,
-            "q05": interval.q05,
-            "q95": interval.q95,
-        }
-        row |= {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
-        row |= of_load
-        load = interval.median if inverse else stated_force
+        row |= summarize_draws(name, mean[:, i], mounted[:, i]) | of_load
+        load = row[name] if inverse else stated_force
         notes = [words[i], angles.notes[i], *limits.notes(None if route is None else float(length), load)]
         if route is not None:
             notes.append(angles.outside[i])
@@ -99,6 +89,19 @@ def _predict_part(
         row["note"] = "; ".join(note for note in notes if note)
         rows.append(row)
     return rows
+
+
+def summarize_draws(name: str, mean: np.ndarray, mounted: np.ndarray) -> dict[str, Any]:
+    """Return median, moments and quantiles of a quantity at one place, and its quantiles in any one mounting.
+
+    Args:
+        name: The quantity.
+        mean: Its draws, without the effect of a mounting.
+        mounted: Its draws in new mountings.
+    """
+    interval, mounting = Interval.of(mean), np.quantile(mounted, (0.05, 0.95))
+    row = {name: interval.median, "mean": interval.mean, "sd": interval.sd, "q05": interval.q05, "q95": interval.q95}
+    return row | {"mounting_q05": float(mounting[0]), "mounting_q95": float(mounting[1])}
 
 
 def choose_route_values(fit: Record, lengths: Sequence[float | NumberWithUnit] | None) -> np.ndarray:

@@ -60,7 +60,9 @@ def note_outside_bends(fit: Record) -> Callable[[float], str]:
     return lambda angle: _note_outside(float(np.rad2deg(angle)), span, "wrap angles", "deg")
 
 
-def clip_to_tension(force: np.ndarray, input_force: float, slack_word: str = "slack") -> tuple[np.ndarray, list[str]]:
+def clip_to_tension(
+    force: np.ndarray, input_force: float | np.ndarray, slack_word: str = "slack"
+) -> tuple[np.ndarray, list[str]]:
     """Return forces of a rope, which pulls or is slack but never pushes, and a note for each column.
 
     Args:

@@ -8,6 +8,7 @@ from bowdenfit.words import decimals, few, filled, narrow_table, percent, signif
 
 Row = Mapping[str, Any]
 _UNITS = {"N_m_per_rad": "N*m/rad", "N_per_mm": "N/mm", "N_mm": "N*mm", "N_m": "N*m", "N": "N", "mm": "mm", "deg": "deg"}
+ROW = "row"  # of a table of what to predict
 _MOUNTING, _PROBABILITY = "mounting", "_probability"
 _RATIOS = ("dynamic_range",)  # quantities without a unit
 
@@ -20,6 +21,8 @@ def predictions_text(rows: Sequence[Row]) -> str:
     """
     if not rows:
         return "Nothing was asked for.\n"
+    if ROW in rows[0]:
+        return _table_of_rows(rows)
     if "in_words" in rows[0]:
         return filled(rows[0]["in_words"]) + "\n"
     several = len(rows) > 1
@@ -114,6 +117,27 @@ def _highest_and_lowest(rows: Sequence[Row]) -> str:
         sentence += f"highest {_format_value(high, name)[0]}{unit} at {_position_text(high)}, "
         sentence += f"lowest {_format_value(low, name)[0]}{unit} at {_position_text(low)}"
     return f"{sentence}. 90 % intervals are in brackets."
+
+
+def _table_of_rows(rows: Sequence[Row]) -> str:
+    """Return predictions row by row of a table, with what each row states."""
+    stated = list(rows[0])[: list(rows[0]).index(_quantities(rows[0])[0])]
+    columns = [[_stated_heading(name), *(_stated_text(row[name]) for row in rows)] for name in stated]
+    heads, *cells = zip(*columns, *_table_columns(rows), strict=True)
+    lines = ["90 % intervals are in brackets."]
+    for note in dict.fromkeys(row["note"] for row in rows if row["note"]):
+        where = [str(row[ROW]) for row in rows if row["note"] == note]
+        lines.append(f"{'Everywhere' if len(where) == len(rows) > 1 else f'Row {few(where, 4)}'}: {note}.")
+    return f"{narrow_table(heads, cells)}\n\n" + "\n".join(map(filled, lines)) + "\n"
+
+
+def _stated_heading(name: str) -> str:
+    words, unit = (name, "") if name in (ROW, "stroke") else _name_and_unit(name)
+    return f"{words} ({unit})" if unit else words
+
+
+def _stated_text(value: Any) -> str:
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _prediction_table(rows: Sequence[Row]) -> str:

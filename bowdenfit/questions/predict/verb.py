@@ -24,8 +24,10 @@ from bowdenfit.display import csv_text
 from bowdenfit.errors import UsageError
 from bowdenfit.questions import predict as room
 from bowdenfit.verb import Reply, Verb
+from bowdenfit.words import listed
 
 if TYPE_CHECKING:
+    from bowdenfit.frames import Frame
     from bowdenfit.questions.predict.predictions import Predictions
     from bowdenfit.results.record import Record
 
@@ -35,6 +37,7 @@ QuantityName = Literal[
 ]  # fmt: skip
 _NOT_STORED = (  # what is not kept
     "input_force", "output_force", "wrap_angles", "preload", "friction_limit", "spring", "contact", "gait", "gait_column",
+    "table",
 )  # fmt: skip
 AT_LENGTHS = ("efficiency", "output-force", "input-force")  # all others are asked at wrap angles
 Force: TypeAlias = Annotated[Quantity | None, Parameter(metavar="FORCE"), number_with_unit("100N")]
@@ -62,6 +65,7 @@ def predict(
     contact: Annotated[str | None, Parameter(metavar="NAME")] = None,
     gait: Annotated[str | Path | None, Parameter(metavar="FILE"), PATH] = None,
     gait_column: Annotated[str | None, Parameter(metavar="HEADING")] = None,
+    table: Annotated["str | Path | Frame | None", Parameter(metavar="FILE"), PATH] = None,
 ) -> "Predictions":
     """Efficiency, a force, or what stretch and preload do, with intervals; one row a route value or wrap angle.
 
@@ -82,12 +86,19 @@ def predict(
             over these wrap angles is predicted.
         gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
         gait_column: Its heading, where it is not one that means a wrap angle.
+        table: Table of what to predict, a row each: length, wrap angle of any contact, input_force or output_force, stroke,
+            with headings and units as in tables of measurements; in a program also a data frame.
 
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
     """
     applied_force, wanted_force = as_pair(input_force), as_pair(output_force)
     pairs = cast("list[tuple[str, NumberWithUnit]]", wrap_angles)
+    if table is not None:
+        others = {"LENGTHS": lengths, "--wrap-angle": pairs, "--quantity": quantity, "--preload": preload, "--spring": spring}
+        gaits = {"--friction-limit": friction_limit, "--contact": contact, "--gait": gait, "--gait-column": gait_column}
+        _refuse_beside_table({**others, **gaits})
+        return room.Predictions(room.predict_table(fit, table, applied_force, wanted_force, stroke))
     angles, named = [angle for name, angle in pairs if not name], [pair for pair in pairs if pair[0]]
     quantity = _choose_quantity(quantity, input_force, output_force)
     over_gait = any(option is not None for option in (contact, gait, gait_column))
@@ -106,6 +117,15 @@ def predict(
     if gait_angles is not None:
         return room.Predictions(room.predict_over_gait(fit, route_values, gait_angles, *forces, stated))
     return room.Predictions(room.predict_at_lengths(fit, route_values, *forces, stated))
+
+
+def _refuse_beside_table(options: Mapping[str, object]) -> None:
+    """Refuse what a table says row by row, or what is not predicted by rows."""
+    if named := [name for name, value in options.items() if value not in (None, (), [])]:
+        raise UsageError(
+            f"--table says in its rows where to predict, and {listed(named)} would change nothing: leave that out, or write it "
+            "as a column of the table where it has one (a length, a wrap angle of a contact, a force, a stroke)."
+        )
 
 
 def _refuse_nameless_angles(angles: Sequence[NumberWithUnit], named: Sequence[object], over_gait: bool) -> None:
@@ -215,6 +235,10 @@ VERB = Verb(
 
     --wrap-angle NAME=ANGLE gives a contact this wrap angle, one for each contact; the
     others keep theirs.
+
+    --table FILE predicts a row each for many: columns with a length, the wrap angle
+    of any contact, input_force or output_force, and stroke; what a row leaves blank
+    is as fitted, and a column that is none of these is refused.
 
     --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while
     this contact bends, such as over a stride; with moment arms in that file

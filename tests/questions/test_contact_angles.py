@@ -32,18 +32,18 @@ def expected(fit, length, free_deg, edge_deg):
 def test_each_contact_can_be_given_its_wrap_angle(fit):
     (row,) = bf.predict(fit, [470], wrap_angles={EDGE: "30deg", FREE: (100, "deg")})
     right = expected(fit, 470, 100, 30)
-    assert row["efficiency"] == pytest.approx(np.median(right), rel=1e-9)
-    assert row["q05"] == pytest.approx(np.quantile(right, 0.05), rel=1e-9)
+    assert row["efficiency"] == pytest.approx(np.median(right), rel=1e-6)
+    assert row["q05"] == pytest.approx(np.quantile(right, 0.05), rel=1e-6)
     assert row["note"] == "'bracket edge' bent by 30 deg and 'free sheath' bent by 100 deg"
     assert bf.predict(fit, 470, wrap_angles=["free sheath=100deg", "bracket edge = 30 deg"])[0]["mean"] == row["mean"]
     (force,) = bf.predict(fit, 470, "50N", wrap_angles={EDGE: "30deg", FREE: "100deg"})
-    assert force["output_force_N"] == pytest.approx(50 * np.median(right), rel=1e-9)
+    assert force["output_force_N"] == pytest.approx(50 * np.median(right), rel=1e-6)
 
 
 def test_other_contacts_keep_a_stated_angle_while_one_goes_through_several(fit):
     (row,) = bf.predict(fit, [470], contact=EDGE, wrap_angles=["0deg", "60deg", "free sheath=100deg"])
     mean = (expected(fit, 470, 100, 0) + expected(fit, 470, 100, 60)) / 2
-    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-9)
+    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-6)
     assert "mean over 2 wrap angles of 'bracket edge', 0 to 60 deg; 'free sheath' bent by 100 deg" in row["note"]
 
 
@@ -121,7 +121,7 @@ def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(
     (stated,) = bf.predict(fit, 560, wrap_angles={FREE: "100deg", "squeezed sheath": "37deg"})
     mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
     right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
-    assert stated["efficiency"] == pytest.approx(np.median(right), rel=1e-9)
+    assert stated["efficiency"] == pytest.approx(np.median(right), rel=1e-6)
 
 
 # Words and seeds --------------------------------------------------------------------------------------------------

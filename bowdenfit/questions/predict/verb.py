@@ -28,6 +28,7 @@ from bowdenfit.words import listed
 
 if TYPE_CHECKING:
     from bowdenfit.frames import Frame
+    from bowdenfit.questions.predict.gait import Gait
     from bowdenfit.questions.predict.predictions import Predictions
     from bowdenfit.results.record import Record
 
@@ -86,8 +87,7 @@ def predict(
             over these wrap angles is predicted.
         gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
         gait_column: Its heading, where it is not one that means a wrap angle.
-        table: Table of what to predict, a row each: length, wrap angle of any contact, input_force or output_force, stroke,
-            with headings and units as in tables of measurements; in a program also a data frame.
+        table: Table with a row for each prediction: length, wrap angles of contacts, input_force or output_force, stroke.
 
     Raises:
         UsageError: There is nothing to predict at, no posterior, or the cable has not what is asked for.
@@ -95,9 +95,7 @@ def predict(
     applied_force, wanted_force = as_pair(input_force), as_pair(output_force)
     pairs = cast("list[tuple[str, NumberWithUnit]]", wrap_angles)
     if table is not None:
-        others = {"LENGTHS": lengths, "--wrap-angle": pairs, "--quantity": quantity, "--preload": preload, "--spring": spring}
-        gaits = {"--friction-limit": friction_limit, "--contact": contact, "--gait": gait, "--gait-column": gait_column}
-        _refuse_beside_table({**others, **gaits})
+        _refuse_beside_table(lengths, pairs, quantity, preload, spring, friction_limit, contact, gait, gait_column)
         return room.Predictions(room.predict_table(fit, table, applied_force, wanted_force, stroke))
     angles, named = [angle for name, angle in pairs if not name], [pair for pair in pairs if pair[0]]
     quantity = _choose_quantity(quantity, input_force, output_force)
@@ -111,17 +109,34 @@ def predict(
         query = room.make_query(fit, angles, applied_force, wanted_force, as_pair(preload), limit, stroke, stiffness)
         return room.Predictions(room.predict_at_wrap_angles(fit, quantity, query))
     _refuse_bend_options(quantity, over_gait or bool(named), preload or spring, friction_limit, input_force)
-    route_values = room.choose_route_values(fit, cast("list[float | NumberWithUnit] | None", lengths))
     gait_angles = room.make_gait(fit, contact, angles, gait, gait_column) if over_gait else None
-    forces, stated = (applied_force, stroke, wanted_force), room.read_stated_angles(fit, named, gait_angles)
-    if gait_angles is not None:
-        return room.Predictions(room.predict_over_gait(fit, route_values, gait_angles, *forces, stated))
+    return _predict_along_route(fit, lengths, (applied_force, stroke, wanted_force), gait_angles, named)
+
+
+def _predict_along_route(
+    fit: "Record",
+    lengths: object,
+    forces: tuple[NumberWithUnit | None, str, NumberWithUnit | None],
+    gait: "Gait | None",
+    named: Sequence[tuple[str, NumberWithUnit]],
+) -> "Predictions":
+    """Return predictions at lengths, or over a gait at each of them."""
+    route_values = room.choose_route_values(fit, cast("list[float | NumberWithUnit] | None", lengths))
+    stated = room.read_stated_angles(fit, named, gait)
+    if gait is not None:
+        return room.Predictions(room.predict_over_gait(fit, route_values, gait, *forces, stated))
     return room.Predictions(room.predict_at_lengths(fit, route_values, *forces, stated))
 
 
-def _refuse_beside_table(options: Mapping[str, object]) -> None:
-    """Refuse what a table says row by row, or what is not predicted by rows."""
-    if named := [name for name, value in options.items() if value not in (None, (), [])]:
+_BESIDE_TABLE = (
+    "LENGTHS", "--wrap-angle", "--quantity", "--preload", "--spring", "--friction-limit", "--contact", "--gait",
+    "--gait-column",
+)  # fmt: skip
+
+
+def _refuse_beside_table(*values: object) -> None:
+    """Refuse what a table says row by row, or what is not predicted by rows; values in the order of their names."""
+    if named := [name for name, value in zip(_BESIDE_TABLE, values, strict=True) if value not in (None, (), [])]:
         raise UsageError(
             f"--table says in its rows where to predict, and {listed(named)} would change nothing: leave that out, or write it "
             "as a column of the table where it has one (a length, a wrap angle of a contact, a force, a stroke)."

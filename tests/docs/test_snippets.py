@@ -203,7 +203,8 @@ def test_every_command_of_a_page_runs_one_after_the_other(page, place, others, t
                 shutil.rmtree(next(iter(understood(words)[0]), FIRST), ignore_errors=True)
             quick = {"fit": [*QUICK, "--no-figures", "--force"], "calibrate": ["-n", "2", *QUICK, "--force"]}.get(words[1], [])
             code, out, err = run(*words[1:], *quick)
-            assert code in (0, 3 if quick else 0), (words, out, err)
+            may_differ = "They differ about the stated wall" in " ".join(out.split())  # linear loop and simulation
+            assert code in (0, 3 if quick or may_differ else 0), (words, out, err)
 
 
 @pytest.mark.slow

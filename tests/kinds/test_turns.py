@@ -1,5 +1,7 @@
 """Recordings whose blocks after a turn count: how they are weighed, what is refused, and truths from another simulator."""
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +23,7 @@ from bowdenfit.kinds.recordings.turns import TurnsTerm, _subtract_common
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.models import build_model
 from bowdenfit.questions.recorded.presliding import Presliding
+from bowdenfit.questions.summary.verdict import describe_narrow_intervals
 from bowdenfit.recordings.preparation import prepare
 from bowdenfit.recordings.recording import RawRecording, Recording, Recordings
 from bowdenfit.recordings.strokes import find_strokes
@@ -129,3 +132,9 @@ def test_the_summary_says_how_far_the_rope_creeps_or_that_it_cannot_be_told_from
     assert "cannot tell the presliding stiffness" in unknown.sentence() and "force at 50 N" in unknown.sentence()
 
 
+
+
+@pytest.mark.parametrize(("options", "count"), [(("play", "rate-dependent"), 0), (("dahl",), 0), (("lugre",), 1)])
+def test_a_fit_of_lugre_is_not_trusted_because_its_intervals_are_too_narrow(options, count):
+    fit = SimpleNamespace(model=SimpleNamespace(cable=SimpleNamespace(friction=SimpleNamespace(options=options))))
+    assert len(describe_narrow_intervals(fit)) == count

@@ -181,7 +181,7 @@ def _read_force(column: Column, cell: Cell) -> float:
 def _read_stroke(cell: Cell) -> int:
     sign = read_stroke(cell, held="")
     if sign == 0:
-        raise cell.refuse(f"{cell.shown} is no stroke in which the rope slides; write pull (+1) or return (-1).")
+        raise cell.refuse(f"{cell.shown} must be a stroke in which the rope slides; write pull (+1) or return (-1).")
     return sign
 
 

@@ -1,6 +1,6 @@
 """Results and text of `bowdenfit teleoperate`: torque in free motion, stiffness in contact, and which walls are stable."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from bowdenfit.display import Display, Part, Rows, text_of
 from bowdenfit.inference.interval import Interval
-from bowdenfit.words import filled, percent, significant, table
+from bowdenfit.words import filled, listed, percent, significant, table
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,6 +24,7 @@ class CouplingScheme(Part):
         hardest: Hardest wall up to which every softer one is stable with the probability asked for [N m/rad]; 0 where free
             motion is not, None where no wall looked at is too hard.
         radius: Median of the largest spectral radius in free motion; above 1 oscillations grow.
+        bounces: Whether the slave still bounces at each wall in a simulation with median parameters and dry friction.
     """
 
     name: str
@@ -33,6 +34,7 @@ class CouplingScheme(Part):
     stable: np.ndarray
     hardest: float | None
     radius: float
+    bounces: np.ndarray
 
     JSON: ClassVar = (
         "name",
@@ -42,6 +44,7 @@ class CouplingScheme(Part):
         "stable",
         "hardest",
         "radius",
+        ("bounces_in_simulation", "bounces"),
     )
 
 
@@ -98,9 +101,19 @@ class Teleoperation(Display):
         """The coupling as stated."""
         return self.schemes[0]
 
+    @property
+    def contradicted(self) -> bool:
+        """Whether linear loop and simulation differ about the stated wall with the coupling as stated."""
+        return (self.at_wall >= self.probability) == bool(self.contact.bounces)
+
     def _table(self) -> Rows:
         rows = [
-            {"coupling": scheme.name, "wall_stiffness": float(wall), "stable": float(scheme.stable[i])}
+            {
+                "coupling": scheme.name,
+                "wall_stiffness": float(wall),
+                "stable": float(scheme.stable[i]),
+                "bounces_in_simulation": bool(scheme.bounces[i]),
+            }
             for scheme in self.schemes
             for i, wall in enumerate(self.walls)
         ]
@@ -123,6 +136,7 @@ def sentences(answer: Teleoperation) -> list[str]:
             *_transmission_sentences(answer),
             *_instability_sentences(answer),
             *_simulation_sentences(answer),
+            *_contrast_sentences(answer),
         )
         if sentence
     ]
@@ -162,7 +176,7 @@ def _transmission_sentences(answer: Teleoperation) -> Iterator[str]:
     yield (
         f"The hand feels {free}, and of the wall {significant(stiffness.median)} N*m/rad "
         f"({significant(stiffness.q05)} to {significant(stiffness.q95)}) while both sides of the loop are taut. "
-        "Stability is assessed without dry friction, which only adds damping."
+        "These probabilities are those of the linear loop, without dry friction."
     )
 
 
@@ -188,12 +202,46 @@ def _simulation_sentences(answer: Teleoperation) -> Iterator[str]:
         yield f"In a simulation with median parameters, the slave {does} 1.2 s after it touched a wall of {wall}."
 
 
+def _contrast_sentences(answer: Teleoperation) -> Iterator[str]:
+    """Say where the simulation with dry friction bounces, beside what the linear loop calls unstable."""
+    probable = [scheme for scheme in answer.schemes if np.any(scheme.stable < answer.probability)]
+    quiet = [scheme.name for scheme in probable if not scheme.bounces.any()]
+    if quiet:
+        yield (
+            f"The linear loop calls some walls unstable {_describe_quiet(answer, quiet)}; in simulations the slave comes to "
+            "rest at all of them: dry friction ends small oscillations. After a harder impact it may not."
+        )
+    if answer.contradicted:
+        yield (
+            "They differ about the stated wall (exit code 3): rely on neither before it was tried on the device."
+        )
+
+
+def _describe_quiet(answer: Teleoperation, quiet: Sequence[str]) -> str:
+    return "with every coupling" if len(quiet) == len(answer.schemes) else f"with {listed(quiet)}"
+
+
 def _scheme_table(answer: Teleoperation) -> str:
     rows = [
-        [scheme.name, f"{scheme.free_torque.median:.3f}", _format_stiffness(scheme), _format_hardest(answer, scheme)]
+        [
+            scheme.name,
+            f"{scheme.free_torque.median:.3f}",
+            _format_stiffness(scheme),
+            _format_hardest(answer, scheme),
+            _format_simulated(answer, scheme),
+        ]
         for scheme in answer.schemes
     ]
-    return table(["coupling", "free (N*m)", "wall felt (N*m/rad)", "hardest wall (N*m/rad)"], rows)
+    heads = ["coupling", "free (N*m)", "wall felt (N*m/rad)", "hardest: linear", "simulated"]
+    return table(heads, rows)
+
+
+def _format_simulated(answer: Teleoperation, scheme: CouplingScheme) -> str:
+    """Return the hardest wall below the first that bounces in the simulation."""
+    if not scheme.bounces.any():
+        return f"over {answer.walls[-1]:.0f}"
+    first = int(np.argmax(scheme.bounces))
+    return significant(float(answer.walls[first - 1])) if first else "none"
 
 
 def _format_stiffness(scheme: CouplingScheme) -> str:

@@ -13,6 +13,7 @@ from bowdenfit.device.teleoperation import (
     MasterController,
     MasterSlave,
     Slave,
+    TeleoperationRuns,
     free_motion_torque,
     is_stable,
     simulate_teleoperation,
@@ -75,64 +76,76 @@ Bends = str | tuple[tuple[float, str], tuple[float, str]] | None
 Draws = Mapping[str, np.ndarray]
 
 
-def simulate_contact(
-    device: Device, loop: LoopDraws, stated: Mapping[str, Known], gains: CouplingGains, delay: int, bend: int
-) -> SimulatedContact:
-    """Simulate master and slave with median parameters.
+class ContactSimulator:
+    """Simulates master and slave with median parameters and dry friction: in free motion, then against a wall.
 
     Args:
         device: The device.
         loop: Draws of the cable, with its stiffness.
         stated: Quantities of the device.
-        gains: What is sent.
-        delay: Samples that it is late by.
+        delay: Samples that what is sent is late by.
         bend: Number of the wrap angle.
     """
-    assert loop.stiffness is not None
-    values = {key: known.value for key, known in stated.items()}
-    stiffness, preload, exponent = (
-        float(np.median(part[:, bend])) for part in (loop.stiffness, loop.preload, loop.exponent)
-    )
-    plant = Plant(
-        LoopTransmission(stiffness, max(preload, _LEAST_PRELOAD), exponent),
-        values["motor.inertia"],
-        values["motor.damping"],
-        values["motor.friction"],
-        values["joint.inertia"] + values["hand.inertia"],
-        values["joint.damping"],
-        values["rope.damping"],
-    )
-    slave = Slave(
-        values["slave.inertia"],
-        values["slave.damping"],
-        values["slave.friction"],
-        values["slave.largest_torque"],
-        WALL,
-        values["wall.stiffness"],
-        values["wall.damping"],
-    )
-    controller = MasterController(device.count, values["controller.filter_time"], values["motor.largest_torque"])
-    sample = values["controller.sample_time"]
-    runs = simulate_teleoperation(
-        plant,
-        Hand(values["hand.stiffness"], values["hand.damping"]),
-        slave,
-        controller,
-        gains,
-        compute_hand_path(sample),
-        delay=delay,
-        sample=sample,
-    )
-    kept = slice(None, None, _TRACE_STEP)
-    return SimulatedContact(
-        runs.time[kept],
-        runs.joint[kept],
-        runs.slave[kept],
-        runs.hand_torque[kept],
-        runs.wall_torque[kept],
-        values["wall.stiffness"],
-        detect_bouncing(runs.time, runs.wall_torque),
-    )
+
+    def __init__(self, device: Device, loop: LoopDraws, stated: Mapping[str, Known], delay: int, bend: int) -> None:
+        assert loop.stiffness is not None
+        values = self._values = {key: known.value for key, known in stated.items()}
+        parts = (loop.stiffness, loop.preload, loop.exponent)
+        stiffness, preload, exponent = (float(np.median(part[:, bend])) for part in parts)
+        self._delay = delay
+        self._plant = Plant(
+            LoopTransmission(stiffness, max(preload, _LEAST_PRELOAD), exponent),
+            values["motor.inertia"],
+            values["motor.damping"],
+            values["motor.friction"],
+            values["joint.inertia"] + values["hand.inertia"],
+            values["joint.damping"],
+            values["rope.damping"],
+        )
+        largest = values["motor.largest_torque"]
+        self._controller = MasterController(device.count, values["controller.filter_time"], largest)
+
+    def run(self, gains: CouplingGains, walls: np.ndarray | float) -> TeleoperationRuns:
+        """Return the signals of a contact with each of some walls.
+
+        Args:
+            gains: What is sent.
+            walls: Their stiffnesses [N m/rad].
+        """
+        values = self._values
+        slave = Slave(
+            values["slave.inertia"],
+            values["slave.damping"],
+            values["slave.friction"],
+            values["slave.largest_torque"],
+            WALL,
+            walls,
+            values["wall.damping"],
+        )
+        hand, sample = Hand(values["hand.stiffness"], values["hand.damping"]), values["controller.sample_time"]
+        path = compute_hand_path(sample)
+        return simulate_teleoperation(
+            self._plant, hand, slave, self._controller, gains, path, delay=self._delay, sample=sample
+        )
+
+    def trace(self, gains: CouplingGains) -> SimulatedContact:
+        """Return the contact with the stated wall through time."""
+        wall = self._values["wall.stiffness"]
+        runs, kept = self.run(gains, wall), slice(None, None, _TRACE_STEP)
+        return SimulatedContact(
+            runs.time[kept],
+            runs.joint[kept],
+            runs.slave[kept],
+            runs.hand_torque[kept],
+            runs.wall_torque[kept],
+            wall,
+            detect_bouncing(runs.time, runs.wall_torque),
+        )
+
+    def bounces(self, gains: CouplingGains) -> np.ndarray:
+        """Return whether the slave still bounces at each of `WALLS`; False where friction holds it before it comes there."""
+        runs = self.run(gains, WALLS)
+        return np.array([bool(detect_bouncing(runs.time, torque)) for torque in runs.wall_torque.T])
 
 
 def compute_hand_path(sample: float) -> np.ndarray:
@@ -196,8 +209,11 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
         f"local feedback {gain:g}": gains.with_local_gain(gain) for gain in LOCAL_GAINS if gain > gains.local_gain
     }
     wall = stated["wall.stiffness"].value
+    simulator = ContactSimulator(device, loop, stated, delay, most)
     schemes = tuple(
-        _assess_scheme(name, scheme_gains, draws, stiffness, delay, frictions, wall, probability)
+        _assess_scheme(
+            name, scheme_gains, draws, stiffness, delay, frictions, wall, probability, simulator.bounces(scheme_gains)
+        )
         for name, scheme_gains in gains_by_name.items()
     )
     stable_at_wall = float(
@@ -213,7 +229,7 @@ def assess_teleoperation(fit: Record, path: Path, bends: Bends, probability: flo
         wall,
         stable_at_wall,
         schemes,
-        simulate_contact(device, loop, stated, gains, delay, most),
+        simulator.trace(gains),
     )
 
 
@@ -264,6 +280,7 @@ def _assess_scheme(
     frictions: Draws,
     wall: float,
     probability: float,
+    bounces: np.ndarray,
 ) -> CouplingScheme:
     """Assess one coupling: what is felt, and which walls are stable."""
     radius = spectral_radius_in_contact(_build_master_and_slave(draws, stiffness, 0.0), gains, delay)
@@ -279,7 +296,7 @@ def _assess_scheme(
     free = Interval.of(np.asarray(free_motion_torque(gains, frictions["rope"], frictions["motor"], frictions["slave"])))
     free_motion_stable = float(np.mean(is_stable(radius)))
     hardest = 0.0 if free_motion_stable < probability else find_hardest_wall(WALLS, stable, probability)
-    return CouplingScheme(name, free, transmitted, free_motion_stable, stable, hardest, float(np.median(radius)))
+    return CouplingScheme(name, free, transmitted, free_motion_stable, stable, hardest, float(np.median(radius)), bounces)
 
 
 def find_hardest_wall(walls: np.ndarray, stable: np.ndarray, probability: float) -> float | None:

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from bowdenfit.arguments import FIT, PATH, RESULTS, Bends, Output, Seed, read_first
 from bowdenfit.questions import teleoperate as _teleoperate
 from bowdenfit.questions.writing import answer_files, write_answer
-from bowdenfit.verb import Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.teleoperate.answer import Teleoperation
@@ -52,7 +52,8 @@ def teleoperate(
 def _reply(answer: "Teleoperation", options: dict[str, Any]) -> Reply:
 
     notes = tuple(f"Wrote {path}." for path in answer_files(options["output"], NAME)) if options["output"] else ()
-    return Reply(_teleoperate.teleoperation_text(answer), lambda: answer, notes, csv=answer.to_csv)
+    exit_code = NOT_TRUSTED if answer.contradicted else 0
+    return Reply(_teleoperate.teleoperation_text(answer), lambda: answer, notes, exit_code, csv=answer.to_csv)
 
 
 VERB = Verb(
@@ -62,9 +63,9 @@ VERB = Verb(
 
     For a loop that drives a slave against a wall, over the uncertainty of the fit:
     torque in free motion, stiffness in contact, and which walls are touched without
-    bouncing,
-    with four channels between master and slave, with two, and with feedback of the
-    master's own torque.
+    bouncing, by the linear loop and in simulations with dry friction (exit code 3
+    where these differ about the stated wall), with four channels between master and
+    slave, with two, and with feedback of the master's own torque.
 
     DEVICE is a device.toml; datasets/haptic-teleoperation has one, whose README
     says which numbers are published and which are assumed.

@@ -42,7 +42,7 @@ def test_a_package_index_gets_no_link_or_image_that_is_dead_there(source, monkey
     targets = re.findall(r"\]\(([^)]*)\)", page)
     files = {file for file in re.findall(r"\]\(([^)]*)\)", README) if "://" not in file}
     assert all(target.startswith("https://") for target in targets) and all(file in page for file in files)
-    assert page.count("![") == (1 if source else 0)
+    assert page.count("![") == (2 if source else 0)
     if source:
         assert f"{source}raw/HEAD/fits/published/on-body-exoskeleton/figures/efficiency.png" in targets
         assert [target for target in targets if "//" in target.removeprefix("https://")] == []

@@ -66,7 +66,7 @@ def test_outside_the_curves_a_row_needs_its_own_angles(quick_fit, table):
     [
         ("cable_length_mm,colour\n450,red\n", r"rows.csv: predict does not use 'colour'; it uses cable_length"),
         ("bracket edge (deg)\n30\n", "rows.csv has no column cable_length_mm"),
-        (HEAD + "450,,100,hold\n", "no stroke in which the rope slides"),
+        (HEAD + "450,,100,hold\n", "must be a stroke in which the rope slides"),
         (HEAD + "450,,-5,pull\n", "row 2.*'-5' is not positive"),
         (HEAD + "450,,,pull\n", "row 2"),
         (HEAD + "450,-3,5,pull\n", "negative"),

@@ -9,20 +9,25 @@ import numpy as np
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.style import BLUE, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, VERMILLION, in_paper_style
 from bowdenfit.questions.teleoperate.stability import FREE_SECONDS
+from bowdenfit.words import listed
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.teleoperate.answer import Teleoperation
 
 HEADING = "What a hand feels of a remote wall"
+RISE = 0.05  # of the probability of stable contact, from which a second rise is said; a judgement
 _HEIGHT, _DOWN = 1.7, 0.62  # in
 
 
 def caption(answer: Teleoperation) -> str:
     """Say what is drawn, in plain words."""
+    rises = [s.name for s in answer.schemes if s.stable[-1] > s.stable.min() + RISE]
+    again = f"harder walls than the worst are likelier stable again with {listed(rises)}; " if rises else ""
     return (
         "Top left: probability that the slave touches a wall without oscillating, by the stiffness of the wall, for each "
-        f"coupling; the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median parameters, "
+        "coupling, by the linear loop without dry friction; "
+        f"{again}the gray line is {100 * answer.probability:.0f} %. The others are one simulation with median parameters, "
         "in free motion for 2 s and then against the wall: angles of the master's joint and of the slave, torques of hand and "
         "wall, and each torque against its angle in contact, with the stiffness that a hand feels by the formula. "
         f"n = {answer.draws} devices and {len(answer.walls)} walls."
@@ -49,7 +54,7 @@ def _draw_walls(axes: Axes, answer: Teleoperation) -> None:
     axes.axhline(100 * answer.probability, color=GRAY, linewidth=0.8)
     axes.set_xscale("log")
     axes.set(xlabel="Stiffness of the wall (N m/rad)", ylabel="Stable contact (%)", ylim=(-3, 103))
-    axes.set_title("Which walls are stable", loc="left")
+    axes.set_title("Which walls are stable, linear loop", loc="left")
 
 
 def _draw_traces(position: Axes, torque: Axes, answer: Teleoperation) -> None:

@@ -26,7 +26,11 @@ extensions = [
 ]
 exclude_patterns = ["extensions"]
 nitpicky = True
-nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", ".*")]  # of libraries, and of what has no page
+nitpick_ignore_regex = [  # of libraries, and of what has no page
+    ("py:class", ".*"),
+    ("py:exc", ".*"),
+    ("py:obj", r"typing\.Literal\[.*"),
+]
 default_role = "code"  # single backquotes in docstrings
 
 html_theme = "furo"

@@ -105,6 +105,7 @@ def test_two_tabs_show_the_same_and_every_page_can_be_read(chromium, tmp_path, q
         assert faults_of(other) == []
         other.goto(f"{app.root}/fit/..%2F..")
         assert other.locator("[role=alert]").count() == 1 or "Not Found" in other.content()
+        visit.console.remove("Failed to load resource: the server responded with a status of 404 (Not Found)")
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ def visiting(chromium, app: Served, width=1280, **settings):
         watch(visit, visit.page, app)
         visit.page.goto(app.address)
         yield visit
-        assert not visit.faults()
+        assert visit.faults() == [], visit.faults()
     finally:
         context.close()
 

@@ -49,8 +49,8 @@ def test_the_torque_at_the_joint_is_the_moment_arm_times_what_arrives(fit, tmp_p
     mu = fit.posterior.values["mu3"].ravel()
     straight = fit.efficiency_draws([470])[:, 0] * np.exp(mu * np.pi / 4)
     torque = 0.1 * arms * straight[:, None] * np.exp(-mu[:, None] * np.deg2rad(angles))  # 100 N times mm, in N m
-    assert row["torque_N_m"] == pytest.approx(np.median(torque.mean(axis=1)), rel=1e-7)
-    assert row["most_torque_N_m_q95"] == pytest.approx(np.quantile(torque.max(axis=1), 0.95), rel=1e-7)
+    assert row["torque_N_m"] == pytest.approx(np.median(torque.mean(axis=1)), rel=1e-6)
+    assert row["most_torque_N_m_q95"] == pytest.approx(np.quantile(torque.max(axis=1), 0.95), rel=1e-6)
     assert "torque_N_m" not in bf.predict(fit, [470], contact="bracket edge", gait=path)[0]
     assert "N*m" in str(bf.predict(fit, [470], contact="bracket edge", gait=path, input_force=(100, "N")))
 
@@ -68,8 +68,8 @@ def test_a_swing_at_even_angles_has_the_mean_of_its_closed_form(fit, swing):
     (row,) = bf.predict(fit, [470], contact="bracket edge", gait=swing)
     step = np.exp(-mu * np.deg2rad(0.5))
     mean = straight * (1 - step**91) / (1 - step) / 91  # a geometric series of steps of half a degree
-    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-9)
-    assert row["q05"] == pytest.approx(np.quantile(mean, 0.05), rel=1e-9)
+    assert row["efficiency"] == pytest.approx(np.median(mean), rel=1e-6)
+    assert row["q05"] == pytest.approx(np.quantile(mean, 0.05), rel=1e-6)
 
 
 def test_the_best_length_does_not_move_with_the_angle_of_a_contact_that_stays(fit):

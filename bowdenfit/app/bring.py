@@ -1,4 +1,4 @@
-"""Pages on which measurements are brought: the start, the files of a new data set, a data set as `check` understands it."""
+"""Pages on which measurements are brought: the start, and the files of a new data set."""
 
 from collections.abc import Awaitable, Callable
 from functools import partial
@@ -13,9 +13,7 @@ from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
 from bowdenfit.app.sheet import FILE as TYPED
 from bowdenfit.app.sheet import TypedSheet
 from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name
-from bowdenfit.errors import BowdenfitError
 from bowdenfit.files import FORMATS
-from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 
 _BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
@@ -271,43 +269,3 @@ def _show_writing(workbench: Workbench, draft: Draft) -> None:
             text_input("folder", name["folder"], lambda typed: name.update(folder=typed))
         with block("div", "row"):
             button("Write the data set", lambda: attempt(write), "primary")
-
-
-async def show_data_set(workbench: Workbench, name: str) -> None:
-    """Show a data set as `check` understands it, and the button that fits it."""
-    folder, fit = workbench.data_set(name), {"name": workbench.free_name(name), "seed": ""}
-
-    def start() -> None:
-        seed = int(fit["seed"]) if fit["seed"].strip() else None
-        workbench.start_fit(fit["name"], name, seed)
-        ui.navigate.to(f"/fit/{fit['name']}")
-
-    with frame(workbench.title_of(name)):
-        with section("Fit it", "fit"):
-            with block("div", "row"):
-                button("Fit", lambda: attempt(start), "primary")
-                link("Live: fit again after each mounting", f"/live/{name}", "button")
-            with block("details"):
-                text("Name and seed", "summary")
-                with field("Kept as fits/", "fit-name"):
-                    text_input("fit-name", fit["name"], lambda typed: fit.update(name=typed))
-                with field("Seed of everything random", "seed", "A whole number; random, and recorded, where it is empty."):
-                    text_input("seed", "", lambda typed: fit.update(seed=typed))
-        with section("As it is understood", "understood"):
-            place = block("div", aria_live="polite")
-    with place:
-        text("Reading ...")
-
-    async def look() -> None:
-        try:
-            report, refusal = str(await workbench.compute(check, folder)), ""
-        except BowdenfitError as error:
-            report, refusal = "", str(error)
-        place.clear()
-        with place:
-            if refusal:
-                refused(refusal)
-            else:
-                text(report, "pre", tabindex="0")
-
-    ui.timer(0.05, look, once=True)

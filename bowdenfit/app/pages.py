@@ -7,7 +7,8 @@ from fastapi.responses import FileResponse, PlainTextResponse
 from nicegui import ui
 
 from bowdenfit.app.ask import export_file
-from bowdenfit.app.bring import show_data_set, show_draft, show_start
+from bowdenfit.app.bring import show_draft, show_start
+from bowdenfit.app.data_set import DataSetPage
 from bowdenfit.app.frame import frame, refused, style_and_script
 from bowdenfit.app.live import LivePage
 from bowdenfit.app.see import FitPage
@@ -46,13 +47,13 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
             _show_refusal("New data set", "These files are gone, because the app was started anew since; bring them again.")
 
     @ui.page("/data/{name}")
-    async def data_set(name: str) -> None:
+    def data_set(name: str) -> None:
         try:
             workbench.data_set(name)
         except BowdenfitError as error:
             _show_refusal(name, str(error))
         else:
-            await show_data_set(workbench, name)
+            DataSetPage(workbench, name)
 
     @ui.page("/fit/{name}")
     def fit(name: str) -> None:
@@ -62,7 +63,6 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
             _show_refusal(name, str(error))
         else:
             FitPage(workbench, name)
-
 
     @ui.page("/live/{name}")
     def live(name: str) -> None:
@@ -113,7 +113,6 @@ def _register_files(workbench: Workbench, application: FastAPI) -> None:
             return Response(await workbench.draw_figure(fit, name.removesuffix(".png")), media_type="image/png")
         except BowdenfitError as error:
             return PlainTextResponse(str(error), _MISSING)
-
 
     @application.get("/export/{fit}/{target}")
     async def get_export(fit: str, target: str) -> Response:

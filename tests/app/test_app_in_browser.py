@@ -56,6 +56,12 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
         page.get_by_role("button", name="Write the data set").click()
         page.get_by_role("heading", name="bench-1").wait_for()
         page.get_by_text("Everything could be read").wait_for()
+        page.get_by_text("Name and seed").click()
+        page.get_by_label("Seed").fill("many")
+        page.get_by_role("button", name="Fit", exact=True).click()
+        page.locator("#seed-fault").wait_for()
+        assert page.inner_text("#seed-fault") == "--seed = 'many' must be a whole number from 0 to 2147483647."
+    assert not (folder / "fits" / "bench-1").exists()
     assert bf.check(folder / "bench-1").description.name == "bench 1"
     assert (folder / "bench-1" / "bench 1.csv").read_text() == TABLE
 

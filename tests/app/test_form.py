@@ -2,9 +2,11 @@
 
 import pytest
 
+from bowdenfit.app.data_set import read_seed
 from bowdenfit.app.draft import Draft
 from bowdenfit.app.form import Form, UnansweredError
 from bowdenfit.cli.init_dialog import start_data_set
+from bowdenfit.errors import UsageError
 from bowdenfit.questions.start.question import number_question, quantity_question, yes_no_question
 
 TABLE = "F_in (N),F_out (N),run\n20,15.2,1\n40,30.1,1\n20,15.0,2\n40,30.9,2\n20,14.8,3\n40,29.9,3\n"
@@ -98,3 +100,11 @@ def test_a_draft_with_open_questions_is_not_written(draft_of, tmp_path):
     with pytest.raises(Exception, match="questions are still open"):
         draft.write(tmp_path / "x")
     assert not (tmp_path / "x").exists()
+
+
+def test_a_seed_that_is_typed_is_read_and_refused_as_the_command_line_does():
+    assert [read_seed(typed) for typed in ("", "  ", " 3 ")] == [None, None, 3]
+    for typed in ("abc", "1.5", "-1", "9" * 30):
+        with pytest.raises(UsageError) as refusal:
+            read_seed(typed)
+        assert str(refusal.value) == f"--seed = '{typed}' must be a whole number from 0 to 2147483647."

@@ -1,0 +1,97 @@
+"""The page of a data set: how `check` understands it, and the button that fits it."""
+
+from nicegui import ui
+
+from bowdenfit.app.elements import block, button, field, link, text, text_input
+from bowdenfit.app.frame import attempt, frame, refused, section
+from bowdenfit.app.workbench import Workbench
+from bowdenfit.arguments import read_arguments
+from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.questions.check.verb import check
+from bowdenfit.run.verb import fit as fit_verb
+
+
+def read_seed(typed: str) -> int | None:
+    """Return a seed as `bowdenfit fit --seed` takes it; None, for one that is random, where nothing is typed.
+
+    Args:
+        typed: As it is typed.
+
+    Raises:
+        UsageError: It is not a whole number, is negative, or is too large.
+    """
+    seed: int | None = read_arguments(fit_verb, {"seed": typed.strip() or None}, typed=True)["seed"]
+    return seed
+
+
+class DataSetPage:
+    """The page of a data set.
+
+    Args:
+        workbench: Where it lies.
+        name: Of the data set.
+    """
+
+    def __init__(self, workbench: Workbench, name: str) -> None:
+        self._workbench, self._name = workbench, name
+        self._fit_name, self._seed = workbench.free_name(name), ""
+        with frame(workbench.title_of(name)):
+            with section("Fit it", "fit"):
+                with block("div", "row"):
+                    button("Fit", lambda: attempt(self._start), "primary")
+                    link("Live: fit again after each mounting", f"/live/{name}", "button")
+                with block("details"):
+                    text("Name and seed", "summary")
+                    with field("Kept as fits/", "fit-name"):
+                        text_input("fit-name", self._fit_name, self._state_name)
+                    self._seed_place = block("div")
+                    self._show_seed()
+            with section("As it is understood", "understood"):
+                self._place = block("div", aria_live="polite")
+        with self._place:
+            text("Reading ...")
+        ui.timer(0.05, self._look, once=True)
+
+    def _state_name(self, typed: str) -> None:
+        self._fit_name = typed
+
+    def _state_seed(self, typed: str) -> None:
+        """Take a seed, or say beside it why it cannot be taken."""
+        self._seed, fault = typed, ""
+        try:
+            read_seed(typed)
+        except UsageError as error:
+            fault = str(error)
+        self._show_seed(fault)
+
+    def _show_seed(self, fault: str = "") -> None:
+        """Show the field of the seed, with why what is typed cannot be taken."""
+        self._seed_place.clear()
+        hint = "A whole number; random, and recorded, where it is empty."
+        with self._seed_place, field("Seed of everything random", "seed", hint, fault):
+            line = text_input("seed", self._seed, self._state_seed)
+            line.props["aria-describedby"] = "seed-fault seed-hint" if fault else "seed-hint"
+            line.props["aria-invalid"] = str(bool(fault)).lower()
+
+    def _start(self) -> None:
+        """Start the fit.
+
+        Raises:
+            UsageError: The seed or the name cannot be taken, or the fit runs already.
+        """
+        self._workbench.start_fit(self._fit_name, self._name, read_seed(self._seed))
+        ui.navigate.to(f"/fit/{self._fit_name}")
+
+    async def _look(self) -> None:
+        """Show what `check` says."""
+        folder = self._workbench.data_set(self._name)
+        try:
+            report, refusal = str(await self._workbench.compute(check, folder)), ""
+        except BowdenfitError as error:
+            report, refusal = "", str(error)
+        self._place.clear()
+        with self._place:
+            if refusal:
+                refused(refusal)
+            else:
+                text(report, "pre", tabindex="0")

@@ -1,11 +1,12 @@
 """What is asked of a fit on its page: what arrives where dials stand, what to measure next, and files for other programs."""
 
 import asyncio
+from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import TYPE_CHECKING, Any, cast
 
 from nicegui import ui
 
@@ -16,8 +17,11 @@ from bowdenfit.app.workbench import Workbench
 from bowdenfit.display import as_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
+from bowdenfit.questions import export as export_room
 from bowdenfit.questions import next as next_room
 from bowdenfit.questions.export.verb import Target, export
+from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY
+from bowdenfit.words import capitalized
 
 if TYPE_CHECKING:
     from bowdenfit.app.dials import Dial
@@ -129,24 +133,25 @@ def show_next(workbench: Workbench, fit: "Fit") -> None:
         with place:
             markup(words, "div", id="ranking")
 
-    with section("What to measure next", "next"), block("div", role="status") as place:
+    with section(next_room.TITLE, "next"), block("div", role="status") as place:
         button("Rank what could be measured next", rank)
-
-
-_PROGRAMS = {
-    "c": "C", "fmu": "an FMU", "mujoco": "MuJoCo", "matlab": "MATLAB", "python": "Python", "yaml": "YAML",
-    "csv": "a spreadsheet",
-}  # fmt: skip
 
 
 def show_files(name: str) -> None:
     """Show links to the report, to the data of a fit, and to what other programs read of it."""
-    with section("Files", "kept-files"), block("ul", "links"):
-        for words, address in (
-            ("Report", f"/kept/{name}/report.html"), ("Everything it says", f"/kept/{name}/details.txt"),
-            ("summary.json", f"/kept/{name}/summary.json"), ("Draws, posterior.nc", f"/kept/{name}/posterior.nc"),
-            *((f"For {_PROGRAMS.get(target, target)}", f"/export/{name}/{target}") for target in get_args(Target)),
-        ):  # fmt: skip
+    kept = (
+        ("Report", REPORT), ("Everything it says", DETAILS_TEXT), (SUMMARY, SUMMARY), (f"Draws, {POSTERIOR}", POSTERIOR),
+    )  # fmt: skip
+    with section("Files", "kept-files"):
+        _show_links([(words, f"/kept/{name}/{file}") for words, file in kept])
+        text("For other programs:")
+        _show_links([(capitalized(words), f"/export/{name}/{target}") for target, words in export_room.NAMES.items()])
+
+
+def _show_links(links: Sequence[tuple[str, str]]) -> None:
+    """Show links, as (words, address), in a row."""
+    with block("ul", "links"):
+        for words, address in links:
             with block("li"):
                 link(words, address, target="_blank")
 
@@ -162,7 +167,7 @@ def export_file(fit: "Fit", target: str) -> tuple[str, bytes]:
         UsageError: There is no such format, or it cannot express the cable.
     """
     with TemporaryDirectory() as folder:
-        endings = {"c": "h", "mujoco": "xml" if fit.model.cable.is_loop else "py", "matlab": "m"}
-        name = f"cable.{endings.get(target, target)}"
+        needs_callback = target == "mujoco" and not fit.model.cable.is_loop
+        name = f"cable{export_room.CALLBACK_ENDING if needs_callback else export_room.ENDINGS.get(target, '')}"
         export(fit, cast("Target", target), output=Path(folder) / name)
         return name, (Path(folder) / name).read_bytes()

@@ -15,6 +15,7 @@ from bowdenfit.app.workbench import Workbench
 from bowdenfit.display import as_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
+from bowdenfit.questions import next as next_room
 from bowdenfit.questions import report as report_room
 from bowdenfit.questions.summary.verb import reply, summary
 from bowdenfit.results.folder import FIT as FIT_FILE
@@ -23,7 +24,6 @@ from bowdenfit.verb import Reply
 if TYPE_CHECKING:
     from bowdenfit.results.record import Record
 
-FIGURES_TITLE, NEXT_TITLE = "Figures", "What to measure next"  # of sections of the report that have their own places here
 _TICK = 0.5  # s between two looks at a fit that runs; a judgement
 
 
@@ -144,7 +144,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         show_arriving(workbench, fit)
         show_next(workbench, fit)
         show_files(name)
-    with right, section("Figures", "figures"):
+    with right, section(report_room.FIGURES_TITLE, "figures"):
         markup(pictures, "div")
     with below:
         for heading, html in others:
@@ -157,8 +157,9 @@ def _render_report(name: str, fit: "Record", figures: dict[str, Any]) -> list[An
     drawings = {figure: f"/kept/{name}/{figure}.png" for figure in figures}
     sections = {part.title: render_section(part, drawings) for part in report_room.report_page(fit, figures).sections}
     first, *others = sections
-    shown = [(title, sections[title]) for title in others if title not in {FIGURES_TITLE, NEXT_TITLE}]
-    return [sections[first], *shown, sections.get(FIGURES_TITLE, "")]
+    elsewhere = {report_room.FIGURES_TITLE, next_room.TITLE}  # which have their own places on this page
+    shown = [(title, sections[title]) for title in others if title not in elsewhere]
+    return [sections[first], *shown, sections.get(report_room.FIGURES_TITLE, "")]
 
 
 def _kind_of(printed: Reply) -> str:

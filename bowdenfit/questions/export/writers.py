@@ -85,15 +85,18 @@ def _table_text(tables: TransmissionTables, heads: Sequence[str], rows: Sequence
     return csv_comment(wrap_comment(tables.sentences)) + csv_table(heads, rows, number=lambda value: repr(float(value)))
 
 
-_ENDINGS: Mapping[str, str] = {
-    "c": ".h",
-    "csv": ".csv",
-    "fmu": ".fmu",
-    "matlab": ".m",
-    "mujoco": ".xml",
-    "python": ".py",
-    "yaml": ".yaml",
-}
+ENDINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "c": ".h",
+        "csv": ".csv",
+        "fmu": ".fmu",
+        "matlab": ".m",
+        "mujoco": ".xml",
+        "python": ".py",
+        "yaml": ".yaml",
+    }
+)
+CALLBACK_ENDING = ".py"  # for MuJoCo, of a cable that is no taut loop
 _OF_TURNS = ("c", "csv", "matlab", "python")  # which have friction that builds up after a turn
 NAMES: Mapping[str, str] = MappingProxyType(
     {
@@ -305,7 +308,7 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
         StoreError: The file exists already, or cannot be written.
     """
     to = options.to
-    path = Path(make_identifier(fit.name) + _ENDINGS[to]) if output is None else output
+    path = Path(make_identifier(fit.name) + ENDINGS[to]) if output is None else output
     if path.exists() and not (options.force and path.is_file()):
         raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
     fit.draws()

@@ -12,13 +12,14 @@ from bowdenfit.plots.curves import route_limits, shade_outside
 from bowdenfit.plots.layout import LEFT, TITLE, legend_above, panels, text_width, wrap_words
 from bowdenfit.plots.panels import show_plain_numbers
 from bowdenfit.plots.style import BLACK, GRAY, SERIES_COLORS, SERIES_LINES, SERIES_MARKERS, axis_label, in_paper_style
+from bowdenfit.questions.next.words import TITLE as NEXT_TITLE
 from bowdenfit.words import counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.questions.next.answer import NextMeasurement
 
-HEADING = "What to measure next"
+HEADING = NEXT_TITLE
 WIDTH = 5.6  # in
 MAX_ROWS = 14  # candidates in the figure without a route
 ROW_HEIGHT = 0.19  # in, of each of them

@@ -46,6 +46,7 @@ from bowdenfit.results.store import load
 ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, budget_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
 _PHONE, _PHONE_WIDTHS = 3.0, {"pairs": 3.6}  # in, so that panels stand one below the other and letters can be read
+FIGURES_TITLE = "Figures"
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
 CHARTS: dict[str, tuple[Callable[[Any], tuple[Chart, ...]], Callable[[Any], str]]] = {  # charts of a figure, and their caption
@@ -62,7 +63,7 @@ def figures_section(figures: dict[str, Any]) -> PageSection | None:
     """
     names = sorted(figures, key=lambda name: (name in FOLDED, name not in FIRST))
     pictures = tuple(_figure_picture(name, figures[name]) for name in names)
-    return prose_section("Figures", (), pictures=pictures) if pictures else None
+    return prose_section(FIGURES_TITLE, (), pictures=pictures) if pictures else None
 
 
 def _figure_picture(name: str, data: Any) -> Picture:

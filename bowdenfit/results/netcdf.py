@@ -16,7 +16,7 @@ from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.files.apart import Limits, call_isolated
 from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
-from bowdenfit.results.serialization import round_to_single
+from bowdenfit.results.serialization import to_single
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
@@ -95,7 +95,7 @@ def _shorten(values: np.ndarray) -> np.ndarray:
     """Return an array as it is written: flags as integers, and numbers of single precision in as many bytes as these take."""
     if values.dtype == bool:
         return values.astype("int8")
-    is_single = values.dtype == np.float64 and np.array_equal(values, round_to_single(values), equal_nan=True)
+    is_single = values.dtype == np.float64 and np.array_equal(values, to_single(values), equal_nan=True)
     return values.astype(np.float32) if is_single else values
 
 

@@ -27,7 +27,7 @@ from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
-from bowdenfit.results.serialization import round_to_single
+from bowdenfit.results.serialization import round_draws
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 from bowdenfit.stages import announce_stage
 
@@ -214,11 +214,12 @@ def _sampler_draws(model: Model, chain: Chain) -> SamplerDraws:
 
 
 def _posterior(model: Model, chain: Chain, implied: Callable[[np.ndarray], Any], seed: int) -> Draws:
-    """Return the draws of a chain with what they imply, and draws from the prior, all as numbers of single precision.
+    """Return the draws of a chain with what they imply, and draws from the prior, as numbers of single precision where that
+    loses nothing.
 
-    These have seven digits, far more than the Monte Carlo error leaves, and take half the room in the results folder.
+    These have seven digits, mostly far more than the Monte Carlo error leaves, and take half the room in the results folder.
     """
-    z, optimum = round_to_single(chain.z), {name: round_to_single(values) for name, values in chain.quantities.items()}
+    z, optimum = round_draws(chain.z), {name: round_draws(values) for name, values in chain.quantities.items()}
     of_chain = vars(chain) | {"z": z, "optimum": optimum}
     kept = {name: value for name, value in of_chain.items() if name not in ("quantities", "reasons")}
-    return Draws(**kept, **jax.tree.map(round_to_single, imply_groups(model, z, implied, seed)))
+    return Draws(**kept, **jax.tree.map(round_draws, imply_groups(model, z, implied, seed)))

@@ -12,6 +12,7 @@ from sealed import edit_sealed
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint
 from bowdenfit.outputs import replace_atomically
+from bowdenfit.results.serialization import round_draws, to_single
 
 DATA_SETS = ROOT / "datasets"
 QUICK = (
@@ -236,6 +237,17 @@ def test_draws_are_written_in_single_precision(saved):
 
     with h5py.File(saved[1] / "posterior.nc") as file:
         assert file["posterior"]["mu1"].dtype == file["log_likelihood"]["wrap_angle"].dtype == np.float32
+
+
+def test_rounding_hides_nothing_of_how_draws_scatter():
+    """A coefficient of 1 known to 1e-7 stays as it is, beside one that is known to 1 %, and one that may be infinite."""
+    rng = np.random.default_rng(1)
+    draws = 1 + rng.standard_normal((2, 500, 3)) * [1e-7, 1e-2, 1e-2]
+    draws[0, 0, 2] = np.inf
+    rounded = round_draws(draws)
+    np.testing.assert_array_equal(rounded[..., [0, 2]], draws[..., [0, 2]])
+    np.testing.assert_array_equal(rounded[..., 1], draws[..., 1].astype(np.float32))
+    assert np.ptp(to_single(draws)[..., 0]) > 0 and np.isclose(np.std(rounded[..., 0]), 1e-7, rtol=0.1)
 
 
 @pytest.mark.parametrize("change", ["friction.mu1.fixed=0.1", "tables.angles.undetected=dropped"])

@@ -10,11 +10,6 @@ from bowdenfit.words import percent
 # Ratio of the ends of the 90 % interval of a positive quantity that is two standard deviations clear of 0, or more.
 _CLEAR_OF_PLAY = 10.0
 
-_LAG = (
-    " How friction changes with speed (stribeck, stribeck_speed, viscous) is known worse under lugre than its intervals say: "
-    "blocks lose how friction lags behind the speed."
-)
-
 
 @dataclass(frozen=True)
 class Presliding:
@@ -23,12 +18,10 @@ class Presliding:
     Args:
         creep: Relative change of the output force in which friction builds up by 63 % [1]; 0 is the play operator.
         force: Force at which that holds, where friction depends on the load [N]; NaN where it does not.
-        lags: Whether friction also changes with the speed, of which its blocks lose the lag.
     """
 
     creep: Interval
     force: float
-    lags: bool = False
 
     @property
     def is_play(self) -> bool:
@@ -37,9 +30,6 @@ class Presliding:
 
     def sentence(self) -> str:
         """Say how far the rope creeps, or that the readings cannot tell."""
-        return self._creep_sentence() + (_LAG if self.lags else "")
-
-    def _creep_sentence(self) -> str:
         at = f" at {self.force:g} N" if self.force > 0 else ""
         if self.is_play:
             return (
@@ -60,4 +50,4 @@ def estimate_presliding(fit: Record) -> Presliding | None:
         return None
     friction = fit.model.cable.friction
     force = friction.conditions.reference_force if friction.depends_on_load else float("nan")
-    return Presliding(Interval.of(1 / fit.posterior.values[PRESLIDING_STIFFNESS]), force, "lugre" in friction.options)
+    return Presliding(Interval.of(1 / fit.posterior.values[PRESLIDING_STIFFNESS]), force)

@@ -41,11 +41,6 @@ _PROBLEMS = {
     TOO_NARROW: "the intervals of this friction model are too narrow",
     NOT_IDENTIFIABLE: "the measurements do not determine every coefficient",
 }
-_LUGRE = (
-    "Under lugre, 90 % intervals of how friction changes with speed contained the truth in 3 to 11 of 13 simulated recordings, "
-    "since blocks lose how friction lags behind the speed. Take what depends on speed from --friction rate-dependent, and the "
-    "creep after a turn from --friction dahl."
-)  # docs/theory.md
 _TRUSTED = "You can trust this: the fit has converged, and the readings agree with the model and with each other."
 _TRUSTED_ALONE = "You can trust this: the fit has converged, and the reading agrees with the model."
 _IN_DOUBT = (
@@ -74,7 +69,7 @@ class Verdict(Display):
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
-            `NOT_DESCRIBED`, `COPIED`, `COARSE`; each with sentences.
+            `NOT_DESCRIBED`, `COPIED`, `COARSE`, `TOO_NARROW`; each with sentences.
         sampled: Whether there are draws.
         doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
@@ -109,15 +104,10 @@ def assess_fit(fit: Record) -> Verdict:
         COPIED: copies,
         COARSE: describe_coarse_readings(fit),
         NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
-        TOO_NARROW: describe_narrow_intervals(fit),
+        TOO_NARROW: fit.model.cable.friction.cautions,
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit))
-
-
-def describe_narrow_intervals(fit: Record) -> tuple[str, ...]:
-    """Say that intervals of a friction model hold the truth too seldom, of a model that is known for it."""
-    return (_LUGRE,) if "lugre" in fit.model.cable.friction.options else ()
 
 
 def _describe_doubts(fit: Record) -> tuple[str, ...]:

@@ -18,7 +18,6 @@ from bowdenfit.words import capitalized, listed
 TITLE = "Two cables side by side"
 _COLORS = ("blue", "vermillion")
 _DRAWS = 20_000  # of a difference: its 90 % interval then has an error of 1 % of its width; a judgement
-_TABLES = (".toml",)  # endings of files that are no measurements
 _CURVE_POINTS = 121  # of an efficiency along the route; a judgement
 
 
@@ -86,7 +85,7 @@ def _named(quantity: str) -> str:
 
 def _files(fit: Record) -> Iterator[tuple[str, str]]:
     """Yield name and checksum of the measured files of a fit."""
-    return ((name, checksum) for name, checksum in fit.dataset.sha256.items() if not name.endswith(_TABLES))
+    return ((name, checksum) for name, checksum in fit.dataset.sha256.items() if not name.endswith(".toml"))
 
 
 def _common_draws(one: Record, other: Record) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
+from bowdenfit.arguments import ANSWER, PATH, RESULTS, TEXTS, Output, numbers_by_name, read_first, whole_number
 from bowdenfit.questions import next as room
 from bowdenfit.questions.writing import answer_files, write_answer
 from bowdenfit.verb import Reply, Verb
@@ -21,10 +21,7 @@ NAME = "next_measurement"
 @read_first
 def next_measurement(
     fit: Annotated["Record | str | Path", RESULTS, PATH],
-    answer: Annotated[
-        str | None,
-        Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient"),
-    ] = None,
+    answer: Annotated[str | None, ANSWER] = None,
     candidates: Annotated[
         Sequence[str],
         Parameter("--candidate", metavar="KIND@WHERE", show_default="all that the data set's tables can hold"),

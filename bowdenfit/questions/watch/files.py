@@ -15,7 +15,6 @@ from pathlib import Path
 
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files.formats import TEXT
-from bowdenfit.words import few
 
 QUIET = 0.5  # s without a change after which a file is settled
 _LONG = 100_000  # bytes from which a file that grows is taken for a log; a judgement: tables have some kB
@@ -120,11 +119,6 @@ class BenchFiles:
     def unsettled(self, now: float) -> list[Path]:
         """Return files that somebody seems to write, or to replace."""
         return [path for path, state in self.states.items() if not state.is_settled(path, now)]
-
-    def describe_waiting(self, now: float) -> str:
-        """Return which files are waited for, in words; empty where there is none."""
-        names = [path.name for path in self.unsettled(now)]
-        return f"waiting for {few(names)}, which {'still change' if len(names) > 1 else 'still changes'}" if names else ""
 
     def copy_settled(self, now: float) -> Path | None:
         """Copy what is settled and return where it is; None where a file changed meanwhile."""

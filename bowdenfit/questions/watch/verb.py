@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from cyclopts import Parameter
 
-from bowdenfit.arguments import DATASET, HIDDEN, LENGTHS, PATH, Length, Output, Seed, read_first
+from bowdenfit.arguments import ANSWER, DATASET, HIDDEN, LENGTHS, PATH, Length, Output, Seed, read_first
 from bowdenfit.errors import UsageError
 from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.questions import watch as room
@@ -24,10 +24,7 @@ NAME = "history"
 @read_first
 def watch(
     dataset: Annotated["str | Path", DATASET, PATH],
-    answer: Annotated[
-        str | None,
-        Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient"),
-    ] = None,
+    answer: Annotated[str | None, ANSWER] = None,
     until: Annotated[Length | None, Parameter(metavar="UNCERTAINTY"), LENGTHS] = None,
     *,
     output: Output = None,

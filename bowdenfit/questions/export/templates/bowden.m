@@ -56,13 +56,17 @@ $step_words
     end
 end
 
-function [other, flags] = slid(T, level, place, speed, force, stroke, sign)
+function level = level_number(T, level)
     if ischar(level)
         level = find(strcmp(T.names, level));
     end
     if numel(level) ~= 1 || level < 1 || level > numel(T.names)
         error('$function:level', 'unknown level; see $function(''levels'')');
     end
+end
+
+function [other, flags] = slid(T, level, place, speed, force, stroke, sign)
+    level = level_number(T, level);
     [force, place, speed, stroke] = same_size(force, place, speed, stroke);
     flags = (place < T.place(1) | place > T.place(end)) * T.varies;
     x = min(max(place, T.place(1)), T.place(end));
@@ -108,12 +112,7 @@ function [other, flags] = slid(T, level, place, speed, force, stroke, sign)
 end
 
 function [output, flags, state] = crept(T, level, place, speed, force, seconds, state)
-    if ischar(level)
-        level = find(strcmp(T.names, level));
-    end
-    if numel(level) ~= 1 || level < 1 || level > numel(T.names)
-        error('$function:level', 'unknown level; see $function(''levels'')');
-    end
+    level = level_number(T, level);
     [force, place, speed, seconds] = same_size(force, place, speed, seconds);
     flags = (place < T.place(1) | place > T.place(end)) * T.varies;
     x = min(max(place, T.place(1)), T.place(end));

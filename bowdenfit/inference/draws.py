@@ -17,6 +17,7 @@ from bowdenfit.models import Model
 PRIOR_DRAWS = 4096  # of which 205 lie beyond either end of a 90 % interval; a judgement
 BATCH = 1024  # draws that a compiled program takes at a time
 _SMALL = 10_000  # numbers in the data below which compiling takes longer than running
+PREDICTED_GROUPS = ("log_likelihood", "expected", "replicated")  # of `compile_replicator`, a number for each reading
 Function = Callable[..., Any]
 DrawFunction: TypeAlias = Callable[[np.ndarray], Any]
 

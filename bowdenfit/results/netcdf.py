@@ -16,13 +16,14 @@ from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.files.apart import Limits, call_isolated
 from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
-from bowdenfit.results.serialization import to_single
+from bowdenfit.results.serialization import pack_single, unpack_single
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
 Coordinates: TypeAlias = Mapping[str, tuple[str, ...]]
 # Bytes and seconds of CPU that reading may take, some times what honest files take: they hold plain arrays.
 _MEMORY, _MEMORY_PER_BYTE, _SECONDS, _SECONDS_PER_BYTE = 1 << 29, 8, 5.0, 5e-7
 _PACKED = {"compression": "gzip", "shuffle": True}  # draws of walkers that stay where they are repeat
+_FEW = 100  # numbers that are not packed, because the tables of what is packed take as much room; a judgement
 _MOST_PACKED = 100  # times the size of a file that one of its arrays may have; a judgement
 EXPECTED, DERIVED = "expected_", "derived"  # the group of what follows from parameters, and may be infinite
 
@@ -85,7 +86,8 @@ def _write(
             if labels is not None and dimension in of_readings:
                 group.create_variable(dimension, (dimension,), dtype=h5py.string_dtype(), data=np.array(labels, dtype=object))
             else:
-                group.create_variable(dimension, (dimension,), data=np.arange(length))
+                numbers = np.arange(length, dtype=np.int32)
+                group.create_variable(dimension, (dimension,), data=numbers, **(_PACKED if length > _FEW else {}))
     flags = values.dtype == bool
     variable = group.create_variable(name, dimensions, data=_shorten(values), **(_PACKED if values.size > 1 else {}))
     variable.attrs.update({**attributes, **({"dtype": "bool"} if flags else {})})
@@ -93,10 +95,7 @@ def _write(
 
 def _shorten(values: np.ndarray) -> np.ndarray:
     """Return an array as it is written: flags as integers, and numbers of single precision in as many bytes as these take."""
-    if values.dtype == bool:
-        return values.astype("int8")
-    is_single = values.dtype == np.float64 and np.array_equal(values, to_single(values), equal_nan=True)
-    return values.astype(np.float32) if is_single else values
+    return values.astype("int8") if values.dtype == bool else pack_single(values)
 
 
 def _key(name: str) -> str:
@@ -200,5 +199,4 @@ def _is_label(member: h5py.Dataset) -> bool:
 
 
 def _array(member: h5py.Dataset) -> np.ndarray:
-    values = np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None)
-    return values.astype(np.float64) if values.dtype == np.float32 else values
+    return unpack_single(np.asarray(member[()], dtype=bool if member.attrs.get("dtype") == "bool" else None))

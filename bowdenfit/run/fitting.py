@@ -16,7 +16,7 @@ import numpy as np
 from bowdenfit.dataset import Dataset
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.chain import Chain, SamplingRequest
-from bowdenfit.inference.draws import compile_replicator, for_each_draw, imply_groups
+from bowdenfit.inference.draws import PREDICTED_GROUPS, compile_replicator, for_each_draw, imply_groups
 from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.least_squares import LeastSquares, MaximumPosterior, find_maximum_posterior, fit_least_squares
 from bowdenfit.inference.log_density import LogDensity
@@ -27,7 +27,7 @@ from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.models import Model, build_model
 from bowdenfit.results.along_route import compile_along_route, make_optimizer
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, DrawPrograms, Draws, Provenance
-from bowdenfit.results.serialization import round_draws
+from bowdenfit.results.serialization import coarsen_predictions, round_draws
 from bowdenfit.run.refusing import refuse_large_sampling, refuse_undetermined
 from bowdenfit.stages import announce_stage
 
@@ -218,8 +218,11 @@ def _posterior(model: Model, chain: Chain, implied: Callable[[np.ndarray], Any],
     loses nothing.
 
     These have seven digits, mostly far more than the Monte Carlo error leaves, and take half the room in the results folder.
+    What draws predict of each reading, which is most of them, keeps fewer.
     """
     z, optimum = round_draws(chain.z), {name: round_draws(values) for name, values in chain.quantities.items()}
     of_chain = vars(chain) | {"z": z, "optimum": optimum}
     kept = {name: value for name, value in of_chain.items() if name not in ("quantities", "reasons")}
-    return Draws(**kept, **jax.tree.map(round_draws, imply_groups(model, z, implied, seed)))
+    groups = imply_groups(model, z, implied, seed)
+    groups |= {name: jax.tree.map(coarsen_predictions, groups[name]) for name in PREDICTED_GROUPS}
+    return Draws(**kept, **jax.tree.map(round_draws, groups))

@@ -12,7 +12,7 @@ from sealed import edit_sealed
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint
 from bowdenfit.outputs import replace_atomically
-from bowdenfit.results.serialization import round_draws, to_single
+from bowdenfit.results.serialization import coarsen_predictions, round_draws, to_single, write_arrays
 
 DATA_SETS = ROOT / "datasets"
 QUICK = (
@@ -139,7 +139,8 @@ def test_the_log_posterior_in_the_file_is_that_of_the_draws(saved):
     density = LogDensity(fit.model)
     expected = jax.jit(jax.vmap(density.log_density, in_axes=(0, None)))(fit.posterior.flat_z, density.data)
     with xarray.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
-        np.testing.assert_allclose(tree["sample_stats"]["lp"].values.ravel(), expected, rtol=1e-6)  # of single precision
+        of_file = tree["sample_stats"]["lp"].values.ravel()
+    np.testing.assert_allclose(of_file, expected, rtol=0, atol=2e-3 * np.std(expected))  # of rounded parts
 
 
 def test_a_finished_fit_is_not_overwritten(saved, on_body):
@@ -248,6 +249,28 @@ def test_rounding_hides_nothing_of_how_draws_scatter():
     np.testing.assert_array_equal(rounded[..., [0, 2]], draws[..., [0, 2]])
     np.testing.assert_array_equal(rounded[..., 1], draws[..., 1].astype(np.float32))
     assert np.ptp(to_single(draws)[..., 0]) > 0 and np.isclose(np.std(rounded[..., 0]), 1e-7, rtol=0.1)
+
+
+def test_rounded_predictions_keep_how_they_scatter():
+    """Each moves by less than a thousandth of a standard deviation, whatever lies far out; what never varies stays."""
+    rng = np.random.default_rng(1)
+    values = np.stack([rng.standard_normal((20, 50)), np.full((20, 50), 1 / 3), rng.standard_normal((20, 50))], axis=-1)
+    values[0, :2, 2] = -1e6, -np.inf
+    rounded = coarsen_predictions(values)
+    np.testing.assert_array_equal(rounded[..., 1], values[..., 1])
+    assert np.isneginf(rounded[0, 1, 2])
+    moved = np.abs(rounded[np.isfinite(values)] - values[np.isfinite(values)]).max()
+    assert 1e-4 < moved < 1.1e-3
+
+
+def test_a_results_folder_takes_few_bytes_a_number(saved, tmp_path):
+    """The on-body data set's, of 10240 draws, takes 4.7 MB, of which figures and report are 1.1."""
+    draws = saved[0].posterior
+    groups = (draws.values, draws.optimum, draws.log_likelihood, draws.expected, draws.replicated, draws.prior)
+    numbers = draws.z.size + sum(values.size for group in groups for values in group.values())
+    assert (saved[1] / "posterior.nc").stat().st_size < 3.1 * numbers
+    write_arrays(tmp_path / "figures.npz", {"draws": draws.values["mu1"], "exact": np.full(1000, 1 / 3)})
+    assert (tmp_path / "figures.npz").stat().st_size < 4 * draws.values["mu1"].size + 8 * 1000 + 2000
 
 
 @pytest.mark.parametrize("change", ["friction.mu1.fixed=0.1", "tables.angles.undetected=dropped"])

@@ -141,6 +141,7 @@ def _render_history(bench: WatchedBench) -> str:
         return ""
     last = history.answers[-1]
     caption = watch_room.history_figure.caption(history)
-    picture = Picture("history", _HEADING, caption, watch_room.history_figure.make_history_charts(history), caption)
+    charts = watch_room.history_figure.make_history_charts(history)
+    picture = Picture("history", _HEADING, caption, charts, caption, alone=True)
     headline = last.stop or last.warning
-    return render_section(prose_section(_HEADING, history.sentences(), pictures=(picture,), headline=headline), {"history": ""})
+    return render_section(prose_section(_HEADING, history.sentences(), pictures=(picture,), headline=headline), {})

@@ -52,7 +52,7 @@ class TwoFitsPage:
         try:
             fits = await self._workbench.open_fit(one), await self._workbench.open_fit(other)
             comparison = await self._workbench.compute(compare_room.contrast_cables, *fits, (one, other))
-            words = render_section(comparison.section, {"two-cables": ""})
+            words = render_section(comparison.section, {})
         except BowdenfitError as error:
             self._place.clear()
             with self._place:

@@ -1,10 +1,11 @@
 "use strict";
 // Charts of this page: drag to zoom, hover or arrow keys to read values; without this script the drawings stand in their place.
 (() => {
-  const BAND = 0.25, NEAR = 12, STEP = 1.6;
+  const BAND = 0.25, INNER_BAR = 0.45, NEAR = 12, STEP = 1.6, WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500], LETTER = 7.5, SHORTEST = 4, MARGINS = 90;
   const make = (tag, parent, given = {}) => parent.appendChild(Object.assign(document.createElement(tag), given));
   const color = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
-  const shown = value => String(Number(value.toPrecision(4)));
+  const shown = value => typeof value === "string" ? value : String(Number(value.toPrecision(4)));
+  const isBar = one => one.look === "from" || one.look === "to";
 
   function seriesOf(chart) {
     const all = chart.groups.flatMap(group => group.series);
@@ -15,6 +16,7 @@
     const stroke = color(one.color);
     if (one.look === "points" || one.look === "hollow")
       return { paths: () => null, stroke, points: { show: true, size: 7, fill: one.look === "points" ? stroke : color("paper") } };
+    if (isBar(one)) return { paths: () => null, points: { show: false } };
     if (one.look === "low" || one.look === "high") return { stroke: "transparent", points: { show: false } };
     return { stroke, width: 2, dash: one.look === "dashed" ? [6, 4] : undefined, points: { show: false } };
   }
@@ -33,13 +35,48 @@
     ctx.restore();
   }
 
+  // Upright bars from one edge to the other: the longest thin, those inside of it thick.
+  function drawBars(plot, series) {
+    const { ctx, bbox } = plot, within = {};
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    series.forEach((one, i) => {
+      if (one.look !== "from") return;
+      const isInner = one.color in within;
+      within[one.color] = true;
+      ctx.strokeStyle = color(one.color);
+      ctx.globalAlpha = isInner ? INNER_BAR : 1;
+      ctx.lineWidth = (isInner ? 6 : 2) * devicePixelRatio;
+      ctx.beginPath();
+      plot.data[0].forEach((x, k) => {
+        const [from, to] = [plot.data[i + 1][k], plot.data[i + 2][k]];
+        if (from == null || to == null) return;
+        const across = plot.valToPos(x, "x", true);
+        ctx.moveTo(across, plot.valToPos(from, "y", true));
+        ctx.lineTo(across, plot.valToPos(to, "y", true));
+      });
+      ctx.stroke();
+    });
+    ctx.restore();
+  }
+
+  // What stands below places that have names: as much of each as there is room for, or its number.
+  function nameSplits(plot, splits, names) {
+    const room = Math.floor((plot.width - MARGINS) / Math.max(splits.length, 1) / LETTER) - 1;
+    const short = name => name.length <= room ? name : room > SHORTEST ? `${name.slice(0, room - 1)}\u2026` : null;
+    const texts = splits.map(place => short(names[place - 1] ?? ""));
+    return texts.includes(null) ? splits.map(place => names[place - 1] === undefined ? "" : String(place)) : texts;
+  }
+
   // The nearest place at which a line has a value; of points only one close to the pointer.
   function place(plot, number, hovered, series) {
     const values = plot.data[number], at = plot.cursor.left, x = plot.data[0];
     const there = i => i >= 0 && i < x.length && values[i] != null;
     let near = hovered;
     for (let step = 0; step < x.length && !there(near); step++) near = there(hovered - step) ? hovered - step : hovered + step;
-    const isPoint = ["points", "hollow"].includes(series[number - 1].look);
+    const isPoint = ["points", "hollow", "from", "to"].includes(series[number - 1].look);
     return there(near) && (!isPoint || Math.abs(plot.valToPos(x[near], "x") - at) < NEAR) ? near : null;
   }
 
@@ -62,7 +99,7 @@
       this.area.addEventListener("keydown", event => this.key(event));
       this.key_ = make("dl", box, { className: "key" });
       this.key_.setAttribute("aria-live", "polite");
-      box.hidden = false;
+      box.hidden = box.closest("figure").hidden = false;
       this.show(true);
       new ResizeObserver(() => this.fit()).observe(box);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
@@ -89,7 +126,8 @@
       this.plot?.destroy();
       const tables = chart.groups.map(group => [group.x, ...group.series.map(one => one.values)]);
       const data = uPlot.join(tables, tables.map(table => table.map(() => 1)));
-      this.ends = [data[0][0], data[0].at(-1)];
+      const named = chart.names.length > 0;
+      this.ends = named ? [0.5, chart.names.length + 0.5] : [data[0][0], data[0].at(-1)];
       const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: "13px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif" });
       const bands = series.flatMap((one, i) => one.look === "low" ? [{ series: [i + 2, i + 1], fill: color(one.color) + Math.round(255 * BAND).toString(16) }] : []);
       this.addKey(chart, series);
@@ -97,16 +135,18 @@
         ...this.size(),
         legend: { show: false },
         scales: { x: { time: false } },
-        axes: [axis(chart.x), { ...axis(chart.y), size: 62 }],
+        axes: [{ ...axis(chart.x), ...(named ? { incrs: WHOLE, values: (plot, splits) => nameSplits(plot, splits, chart.names) } : {}) }, { ...axis(chart.y), size: 62 }],
         series: [{}, ...series.map(looks)],
         bands,
         cursor: { dataIdx: (plot, number, hovered) => number === 0 ? hovered : place(plot, number, hovered, series), drag: { x: true, y: false } },
         hooks: {
           drawClear: [plot => shade(plot, chart.spans)],
+          drawAxes: [plot => drawBars(plot, series)],
           setCursor: [plot => this.read(plot, series)],
           setScale: [(plot, name) => { if (name === "x") this.box.dataset.shown = `${plot.scales.x.min} ${plot.scales.x.max}`; }],
         },
       }, data, this.area);
+      if (named) this.whole();
     }
 
     addKey(chart, series) {
@@ -117,9 +157,11 @@
         if (this.values.has(label)) return;
         const row = make("div", this.key_);
         const name = make("dt", row);
-        const mark = make("span", name, { className: `mark ${one.look ?? (one.start === one.stop ? "line" : "span")}` });
+        const mark = make("span", name, { className: `mark ${one.look ?? (one.start === one.stop ? "upright" : "span")}` });
         mark.style.color = color(one.color);
-        if (one.look === "low") mark.style.opacity = 1 - (1 - BAND) ** (within[one.color] = (within[one.color] ?? 0) + 1);
+        const place = ["low", "from"].includes(one.look) ? within[one.color + one.look] = (within[one.color + one.look] ?? 0) + 1 : 0;
+        if (one.look === "low") mark.style.opacity = 1 - (1 - BAND) ** place;
+        if (one.look === "from" && place > 1) mark.classList.add("inner");
         make("span", name, { textContent: label });
         this.values.set(label, make("dd", row));
       };
@@ -131,7 +173,8 @@
     read(plot, series) {
       const at = plot.cursor.idx, found = new Map();
       if (at != null) {
-        found.set(this.charts[this.current].x, [plot.data[0][at]]);
+        const x = plot.data[0][at], { names } = this.charts[this.current];
+        found.set(this.charts[this.current].x, [names.length ? names[x - 1] : x]);
         for (const span of this.charts[this.current].spans)
           if (span.start === span.stop) found.set(span.label, [span.start]);
           else if (span.start <= plot.data[0][at] && plot.data[0][at] <= span.stop) found.set(span.label, null);

@@ -45,7 +45,7 @@ def render_page(
     pieces = _assemble(with_drawings).split(_MARK)
     room = MOST_BYTES - sum(len(piece.encode()) for piece in pieces)
     for i, picture in enumerate(with_drawings.pictures):
-        image = _image_tag(drawings[picture.name], picture.title)
+        image = "" if picture.alone else _image_tag(drawings[picture.name], picture.title)
         room -= len(image)
         pieces[2 * i + 1] = image if room > 0 else TOO_LARGE
         if room > 0 and picture.name in narrow and len(phone := _image_source(narrow[picture.name])) < room:
@@ -60,12 +60,12 @@ def render_section(section: PageSection, addresses: Mapping[str, str]) -> str:
 
     Args:
         section: What is shown.
-        addresses: Where its drawings are, by name; empty for a figure that is charts alone; one without is left out.
+        addresses: Where its drawings are, by name; a figure without is left out, unless it is charts alone.
     """
     shown_section = section.with_pictures(addresses)
     pieces = _render_body(_make_environment(), shown_section).split(_MARK)
     for i, picture in enumerate(shown_section.pictures):
-        alt, source = escape(printable(picture.title)), escape(addresses[picture.name])
+        alt, source = escape(printable(picture.title)), escape(addresses.get(picture.name, ""))
         pieces[2 * i + 1] = f'<img class="wide" alt="{alt}" src="{source}" loading="lazy">' if source else ""
     return "".join(pieces)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.words import printable
 
-Look: TypeAlias = Literal["line", "dashed", "low", "high", "points", "hollow"]
+Look: TypeAlias = Literal["line", "dashed", "low", "high", "from", "to", "points", "hollow"]
 _DIGITS, _X_DIGITS = 5, 8  # significant ones: 5 are more than a screen has pixels; places may start far from zero
 PICTURES = "pictures"  # in the context of a section that has some
 
@@ -19,8 +19,8 @@ class Series:
     """Values that belong together.
 
     Args:
-        label: In the key; the edges of a band have the same.
-        look: "low" and "high", one after the other, are the edges of a band.
+        label: In the key; the edges of a band, or the ends of bars, have the same.
+        look: "low" and "high", one after the other, are the edges of a band, and "from" and "to" the ends of upright bars.
         color: One of the page's colors, such as "blue".
         values: At the places of their group; not finite where there are none.
     """
@@ -71,6 +71,7 @@ class Chart:
         y_label: With unit.
         groups: What is drawn.
         spans: What is shaded behind.
+        place_names: What the places 1, 2 and so on are; empty where they are numbers.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Chart:
     y_label: str
     groups: tuple[SeriesGroup, ...]
     spans: tuple[Span, ...] = ()
+    place_names: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """For the page's script."""
@@ -93,6 +95,7 @@ class Chart:
                 for group in self.groups
             ],
             "spans": [vars(span) for span in self.spans],
+            "names": [printable(name) for name in self.place_names],
         }
 
 
@@ -107,6 +110,7 @@ class Picture:
         charts: The same to zoom into, one after the other; none where that does not pay.
         chart_caption: What the charts show, which have no panels.
         folded: Whether only those who ask for it see it.
+        alone: Whether its charts have no drawing, because a table beside them has the same numbers for paper.
     """
 
     name: str
@@ -115,6 +119,7 @@ class Picture:
     charts: tuple[Chart, ...] = ()
     chart_caption: str = ""
     folded: bool = False
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -143,10 +148,10 @@ class PageSection:
         return pictures
 
     def with_pictures(self, names: Collection[str]) -> "PageSection":
-        """The same with those figures alone that are among some."""
+        """The same with those figures that are among some, or need no drawing."""
         if PICTURES not in self.context:
             return self
-        kept = tuple(picture for picture in self.pictures if picture.name in names)
+        kept = tuple(picture for picture in self.pictures if picture.alone or picture.name in names)
         return replace(self, context={**self.context, PICTURES: kept})
 
 

@@ -12,13 +12,15 @@ from jaxtyping import Float
 
 from bowdenfit.inference.draws import for_each_value
 from bowdenfit.inference.interval import Interval
-from bowdenfit.pages.section import PageSection, PageTable, prose_section
+from bowdenfit.pages.section import Chart, PageSection, PageTable, Picture, Series, SeriesGroup, prose_section
+from bowdenfit.plots.style import MEDIAN, WIDE_INTERVAL
 from bowdenfit.questions.recorded.friction_effects import choose_recorded_length
 from bowdenfit.results.record import OPTIMAL_LENGTH, Record, cached_per_fit, parameter_values
 from bowdenfit.words import counted, listed, percent, table
 
 _LONGEST_NAME = 40  # characters of a contact's name in a sentence; a judgement
 _FEW = 3  # contacts after the first that a sentence names; a judgement
+LOSS_TITLE = "Where the force is lost"
 HEADS = ("contact", "share", "90 % interval", "probability of the largest")
 
 
@@ -120,7 +122,7 @@ def loss_text(fit: Record) -> str:
 
 def loss_heading(loss: LossByContact) -> str:
     """Return the heading of the table, with the place on the route."""
-    return "Where the force is lost" + (f", {loss.position}" if loss.position else "")
+    return LOSS_TITLE + (f", {loss.position}" if loss.position else "")
 
 
 def loss_rows(loss: LossByContact) -> list[tuple[str, ...]]:
@@ -137,4 +139,21 @@ def loss_section(fit: Record) -> PageSection | None:
     loss = loss_by_contact(fit)
     if loss is None:
         return None
-    return prose_section("Where the force is lost", (), [PageTable(HEADS, tuple(loss_rows(loss)), loss_heading(loss))])
+    table_of_shares = PageTable(HEADS, tuple(loss_rows(loss)), loss_heading(loss))
+    where = f", {loss.position}" if loss.position else ""
+    caption = f"Share of each contact in the loss{where}: median, and the interval that holds it with 90 % probability."
+    picture = Picture("loss", LOSS_TITLE, caption, (make_loss_chart(loss),), caption, alone=True)
+    return prose_section(LOSS_TITLE, (), [table_of_shares], pictures=(picture,))
+
+
+def make_loss_chart(loss: LossByContact) -> Chart:
+    """Return the chart of the share of each contact [%], with its interval."""
+    names, shares = tuple(contact.name for contact in loss.contacts), [contact.share for contact in loss.contacts]
+    low, median, high = (100 * np.array([getattr(share, name) for share in shares]) for name in ("q05", "median", "q95"))
+    series = (
+        Series(WIDE_INTERVAL, "from", "blue", low),
+        Series(WIDE_INTERVAL, "to", "blue", high),
+        Series(MEDIAN, "points", "blue", median),
+    )
+    places = SeriesGroup(np.arange(1.0, len(names) + 1), series)
+    return Chart("Loss", "Contact", "Share of the loss (%)", (places,), place_names=names)

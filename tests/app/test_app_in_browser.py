@@ -87,7 +87,8 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         page.locator("#ranking table").wait_for()
         advice = printed_by("next", results).split("\n\n")[0].split()
         assert " ".join(advice) in " ".join(text_on(page, "#ranking").split())
-        page.locator("#figure-efficiency .uplot").wait_for()
+        for name in ("efficiency", "pairs", "coefficients", "residuals", "loss"):
+            page.locator(f"#figure-{name} .uplot").wait_for(state="attached")
         answer = page.request.get(f"{app.root}/export/on-body/csv")
         printed_by("export", results, "--to", "csv", "--output", folder / "table.csv")
         assert answer.body() == (folder / "table.csv").read_bytes()

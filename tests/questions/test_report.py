@@ -137,6 +137,16 @@ def test_a_chart_is_read_with_the_keyboard(chromium, routed):
         assert shown(chart)[1] - shown(chart)[0] < whole[1] - whole[0]
         reader.page.keyboard.press("0")
         assert shown(chart) == whole
+        reader.page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+        for name in ("coefficients", "pairs", "residuals", "loss"):
+            chart = reader.page.locator(CHART.format(name))
+            chart.get_by_role("application").focus()
+            reader.page.keyboard.press("ArrowRight")
+            assert re.search(r"\d to \d", chart.locator(".key").inner_text()), name
+            reader.page.keyboard.press("+")
+        assert "<b onclick='alert(3)'>" in "".join(reader.page.locator("#figure-pairs option").all_text_contents())
+        assert "</script>" in reader.page.locator("#figure-loss .key").inner_text()
+        assert reader.faults() == []
 
 
 def test_each_recording_is_chosen_by_its_name(chromium, recorded):

@@ -48,7 +48,7 @@ class TwoCables(Display):
         """The same as a part of a page."""
         caption = f"{listed(list(self.names))} on one chart: line, median; band, {WIDE_INTERVAL}, or density of each value."
         note = "The probability is that of the sign, which is 0.5 where nothing is known of it."
-        picture = Picture("two-cables", TITLE, caption, self.charts, caption)
+        picture = Picture("two-cables", TITLE, caption, self.charts, caption, alone=True)
         return prose_section(TITLE, [*self.sentences(), note], pictures=(picture,))
 
 

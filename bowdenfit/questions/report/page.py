@@ -1,4 +1,4 @@
-"""The figures of a fit on its report: the answer first, what is for statisticians folded, two to zoom into."""
+"""The figures of a fit on its report: the answer first, what is for statisticians folded, some to zoom into."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -28,7 +28,10 @@ from bowdenfit.questions.next.ranking import rank_measurements
 from bowdenfit.questions.next.words import ranking_section
 from bowdenfit.questions.recorded.recordings_figure import describe_recordings_charts, make_recordings_charts
 from bowdenfit.questions.report.changes import changes_section
+from bowdenfit.questions.summary.coefficients_figure import describe_coefficient_charts, make_coefficient_charts
 from bowdenfit.questions.summary.methods import methods_section
+from bowdenfit.questions.summary.pairs_figure import describe_pair_charts, make_pair_charts
+from bowdenfit.questions.summary.residuals_figure import describe_residual_charts, make_residual_charts
 from bowdenfit.questions.summary.sections import (
     answer_section,
     checks_section,
@@ -45,13 +48,16 @@ from bowdenfit.results.store import load
 
 ABOVE_FIGURES = (answer_section, measured_section, coefficients_section, loss_section, budget_section, bends_section)
 BELOW_FIGURES = (methods_section, provenance_section)
-_PHONE, _PHONE_WIDTHS = 3.0, {"pairs": 3.6}  # in, so that panels stand one below the other and letters can be read
+_PHONE = 3.0  # in, so that panels stand one below the other and letters can be read
 FIGURES_TITLE = "Figures"
 FIRST = ("efficiency",)  # the answer
 FOLDED = ("coefficients", "traces", "residuals", "checks", "autocorrelation", "sample_efficiency")
 CHARTS: dict[str, tuple[Callable[[Any], tuple[Chart, ...]], Callable[[Any], str]]] = {  # charts of a figure, and their caption
     "efficiency": (make_efficiency_chart, describe_efficiency_chart),
     "recordings": (make_recordings_charts, describe_recordings_charts),
+    "coefficients": (make_coefficient_charts, describe_coefficient_charts),
+    "pairs": (make_pair_charts, describe_pair_charts),
+    "residuals": (make_residual_charts, describe_residual_charts),
 }
 
 
@@ -146,7 +152,7 @@ def draw_for_phones(figures: dict[str, Any], mark: str) -> dict[str, bytes]:
     with TemporaryDirectory() as folder:
         names = [name for name in figures if name not in FOLDED and name not in CHARTS]
         files = {
-            name: write_figure_files(name, figures[name], Path(folder), (PNG,), "", _PHONE_WIDTHS.get(name, _PHONE), mark)
+            name: write_figure_files(name, figures[name], Path(folder), (PNG,), "", _PHONE, mark)
             for name in names
         }
         return {name: file.read_bytes() for name, (file, *_) in files.items()}

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bowdenfit.plots.captions import explain_symbols
-from bowdenfit.plots.curves import GRID_POINTS, density, limits, support
+from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
+from bowdenfit.parameters.symbols import to_plain_text
+from bowdenfit.plots.captions import count_shown, explain_symbols
+from bowdenfit.plots.curves import GRID_POINTS, choose_evenly, density, limits, support
 from bowdenfit.plots.layout import (
     TITLE,
     count_columns,
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
 HEADING = "Coefficients"
 ROLES = ("friction", "friction_model", "angle", "sensor")
 _SHORT = (1e-3, 1e5)  # numbers between these are written out
+MOST_CHARTS = 24  # coefficients on a page; a judgement
+WITH_READINGS, BEFORE_READINGS = "With the measurements", "Before them (prior)"
 MOST_COLUMNS, LEAST_WIDTH = 3, 1.4  # panels in a row, and width of one [in]
 
 
@@ -115,14 +119,14 @@ def _draw_panel(axes: Axes, parameter: Coefficient) -> None:
     grid, lower = np.linspace(*shown, GRID_POINTS), support(draws, parameter.prior)
     posterior = density(draws, grid, lower)
     axes.fill_between(grid, posterior, color=BLUE, alpha=0.38, linewidth=0)
-    axes.plot(grid, posterior, color=BLUE, label="With the measurements")
+    axes.plot(grid, posterior, color=BLUE, label=WITH_READINGS)
     prior = density(parameter.prior, grid, lower)
-    axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label="Before them (prior)")
+    axes.plot(grid, prior, color=BLACK, linestyle="--", linewidth=1.0, label=BEFORE_READINGS)
     _draw_least_squares(axes, parameter, shown, 0.08 * posterior.max())
     axes.set(xlim=shown, ylim=(0, 1.2 * posterior.max()))
     label_across(axes, axis_label(parameter.symbol, parameter.unit))
     axes.yaxis.set_major_formatter(lambda value, _: _format_in_few_letters(value))
-    axes.set_ylabel("Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})")
+    axes.set_ylabel(_density_label(parameter))
     axes.set_title(_describe_posterior(parameter))
 
 
@@ -162,7 +166,62 @@ def _draw_least_squares(axes: Axes, parameter: Coefficient, shown: tuple[float, 
 
 def _describe_posterior(parameter: Coefficient) -> str:
     """Return the median and 90 % interval of a coefficient, as a title."""
-    low, middle, high = (float(q) for q in np.quantile(parameter.draws, (0.05, 0.5, 0.95)))
-    low_text, median, high_text = rounded_texts((low, middle, high), high - low)
+    low, median, high = _round_quantiles(_quantiles(parameter))
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    return f"{MEDIAN} {median}{unit}\n{WIDE_INTERVAL} {low_text} to {high_text}{unit}"
+    return f"{MEDIAN} {median}{unit}\n{WIDE_INTERVAL} {low} to {high}{unit}"
+
+
+def _density_label(parameter: Coefficient) -> str:
+    return "Density" if parameter.unit == "1" else f"Density (1/{parameter.unit})"
+
+
+def _quantiles(parameter: Coefficient) -> tuple[float, float, float]:
+    """Return the lower end of the 90 % interval, the median, and the upper end."""
+    low, median, high = (float(q) for q in np.quantile(parameter.draws, (0.05, 0.5, 0.95)))
+    return low, median, high
+
+
+def _round_quantiles(quantiles: tuple[float, float, float]) -> tuple[str, ...]:
+    """Return quantiles as texts with digits that the width of the interval warrants."""
+    return tuple(rounded_texts(quantiles, quantiles[2] - quantiles[0]))
+
+
+def make_coefficient_charts(parameters: tuple[Coefficient, ...]) -> tuple[Chart, ...]:
+    """Return a chart of the density of each coefficient, or of evenly chosen ones of many.
+
+    Args:
+        parameters: What the figure shows.
+    """
+    return tuple(_make_chart(parameter) for parameter in choose_evenly(parameters, MOST_CHARTS))
+
+
+def describe_coefficient_charts(parameters: tuple[Coefficient, ...]) -> str:
+    """Describe the charts, one coefficient at a time."""
+    counting = count_shown(min(len(parameters), MOST_CHARTS), len(parameters), "coefficient")
+    return (
+        f"What the measurements say of {counting}, one at a time. Line: how plausible each value is, measurements and "
+        "priors considered; dashed: by the prior alone. Shaded: the interval that holds the value with 90 % probability. "
+        "Upright lines: median, and the least-squares estimate. "
+        f"{explain_symbols((p.symbol, p.meaning) for p in parameters)}"
+        f"n = {parameters[0].draws.size} draws from the posterior."
+    )
+
+
+def _make_chart(parameter: Coefficient) -> Chart:
+    """Return the chart of one coefficient: densities, the interval, the median, and least squares where it is near."""
+    shown, lower = _find_limits(parameter), support(parameter.draws, parameter.prior)
+    grid = np.linspace(*shown, GRID_POINTS)
+    lines = (
+        Series(WITH_READINGS, "line", "blue", density(parameter.draws, grid, lower)),
+        Series(BEFORE_READINGS, "dashed", "black", density(parameter.prior, grid, lower)),
+    )
+    low, median, high = _quantiles(parameter)
+    low_text, _, high_text = _round_quantiles((low, median, high))
+    spans = [Span(f"{WIDE_INTERVAL}, {low_text} to {high_text}", "pull", low, high), Span(MEDIAN, "blue", median, median)]
+    estimate, error = parameter.least_squares, parameter.standard_error
+    if shown[0] <= estimate <= shown[1]:
+        note = f" (standard error {significant(error)})" if np.isfinite(error) else ""
+        spans.append(Span(f"{LEAST_SQUARES}{note}", "vermillion", estimate, estimate))
+    label = to_plain_text(axis_label(parameter.symbol, parameter.unit))
+    name = to_plain_text(parameter.symbol) + (f", {parameter.meaning}" if parameter.meaning else "")
+    return Chart(name, label, _density_label(parameter), (SeriesGroup(grid, lines),), tuple(spans))

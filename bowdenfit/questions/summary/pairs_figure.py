@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.pages.section import Chart, Series, SeriesGroup, Span
+from bowdenfit.parameters.symbols import to_plain_text
 from bowdenfit.plots.captions import explain_symbols
 from bowdenfit.plots.curves import density, limits
 from bowdenfit.plots.layout import (
@@ -23,7 +25,7 @@ from bowdenfit.plots.layout import (
     ticks_left,
     wrap_words,
 )
-from bowdenfit.plots.style import BLUE, LEAST, SMALL, WIDE, in_paper_style
+from bowdenfit.plots.style import BLUE, LEAST, MEDIAN, SMALL, WIDE, in_paper_style
 from bowdenfit.questions import summary
 from bowdenfit.words import decimals
 
@@ -43,6 +45,7 @@ LARGEST, SMALLEST = 1.45, 0.66  # in, of a panel with its gap
 HEADROOM = 1.55  # height of a panel on the diagonal over that of its highest bar
 MARK = 0.26  # in, of a color in the key, with the gap to its words
 BINS = 32  # of each axis, in two dimensions
+FINER = 2  # so many bins of a chart, which has no contours between them, for one of these
 SMOOTHING = 6.5  # bins, of one draw; less of n by the rate of the best kernel in two dimensions, n to the power of -1/6
 
 
@@ -235,3 +238,97 @@ def _select_quantities(data: Pairs, most: int) -> list[SampledQuantity]:
     """Return at most so many quantities, the optimum among them."""
     every, last = data.quantities, 2 if data.best and most > 2 else 0
     return every if len(every) <= most else every[: most - last] + every[len(every) - last :]
+
+
+def make_pair_charts(data: Pairs) -> tuple[Chart, ...]:
+    """Return the chart of each pair of quantities, the most correlated first.
+
+    Args:
+        data: What the figure shows.
+    """
+    draws = np.stack([quantity.draws.ravel() for quantity in data.quantities])
+    with np.errstate(invalid="ignore", divide="ignore"):  # of one that never moves
+        correlation = np.nan_to_num(np.corrcoef(draws))
+    rows, columns = np.tril_indices(len(draws), -1)
+    order = np.argsort(-np.abs(correlation[rows, columns]), kind="stable")
+    return tuple(
+        _make_pair_chart(data.quantities[column], data.quantities[row], float(correlation[row, column]))
+        for row, column in zip(rows[order].tolist(), columns[order].tolist(), strict=True)
+    )
+
+
+def describe_pair_charts(data: Pairs) -> str:
+    """Describe the charts, two quantities at a time."""
+    return (
+        "Two parameters of the posterior against each other, the most correlated first. Dark and light: the smallest areas "
+        "that hold the truth with 68 % and 95 % probability; a long slanted area means that the measurements determine a "
+        "combination of the two better than either. Upright line: median. "
+        f"{explain_symbols((q.symbol, q.meaning) for q in data.quantities)}"
+        f"n = {data.quantities[0].draws.size} draws from the posterior."
+    )
+
+
+def _make_pair_chart(across: SampledQuantity, up: SampledQuantity, correlation: float) -> Chart:
+    """Return the chart of two quantities, with the smallest areas that hold 68 % and 95 % of their draws."""
+    x, edges = find_region_edges(across, up)
+    series = []
+    for share in reversed(FILLS):
+        words = f"{100 * share:.0f} % probability"
+        series += [Series(words, "low", "blue", edges[share][0]), Series(words, "high", "blue", edges[share][1])]
+    labels = [" ".join(to_plain_text(quantity.label).split()) for quantity in (across, up)]
+    names = [to_plain_text(quantity.symbol) or label for quantity, label in zip((across, up), labels, strict=True)]
+    median = float(np.median(across.draws))
+    line = Span(f"{MEDIAN} of {names[0]}", "vermillion", median, median)
+    name = f"{names[0]} and {names[1]}, correlation {correlation:.2f}".replace("-", "\N{MINUS SIGN}")
+    return Chart(name, labels[0], labels[1], (SeriesGroup(x, tuple(series)),), (line,))
+
+
+def find_region_edges(
+    across: SampledQuantity, up: SampledQuantity
+) -> tuple[np.ndarray, dict[float, tuple[np.ndarray, np.ndarray]]]:
+    """Return the lower and upper edge of the smallest areas that hold a share of the draws of two quantities.
+
+    Like those of the corner plot they are cut out of a smoothed histogram, here where they hold that share of the draws
+    themselves. An area with a gap in it is shown without.
+
+    Args:
+        across: The quantity along the axis.
+        up: The other.
+
+    Returns:
+        Places along the axis, and lower and upper edge there by share (`FILLS`); NaN where the area is not.
+    """
+    n = across.draws.size
+    counts, x_edges, y_edges = np.histogram2d(
+        across.draws.ravel(), up.draws.ravel(), FINER * BINS, (across.limits(SHARE), up.limits(SHARE))
+    )
+    width = FINER * SMOOTHING * n ** (-1 / 6)
+    reach = round(4 * width)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    smooth = np.pad(counts, reach, mode="symmetric")
+    for axis in (0, 1):
+        smooth = np.apply_along_axis(np.convolve, axis, smooth, kernel / kernel.sum(), mode="valid")
+    x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges))
+    falling = np.argsort(-smooth, axis=None)
+    held = np.cumsum(counts.ravel()[falling]) / counts.sum()
+    levels = {share: smooth.ravel()[falling[int(np.searchsorted(held, share))]] for share in FILLS}
+    return x, {share: _edges_along(smooth, y, level) for share, level in levels.items()}
+
+
+def _edges_along(counts: np.ndarray, y: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest place at which each row of smoothed counts crosses a level; NaN where it does not."""
+    edges = np.full((2, len(counts)), np.nan)
+    for i, row in enumerate(counts):
+        above = np.flatnonzero(row >= level)
+        if len(above):
+            edges[:, i] = _cross(row, y, level, above[0], -1), _cross(row, y, level, above[-1], 1)
+    return edges[0], edges[1]
+
+
+def _cross(row: np.ndarray, y: np.ndarray, level: float, inside: int, step: int) -> float:
+    """Return where a row falls below a level beyond a place inside, between that place and the next."""
+    outside = inside + step
+    if not 0 <= outside < len(row):
+        return float(y[inside])
+    part = (row[inside] - level) / (row[inside] - row[outside])
+    return float(y[inside] + part * (y[outside] - y[inside]))

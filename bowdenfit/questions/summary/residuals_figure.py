@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.pages.section import Chart, Series, SeriesGroup
+from bowdenfit.plots.captions import count_shown
+from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.plots.layout import EDGE, RIGHT, axes_at, empty_page, legend_above, text_width
 from bowdenfit.plots.panels import shorten_name
 from bowdenfit.plots.strips import NONE
@@ -34,6 +37,8 @@ ROW, LEAST, MOST = 0.155, 0.6, 8.0  # in, height of a labeled row and of the pan
 GAP, BELOW, ABOVE = 0.2, 0.6, 0.08  # in, between the panels, below and above them
 LONGEST, LABELS = 34, 0.3  # characters of a label, and share of the page that labels take at most
 STRIP = 0.42  # of the rest, for the residuals
+MOST_POINTS = 500  # rows that a chart shows; a judgement
+OUTSIDE = "Outside the range of the curves"
 
 
 @dataclass(frozen=True)
@@ -51,15 +56,20 @@ def data(fit: Record) -> Residuals | None:
 
 def caption(data: Residuals) -> str:
     """Describe what is drawn, in plain words."""
-    n, has_draws = sum(len(points.labels) for points in data.points), len(data.points[0].predicted) > 1
-    bars = (
-        "bars: where a reading would lie with 50 % and 90 % probability if it were taken anew, on a new mounting where "
-        "readings are runs; about one reading in ten may lie outside the longer one."
-        if has_draws else "the line is the least-squares prediction."
-    )  # fmt: skip
+    n, bars = sum(len(points.labels) for points in data.points), _describe_bars(data)
     return (
         f"Left: every measured efficiency beside its prediction; {bars} Right: measured minus predicted, in percentage points. "
         f"n = {counted(n, 'efficiency', 'efficiencies')}."
+    )
+
+
+def _describe_bars(data: Residuals) -> str:
+    """Return the clause that explains how predictions are drawn."""
+    if len(data.points[0].predicted) == 1:
+        return "the line is the least-squares prediction."
+    return (
+        "bars: where a reading would lie with 50 % and 90 % probability if it were taken anew, on a new mounting where "
+        "readings are runs; about one reading in ten may lie outside the longer one."
     )
 
 
@@ -114,7 +124,7 @@ def _draw_rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool)
     if not inside.all():
         axes.plot(
             offset[~inside], row[~inside], "o", color=BLACK, markersize=3.6, markerfacecolor="white",
-            label="Outside the range of the curves",
+            label=OUTSIDE,
         )  # fmt: skip
     if residual:
         axes.axvline(0, color=GRAY, linewidth=0.8, zorder=0.9)
@@ -122,3 +132,55 @@ def _draw_rows(axes: Axes, tables: tuple[EfficiencyPoints, ...], residual: bool)
             axes.set_xlim(-1, 1)
     axes.grid(visible=False, axis="y")
     axes.locator_params(axis="x", nbins=5 if not residual else 4)
+
+
+def make_residual_charts(data: Residuals) -> tuple[Chart, Chart]:
+    """Return the charts of measured efficiencies beside predicted ones, and of their differences, a place for each row.
+
+    Args:
+        data: What the figure shows.
+    """
+    labels = [label for table in data.points for label in table.labels]
+    rows = np.array(choose_evenly(range(len(labels)), MOST_POINTS))
+    measured = 100 * np.concatenate([table.measured for table in data.points])[rows]
+    predicted = 100 * np.concatenate([table.predicted for table in data.points], axis=1)[:, rows]
+    inside = np.concatenate([table.inside for table in data.points])[rows]
+    names, center = tuple(labels[row] for row in rows), predicted[len(predicted) // 2]
+    beside = _series_of_rows(measured, predicted, inside)
+    off = _series_of_rows(measured - center, predicted - center, inside)
+    places, row_label = np.arange(1.0, len(rows) + 1), "Reading"
+    return (
+        Chart("Measured beside predicted", row_label, "Efficiency (%)", (SeriesGroup(places, beside),), place_names=names),
+        Chart(
+            "Measured minus predicted", row_label, "Difference (points)", (SeriesGroup(places, off),),
+            place_names=names,
+        ),
+    )  # fmt: skip
+
+
+def _series_of_rows(measured: np.ndarray, predicted: np.ndarray, inside: np.ndarray) -> tuple[Series, ...]:
+    """Return measured values and their predictive intervals.
+
+    Args:
+        measured: One a row.
+        predicted: `BAND_QUANTILES` of each row along the first axis, or one least-squares row.
+        inside: Whether each row lies within the range of the curves.
+    """
+    if len(predicted) > 1:
+        low, lower, _, upper, high = predicted
+        wide, narrow = (f"Predicted, {interval}" for interval in (WIDE_INTERVAL, NARROW_INTERVAL))
+        series = [Series(wide, "from", "blue", low), Series(wide, "to", "blue", high)]
+        series += [Series(narrow, "from", "blue", lower), Series(narrow, "to", "blue", upper)]
+    else:
+        series = [Series(f"Predicted, {LEAST_SQUARES.lower()}", "line", "blue", predicted[0])]
+    series.append(Series("Measured", "points", "black", np.where(inside, measured, np.nan)))
+    if not inside.all():
+        series.append(Series(OUTSIDE, "hollow", "black", np.where(inside, np.nan, measured)))
+    return tuple(series)
+
+
+def describe_residual_charts(data: Residuals) -> str:
+    """Describe the charts."""
+    n, bars = sum(len(table.labels) for table in data.points), _describe_bars(data)
+    counting = count_shown(min(n, MOST_POINTS), n, "efficiency", "efficiencies")
+    return f"Every measured efficiency beside its prediction, or minus it, in percentage points; {bars} n = {counting}."

@@ -1,10 +1,10 @@
 """`bf.Fit`: a finished fit as users hold it, with a method or attribute for every question, and the answers that it keeps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from bowdenfit.arguments import Quantity, number_with_unit
 from bowdenfit.display import Rows, text_of
@@ -14,7 +14,15 @@ from bowdenfit.questions.bends.words import bends_text
 from bowdenfit.questions.check.answer import Checks, check_readings
 from bowdenfit.questions.check.words import describe_checks_alone
 from bowdenfit.questions.error_budget import ErrorBudget, error_budget
-from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_with_title, parse_page_width, warning_mark
+from bowdenfit.questions.figures import (
+    FIGURES,
+    collect_figure_data,
+    draw_on_axes,
+    draw_with_title,
+    parse_page_size,
+    parse_page_width,
+    warning_mark,
+)
 from bowdenfit.questions.groups import Groups, contrast_groups
 from bowdenfit.questions.identify.answer import Identifiability, identifiability_text
 from bowdenfit.questions.identify.judgment import assess_identifiability
@@ -33,7 +41,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import DataTree
 
-    from bowdenfit.plots.layout import Figure
+    from bowdenfit.plots.layout import Axes, Figure
 import numpy as np
 
 from bowdenfit.questions.predict.lengths import predict_at_lengths
@@ -156,25 +164,43 @@ class FigureMethods:
         self._fit = fit
         self._data: dict[str, Any] = {}  # of the figures asked for; None where there is nothing to show
 
-    def __call__(self, name: str, width: Quantity | None = None) -> "Figure":
+    def __call__(
+        self,
+        name: str,
+        width: Quantity | None = None,
+        *,
+        figsize: tuple[float, float] | None = None,
+        ax: "Axes | Sequence[Axes] | np.ndarray | None" = None,
+    ) -> "Figure":
         """Return one of the figures.
 
         Args:
             name: Which.
             width: On which words stay as large as they are, such as "3.5in"; what suits the figure if omitted.
+            figsize: Width and height of the page [in], in place of `width`; panels are stretched to the height.
+            ax: Axes of matplotlib that are drawn on in place of a page: one for the first panel alone, or one for each panel,
+                row by row, as `plt.subplots` returns them. They keep their places; the figure that they belong to is returned.
 
         Raises:
-            UsageError: The fit has no such figure, and which it has; or none can be so wide.
+            UsageError: The fit has no such figure, and which it has; none can be so wide or so low; or there are other than
+                one axes or those of all panels.
         """
         if name not in FIGURES:
             raise NoSuchFigureError(f"there is no figure {name!r}{suggest_name(name, list(FIGURES))}")
         if self._data_of(name) is None:
             raise UsageError(f"this fit has nothing to show in the figure {name!r}; it has {listed(dir(self))}.")
         mark = warning_mark(assess_fit(self._fit).troubles)
+        if sum(option is not None for option in (width, figsize, ax)) > 1:
+            raise UsageError("give one of width, figsize and ax; the figure that ax belongs to has its own size.")
+        if ax is not None:
+            return draw_on_axes(name, self._data_of(name), ax, mark)
+        if figsize is not None:
+            inches, height = parse_page_size(figsize)
+            return draw_with_title(name, self._data_of(name), self._fit.name, inches, mark, height)
         stated = None if width is None else number_with_unit("3.5in").read(width, "width")
         return draw_with_title(name, self._data_of(name), self._fit.name, parse_page_width(stated), mark)
 
-    def __getattr__(self, name: str) -> "Callable[..., Figure]":
+    def __getattr__(self, name: str) -> "FigureMethod":
         if name.startswith("_"):
             raise AttributeError(name)
         if name not in FIGURES:
@@ -191,6 +217,19 @@ class FigureMethods:
         if name not in self._data:
             self._data[name] = dict(collect_figure_data(self._fit, [name])).get(name)
         return self._data[name]
+
+
+class FigureMethod(Protocol):
+    """One of the figures of a fit."""
+
+    def __call__(
+        self,
+        width: Quantity | None = None,
+        *,
+        figsize: tuple[float, float] | None = None,
+        ax: "Axes | Sequence[Axes] | np.ndarray | None" = None,
+    ) -> "Figure":
+        """Return the figure; see `FigureMethods.__call__`."""
 
 
 class NoSuchFigureError(UsageError, AttributeError):

@@ -6,6 +6,7 @@ quarter of the time of a figure. Tests check that nothing overlaps or leaves the
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bowdenfit import plots
+from bowdenfit.errors import UsageError
+from bowdenfit.plots.borrowed import is_borrowed, substitute
 from bowdenfit.plots.style import LEAST, SMALL, TITLE_SIZE, VERMILLION, WIDE
 
 if TYPE_CHECKING:
@@ -28,6 +31,7 @@ TITLE = 0.22  # room for a title of one line
 LABEL_LEFT, LABEL_BELOW = 0.41, 0.25  # from the axes to its labels
 EDGE = 0.08  # from words to the edge of the page
 _MARK, _APART = 2.6, 2.0  # of a legend, in its font size: a mark with its gap, and from one column to the next
+_LOWEST = 0.6  # of the height that suits a panel, that it may have; a judgement
 _TITLE_ROWS, _TITLE_ROW, LABEL_ROW = 2, 0.15, 0.13  # most rows of a title, and one more row of a title or label
 
 
@@ -57,7 +61,8 @@ def panels(
         len(heights), columns, height_ratios=heights, left=LEFT / page, right=1 - RIGHT / page,
         bottom=BOTTOM / height, top=1 - top / height, wspace=across / width, hspace=down * len(heights) / sum(heights),
     )  # fmt: skip
-    flat = list(grid.subplots(**sharing, squeeze=False).flat)  # type: ignore[call-overload]
+    made = list(grid.subplots(**sharing, squeeze=False).flat)  # type: ignore[call-overload]
+    flat = [substitute(axes) for axes in made]
     for axes in flat:
         place_labels(figure, axes)
     return figure, flat
@@ -66,14 +71,16 @@ def panels(
 def axes_at(figure: Figure, left: float, bottom: float, width: float, height: float, **sharing: Any) -> Axes:
     """Add a panel at a position in inches."""
     page, total = figure.get_size_inches()
-    return figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing)
+    return substitute(figure.add_axes((left / page, bottom / total, width / page, height / total), **sharing))
 
 
 def place_labels(figure: Figure, axes: Axes, left: float = LABEL_LEFT, below: float = LABEL_BELOW) -> None:
     """Put the axis labels at fixed distances [in], so that those of neighbors line up."""
-    page, box = figure.get_size_inches(), axes.get_position()
-    axes.yaxis.set_label_coords(-left / (box.width * page[0]), 0.5)
-    axes.xaxis.set_label_coords(0.5, -below / (box.height * page[1]))
+    if is_borrowed(axes):
+        return
+    inches = figure.dpi_scale_trans
+    axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + plots.mpl.ScaledTranslation(-left, 0.0, inches))
+    axes.xaxis.set_label_coords(0.5, 0.0, axes.transAxes + plots.mpl.ScaledTranslation(0.0, -below, inches))
 
 
 def number_width(axes: Axes) -> float:
@@ -185,19 +192,25 @@ def _legend_width(widths: Sequence[float], columns: int) -> float:
     return sum(max(part) for part in np.array_split(np.array(widths), columns)) + _APART * SMALL / 72 * columns
 
 
-def title_above(figure: Figure, words: str, mark: str = "") -> None:
+def title_above(figure: Figure, words: str, mark: str = "", height: float | None = None) -> None:
     """Add a title on room added above everything else.
 
     Args:
         figure: The page.
         words: The title.
         mark: Why nobody should rely on the figure, which stands below the title.
+        height: Of the page with its title [in], to which panels are stretched; what suits the figure if omitted.
+
+    Raises:
+        UsageError: Panels would be too low to be read.
     """
     width = figure.get_size_inches()[0]
     title = wrap_words(words, width - 2 * EDGE, TITLE_SIZE, "bold", _TITLE_ROWS)
     marked = wrap_words(mark, width - 2 * EDGE, TITLE_SIZE, "bold").split("\n") if mark else []
     above = EDGE + _TITLE_ROW * (1 + title.count("\n"))
     room = above + _TITLE_ROW * len(marked)
+    if height is not None:
+        _stretch_panels(figure, height, room)
     _add_room(figure, room)
     height = figure.get_size_inches()[1]
     for legend in figure.legends:
@@ -213,8 +226,25 @@ def title_above(figure: Figure, words: str, mark: str = "") -> None:
         )  # fmt: skip
 
 
+def add_mark(axes: Axes, words: str) -> None:
+    """Write why nobody should rely on a figure into one of its panels.
+
+    Args:
+        axes: The panel.
+        words: Why.
+    """
+    room = panel_size(axes)[0] - 2 * EDGE
+    axes.text(
+        0.02, 0.98, wrap_words(words, room, TITLE_SIZE, "bold"), transform=axes.transAxes, ha="left", va="top",
+        fontsize=TITLE_SIZE, fontweight="bold", color=VERMILLION, parse_math=False, zorder=10,
+    )  # fmt: skip
+
+
 def label_across(axes: Axes, words: str) -> None:
     """Name the lower axis, in several lines if the name is wider than the panel and its margins."""
+    if is_borrowed(axes):
+        axes.set_xlabel(words)
+        return
     figure = axes.figure
     assert figure is not None  # a panel is on a page
     page, box = figure.get_size_inches()[0], axes.get_position()  # type: ignore[union-attr]
@@ -236,6 +266,38 @@ def _add_room(figure: Figure, above: float, below: float = 0.0) -> None:
     figure.set_size_inches(width, taller)
     for axes, box in zip(figure.axes, boxes, strict=True):
         axes.set_position((box.x0, (box.y0 * height + below) / taller, box.width, box.height * height / taller))
+
+
+def _stretch_panels(figure: Figure, height: float, above: float) -> None:
+    """Make panels higher or lower so that a page is as high as stated; what is between them stays.
+
+    Args:
+        figure: The page.
+        height: Of the page [in], with what is added above it.
+        above: What is added above it [in].
+
+    Raises:
+        UsageError: Panels would be too low to be read.
+    """
+    width, before = figure.get_size_inches()
+    boxes = [axes.get_position() for axes in figure.axes]
+    edges = np.unique(np.round([0.0, before, *(before * y for box in boxes for y in (box.y0, box.y1))], 6))
+    middles, rows = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    has_panel = np.array([any(before * box.y0 < y < before * box.y1 for box in boxes) for y in middles])
+    between, of_panels = float(rows[~has_panel].sum()), float(rows[has_panel].sum())
+    stretch = (height - above - between) / of_panels
+    if stretch < _LOWEST:
+        least = math.ceil(10 * (above + between + _LOWEST * of_panels)) / 10
+        raise UsageError(
+            f"this figure does not fit into {height:g} in of height at {width:g} in of width; write "
+            f"figsize=({width:g}, {least:g}), or more, or leave figsize out for the size that suits it."
+        )
+    stretched = np.concatenate([[0.0], np.cumsum(np.where(has_panel, stretch * rows, rows))])
+    taller = float(stretched[-1])
+    figure.set_size_inches(width, taller)
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        low, high = np.interp([before * box.y0, before * box.y1], edges, stretched)
+        axes.set_position((box.x0, low / taller, box.width, (high - low) / taller))
 
 
 TICK = 0.035  # in, length of a tick: less than matplotlib's 3.5 pt; a judgement
@@ -273,7 +335,7 @@ def number_below(axes: Axes, whole: bool = False, upright: bool = False) -> None
         whole: Whether only whole numbers make sense.
         upright: Whether numbers stand upright, where two of them are too wide for the panel.
     """
-    width = _size(axes)[0]
+    width = panel_size(axes)[0]
     low, high = axes.get_xlim()
     values, texts = ticks_left((low, high), width) if upright else ticks_below((low, high), width, whole)
     axes.set_xticks(values, texts)
@@ -289,17 +351,16 @@ def number_below(axes: Axes, whole: bool = False, upright: bool = False) -> None
 
 def number_left(axes: Axes) -> None:
     """Put tick numbers on the left axis of a panel that has its limits and position."""
-    height = _size(axes)[1]
+    height = panel_size(axes)[1]
     axes.set_yticks(*ticks_left(axes.get_ylim(), height))
     axes.tick_params(axis="y", length=72 * TICK, pad=72 * 0.6 * TICK, width=0.6, labelsize=LEAST, labelrotation=0)
 
 
-def _size(axes: Axes) -> tuple[float, float]:
-    """Return width and height of a panel [in]."""
-    figure, box = axes.figure, axes.get_position()
+def panel_size(axes: Axes) -> tuple[float, float]:
+    """Return width and height of a panel [in], on a page or in a part of one."""
+    figure = axes.figure
     assert figure is not None  # a panel is on a page
-    width, height = figure.get_size_inches()  # type: ignore[union-attr]
-    return box.width * width, box.height * height
+    return axes.bbox.width / figure.dpi, axes.bbox.height / figure.dpi
 
 
 def ticks(

@@ -4,6 +4,7 @@ from matplotlib import colormaps as colormaps
 from matplotlib import rc_context as rc_context
 from matplotlib import rcParams as rcParams
 from matplotlib import rcParamsDefault as rcParamsDefault
+from matplotlib.axes import Axes as Axes
 from matplotlib.figure import Figure as Figure
 from matplotlib.font_manager import FontProperties as FontProperties
 from matplotlib.lines import Line2D as Line2D

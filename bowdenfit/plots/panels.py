@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bowdenfit import plots
+from bowdenfit.plots.borrowed import is_borrowed
 from bowdenfit.plots.layout import (
     LEFT,
     RIGHT,
@@ -138,7 +139,8 @@ def label_outer(flat: list[Axes], columns: int, x_label: str, y_label: str) -> N
         if i + columns >= len(flat):
             label_across(axes, x_label)
             axes.tick_params(labelbottom=True)
-    room_for_labels(flat[0].figure)  # type: ignore[arg-type]
+    if not is_borrowed(flat[0]):
+        room_for_labels(flat[0].figure)  # type: ignore[arg-type]
 
 
 def enlarge_marks(figure: Figure) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.plots.borrowed import is_borrowed
 from bowdenfit.plots.layout import (
     BOTTOM,
     RIGHT,
@@ -102,6 +103,8 @@ def place_names(main: Axes, strip: Axes, far: float | None = None) -> None:
         strip: Its strip.
         far: From the axes to the names [in]; beside the wider numbers of the two, and on the page, if omitted.
     """
+    if is_borrowed(main):
+        return
     figure = main.figure
     assert figure is not None  # a panel is on a page
     if far is None:

@@ -9,10 +9,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
+from bowdenfit import plots
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import StoreError, UsageError
 from bowdenfit.inputs import damage_as
-from bowdenfit.plots.layout import title_above
+from bowdenfit.plots.borrowed import count_panels, draw_on, flatten_axes
+from bowdenfit.plots.layout import add_mark, title_above
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.plots.write import FORMATS, write_all
 from bowdenfit.questions.bends import (
@@ -75,6 +77,7 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
 AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
 NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure; a judgement
+HIGHEST = 40.0  # in, of a figure; a judgement
 
 
 def collect_figure_data(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
@@ -117,7 +120,9 @@ def figure_data_types(names: Iterable[str]) -> dict[str, Any]:
 
 
 @in_paper_style
-def draw_with_title(name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "") -> "Figure":
+def draw_with_title(
+    name: str, data: Any, cable: str = "", width: float | None = None, mark: str = "", height: float | None = None
+) -> "Figure":
     """Draw a figure under its title; loads matplotlib, and no model.
 
     Args:
@@ -126,9 +131,52 @@ def draw_with_title(name: str, data: Any, cable: str = "", width: float | None =
         cable: Name of the cable, for the title.
         width: Of the page [in], on which words stay as large as they are; what suits the figure if omitted.
         mark: See `warning_mark`.
+        height: Of the page [in], to which panels are stretched; what suits the figure if omitted.
+
+    Raises:
+        UsageError: The page is too low for the figure.
     """
     figure: Figure = FIGURES[name].draw(data, width)
-    title_above(figure, figure_title(name, cable), mark)
+    title_above(figure, figure_title(name, cable), mark, height)
+    return figure
+
+
+@in_paper_style
+def draw_on_axes(name: str, data: Any, ax: Any, mark: str = "") -> "Figure":
+    """Draw a figure on axes of matplotlib, and return the figure that these belong to.
+
+    Args:
+        name: Which of `FIGURES`.
+        data: What it shows.
+        ax: One, for the first panel alone, or as many as there are panels, in a list or an array as of `plt.subplots`.
+        mark: See `warning_mark`; stands in the first panel.
+
+    Raises:
+        UsageError: These are no axes, or another number of them.
+    """
+    axes = flatten_axes(ax)
+    if not axes or not all(isinstance(one, plots.mpl.Axes) for one in axes):
+        raise UsageError(
+            "ax must be axes of matplotlib: one for the first panel, such as ax=plt.subplots()[1], or one for each panel."
+        )
+
+    def draw() -> "Figure":
+        figure: Figure = FIGURES[name].draw(data, None)
+        return figure
+
+    count = count_panels(draw)
+    if len(axes) not in (1, count) or len(set(axes)) < len(axes):
+        panels = f"{count} panels" if count > 1 else "1 panel"
+        several = f", or {count} different ones, such as those of plt.subplots({count})" if count > 1 else ""
+        raise UsageError(
+            f"the figure {name!r} has {panels}, and ax holds {len(axes)} axes; give one, on which the first panel is "
+            f"drawn{several}."
+        )
+    draw_on(draw, axes)
+    first = axes[0]
+    if mark:
+        add_mark(first, mark)
+    figure: Figure = first.figure
     return figure
 
 
@@ -164,6 +212,25 @@ def parse_page_width(width: NumberWithUnit | None) -> float | None:
             "column of a paper."
         )
     return float(inches)
+
+
+def parse_page_size(figsize: tuple[float, float]) -> tuple[float, float]:
+    """Return width and height of the page [in].
+
+    Args:
+        figsize: As stated.
+
+    Raises:
+        UsageError: These are no two numbers, or none that a figure can have.
+    """
+    remedy = f"write figsize=(7, 5), from {NARROWEST:g} in to {WIDEST:g} in wide and up to {HIGHEST:g} in high."
+    try:
+        width, height = (float(size) for size in figsize)
+    except (TypeError, ValueError):
+        raise UsageError(f"figsize is the width and the height of the page in inches, not {figsize!r}; {remedy}") from None
+    if not (NARROWEST <= width <= WIDEST and 0 < height <= HIGHEST):
+        raise UsageError(f"a figure cannot be {width:g} in wide and {height:g} in high; {remedy}")
+    return width, height
 
 
 def figure_title(name: str, cable: str) -> str:

@@ -4,15 +4,18 @@ import gc
 import subprocess
 import sys
 import weakref
+from itertools import pairwise
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from figure_words import check_words
 from matplotlib.figure import Figure
 
 import bowdenfit as bf
+from bowdenfit.plots.borrowed import count_panels
 from bowdenfit.plots.style import in_paper_style
-from bowdenfit.questions.figures import FIGURES, collect_figure_data, parse_page_width
+from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_on_axes, parse_page_width, warning_mark
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +68,77 @@ def test_a_figure_chooses_no_backend_and_loads_no_pyplot(on_body):
     )
     found = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert found.stdout.split() == ["False", "False"], found
+
+
+def test_a_figure_is_drawn_on_axes_of_the_user(fit):
+    """The first panel with its legend and both names on one axes; all panels on as many, which keep their places."""
+    page = Figure(figsize=(9, 4))
+    left, right = page.subplots(1, 2, gridspec_kw={"left": 0.02})
+    places = [axes.get_position().bounds for axes in (left, right)]
+    assert fit.plot.efficiency(ax=left) is fit.plot.wrap_angles(ax=right) is page
+    assert [axes.get_position().bounds for axes in (left, right)] == places and len(page.axes) == 2
+    assert (left.get_xlabel(), left.get_ylabel()) == ("Cable length (mm)", "Efficiency (%)")
+    assert right.get_ylabel() == "Wrap angle (deg)" and "Reading" in _words(right.get_legend())
+    of_page = fit.plot.efficiency().axes
+    rows = Figure().subplots(len(of_page), sharex=True)
+    fit.plot.efficiency(ax=rows)
+    assert [axes.get_xlim() for axes in rows] == [axes.get_xlim() for axes in of_page]
+    assert [len(axes.lines) for axes in rows] == [len(axes.lines) for axes in of_page] and left.lines
+    wide = Figure().subplots(2, 2)
+    fit.plot.wrap_angles(ax=wide)
+    assert [axes.get_title() for axes in wide.ravel()] == ["free sheath", "squeezed sheath", "", ""]
+
+
+def _words(legend):
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def test_a_mark_of_distrust_stands_on_axes_of_the_user_too(fit):
+    axes = Figure().add_subplot()
+    data = dict(collect_figure_data(fit, ["efficiency"]))["efficiency"]
+    draw_on_axes("efficiency", data, axes, warning_mark(["not converged"]))
+    assert any("Do not use" in text.get_text().replace("\n", " ") for text in axes.texts)
+
+
+@pytest.mark.extended
+def test_every_figure_is_drawn_on_as_many_axes_as_it_has_panels(fit):
+    for name in dir(fit.plot):
+        count = count_panels(lambda name=name: FIGURES[name].draw(fit.plot._data_of(name), None))
+        flat = Figure().subplots(count, squeeze=False).ravel()
+        fit.plot(name, ax=flat)
+        assert all(axes.has_data() for axes in flat), name
+
+
+def test_panels_are_stretched_to_a_page_and_what_is_between_them_stays(fit):
+    usual = fit.plot.efficiency(width="7in")
+    height = float(usual.get_size_inches()[1])
+    taller = fit.plot.efficiency(figsize=(7, height + 2))
+    assert tuple(taller.get_size_inches()) == pytest.approx((7, height + 2))
+
+    def between(figure):
+        boxes = [axes.get_position() for axes in figure.axes]
+        return [(above.y0 - below.y1) * figure.get_size_inches()[1] for above, below in pairwise(boxes)]
+
+    assert between(taller) == pytest.approx(between(usual), abs=1e-4)
+    check_words(taller, "efficiency")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"figsize": (7, 1)}, r"write figsize=\(7, \d"),
+        ({"figsize": 7}, r"in inches, not 7; write figsize=\(7, 5\)"),
+        ({"figsize": (1, 5)}, "cannot be 1 in wide"),
+        ({"figsize": (7, float("nan"))}, "nan in high"),
+        ({"ax": "left"}, r"axes of matplotlib.*plt.subplots"),
+        ({"ax": []}, "axes of matplotlib"),
+        ({"ax": list(Figure().subplots(9))}, r"and ax holds 9 axes; give one, .*plt.subplots\(\d\)"),
+        ({"figsize": (7, 5), "width": "7in"}, "give one of width, figsize and ax"),
+    ],
+)
+def test_pages_and_axes_that_no_figure_fits_are_refused_with_a_remedy(fit, options, words):
+    with pytest.raises(bf.UsageError, match=words):
+        fit.plot.efficiency(**options)
 
 
 @pytest.mark.parametrize(("least", "unit"), [(3, "in"), (76.2, "mm"), (7.62, "cm")])

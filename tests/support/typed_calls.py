@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import bowdenfit as bf
 
@@ -27,6 +28,9 @@ def accepted(fit: bf.Fit) -> None:
     bf.pool("fits/my-fleet", until="60%", wrap_angles=["mu_sheath=180deg"], cycles=10_000)
     bf.identify("bench.toml", output=Path("answers"))
     fit.plot("efficiency", width=(3.5, "in"))
+    fit.plot.efficiency(figsize=(7, 5))
+    fit.plot.efficiency(ax=Figure().subplots(4))
+    fit.plot("efficiency", ax=Figure().add_subplot())
     contacts = [bf.Contact("sheath", "mu", wrap_angle=(180, "deg"))]
     cable = bf.Cable("my cable", contacts, friction_model="load-dependent")
     data = cable.read(forces={"input force (N)": [20, 40], "output force (N)": np.array([17.2, 34.1])})
@@ -49,3 +53,5 @@ def wrong(fit: bf.Fit) -> None:
     bf.fit("my-cable", seed="1")  # refused
     bf.fit(123)  # refused
     bf.plot(fit, width=3.5)  # refused
+    fit.plot.efficiency(figsize=7)  # refused
+    fit.plot.efficiency(ax="left")  # refused

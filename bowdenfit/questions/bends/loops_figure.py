@@ -9,7 +9,7 @@ import numpy as np
 
 from bowdenfit.plots.captions import count_shown, describe_curve, describe_strip
 from bowdenfit.plots.curves import choose_evenly, draw_quantiles, middle, name_band, note_shown_count
-from bowdenfit.plots.layout import legend_above
+from bowdenfit.plots.layout import legend_above, panel_size
 from bowdenfit.plots.panels import enlarge_marks, span
 from bowdenfit.plots.strips import panels_with_strips
 from bowdenfit.plots.style import BLACK, BLUE, GRAY, LEAST_SQUARES, MEDIAN, PURPLE, VERMILLION, in_paper_style
@@ -156,7 +156,7 @@ def _draw_slack(axes: Axes, loop: LoopCurve) -> None:
 
 def _name_branches(axes: Axes, loop: LoopCurve, place: float) -> None:
     """Name both branches along the line, at its end that is farther from the loop; not in a small panel."""
-    if axes.get_position().width * axes.figure.get_size_inches()[0] < LEAST_NAMED:  # type: ignore[union-attr]
+    if panel_size(axes)[0] < LEAST_NAMED:
         return
     bottom, top = axes.get_ylim()
     height = float(np.interp(middle(loop.slack_load), loop.input_force, middle(loop.forward + loop.back) / 2))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from nicegui import ui
 
 import bowdenfit as bf
+from bowdenfit.app.add_rows import show_table_links
 from bowdenfit.app.elements import block, button, choice, field, link, markup, text
 from bowdenfit.app.frame import refused, section
 from bowdenfit.app.workbench import Workbench
@@ -114,8 +115,14 @@ def show_arriving(workbench: Workbench, fit: "Fit") -> None:
             ArrivingForce(workbench, fit).show()
 
 
-def show_next(workbench: Workbench, fit: "Fit") -> None:
-    """Show what to measure next, where it is asked for."""
+def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
+    """Show what to measure next, where it is asked for, and where it goes once it was measured.
+
+    Args:
+        workbench: Which works it out.
+        fit: The fit.
+        name: Of the fit.
+    """
 
     async def rank() -> None:
         place.clear()
@@ -133,8 +140,17 @@ def show_next(workbench: Workbench, fit: "Fit") -> None:
         with place:
             markup(words, "div", id="ranking")
 
-    with section(next_room.TITLE, "next"), block("div", role="status") as place:
-        button("Rank what could be measured next", rank)
+    data_set = workbench.data_set_of(fit, name)
+    with section(next_room.TITLE, "next"):
+        with block("div", role="status") as place:
+            button("Rank what could be measured next", rank)
+        if data_set:
+            text("Once it was measured, type it in, or let the app see the file:")
+            with block("div", "row"):
+                show_table_links(workbench, data_set)
+                link("Live: fit again after each mounting", f"/live/{data_set}", "button")
+        else:
+            text("The data set of this fit does not lie here as it was fitted; open it at the start to add what was measured.")
 
 
 def show_files(name: str) -> None:

@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from bowdenfit.app.add_rows import show_table_links
 from bowdenfit.app.elements import block, button, field, link, text, text_input
 from bowdenfit.app.frame import attempt, frame, refused, section
 from bowdenfit.app.workbench import Workbench
@@ -39,13 +40,15 @@ class DataSetPage:
             with section("Fit it", "fit"):
                 with block("div", "row"):
                     button("Fit", lambda: attempt(self._start), "primary")
-                    link("Live: fit again after each mounting", f"/live/{name}", "button")
                 with block("details"):
                     text("Name and seed", "summary")
                     with field("Kept as fits/", "fit-name"):
                         text_input("fit-name", self._fit_name, self._state_name)
                     self._seed_place = block("div")
                     self._show_seed()
+            with section("Add what was measured", "add"), block("div", "row"):
+                show_table_links(workbench, name)
+                link("Live: fit again after each mounting", f"/live/{name}", "button")
             with section("As it is understood", "understood"):
                 self._place = block("div", aria_live="polite")
         with self._place:

@@ -6,6 +6,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 from nicegui import ui
 
+from bowdenfit.app.add_rows import AddRowsPage
 from bowdenfit.app.ask import export_file
 from bowdenfit.app.bring import show_draft, show_start
 from bowdenfit.app.data_set import DataSetPage
@@ -54,6 +55,13 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
             _show_refusal(name, str(error))
         else:
             DataSetPage(workbench, name)
+
+    @ui.page("/table/{name}")
+    def table(name: str, file: str = "") -> None:
+        try:
+            AddRowsPage(workbench, name, file)
+        except BowdenfitError as error:
+            _show_refusal(f"Add rows to {file}", str(error))
 
     @ui.page("/fit/{name}")
     def fit(name: str) -> None:

@@ -142,7 +142,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
     loading.delete()
     with left:
         show_arriving(workbench, fit)
-        show_next(workbench, fit)
+        show_next(workbench, fit, name)
         show_files(name)
     with right, section(report_room.FIGURES_TITLE, "figures"):
         markup(pictures, "div")

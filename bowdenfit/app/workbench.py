@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +18,7 @@ import bowdenfit as bf
 from bowdenfit.app.draft import Draft
 from bowdenfit.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data, warning_mark, write_figure_files
@@ -101,6 +102,17 @@ class Workbench:
     def title_of(self, name: str) -> str:
         """Return what a data set is called."""
         return self.folder.name if name == _HERE else name
+
+    def data_set_of(self, fit: Fit, name: str) -> str:
+        """Return the data set that a fit is of, by the checksum of its description; empty where it does not lie here.
+
+        Args:
+            fit: The fit.
+            name: Of the fit, which decides between data sets with the same description.
+        """
+        checksum = fit.dataset.sha256.get(DESCRIPTION_FILE)
+        names = [one for one in self.data_sets() if _checksum(self.data_set(one) / DESCRIPTION_FILE) == checksum]
+        return max(names, key=lambda one: (name.startswith(self.title_of(one)), len(one)), default="")
 
     def fits(self) -> list[KeptFit]:
         """Return the fits that are kept, those that were interrupted among them."""
@@ -201,6 +213,15 @@ class Workbench:
             bench.stop()
         self._thread.shutdown(wait=False, cancel_futures=True)
         self._temporary.cleanup()
+
+
+def _checksum(path: Path) -> str:
+    """Return the checksum of a file, as a fit keeps it; empty of none that can be read."""
+    try:
+        refuse_special(path)
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except (OSError, BowdenfitError):
+        return ""
 
 
 def _collect_figure_data(fit: Fit) -> dict[str, Any]:

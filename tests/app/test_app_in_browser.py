@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from app_in_browser import served, visiting
@@ -12,8 +13,14 @@ from reading_room import browser
 
 import bowdenfit as bf
 
+DATASETS = Path(__file__).parents[2] / "datasets"
 QUICK = "[sampler]\nn_walkers = 64\ntarget_ess = 200\ntarget_r_hat = 1.05\nmax_steps = 4000\n"
 ROWS = ("20,15.2,1", "40,30.1,1", "60,45.6,1", "20,15.0,2", "40,30.9,2", "60,46.0,2", "20,14.8,3", "40,29.9,3", "60,44.6,3")
+PASTE = """(cell, words) => {
+  const data = new DataTransfer();
+  data.setData("text", words);
+  cell.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true, cancelable: true }));
+}"""
 TABLE = "\n".join(["F_in (N),F_out (N),run", *ROWS, ""])
 
 
@@ -29,6 +36,7 @@ def bench(tmp_path_factory, quick_results):
     """A folder with a fit, and the app that serves it."""
     folder = tmp_path_factory.mktemp("bench")
     shutil.copytree(quick_results, folder / "fits" / "on-body")
+    shutil.copytree(DATASETS / "on-body-exoskeleton", folder / "on-body-exoskeleton")
     with served(folder) as app:
         yield folder, app
 
@@ -61,9 +69,21 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
         page.get_by_role("button", name="Fit", exact=True).click()
         page.locator("#seed-fault").wait_for()
         assert page.inner_text("#seed-fault") == "--seed = 'many' must be a whole number from 0 to 2147483647."
+        page.get_by_role("link", name="Add rows to bench 1.csv").click()
+        for heading, typed in (("F_in (N)", "20"), ("F_out (N)", "many"), ("run", "4")):
+            page.get_by_label(f"{heading}, new row 1", exact=True).fill(typed)
+        page.keyboard.press("Tab")
+        page.get_by_text("'many' is not a number").wait_for()
+        assert page.get_by_label("F_out (N), new row 1", exact=True).get_attribute("aria-invalid") == "true"
+        assert (folder / "bench-1" / "bench 1.csv").read_text() == TABLE
+        pasted = "F_in (N)\tF_out (N)\trun\n20\t15.1\t4\n40\t30.5\t4"
+        page.get_by_label("F_in (N), new row 1", exact=True).evaluate(PASTE, pasted)
+        page.get_by_role("button", name="Add 2 rows").click()
+        page.get_by_role("heading", name="bench-1").wait_for()
+        page.get_by_text("4 runs").wait_for()
     assert not (folder / "fits" / "bench-1").exists()
     assert bf.check(folder / "bench-1").description.name == "bench 1"
-    assert (folder / "bench-1" / "bench 1.csv").read_text() == TABLE
+    assert (folder / "bench-1" / "bench 1.csv").read_text() == f"{TABLE}20,15.1,4\n40,30.5,4\n"
 
 
 @pytest.mark.extended
@@ -85,6 +105,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         assert text_on(page, "#arrives").split() == printed.split()
         page.get_by_role("button", name="Rank what could be measured next").click()
         page.locator("#ranking table").wait_for()
+        page.get_by_role("link", name="Add rows to efficiencies.csv").wait_for()
         advice = printed_by("next", results).split("\n\n")[0].split()
         assert " ".join(advice) in " ".join(text_on(page, "#ranking").split())
         for name in ("efficiency", "pairs", "coefficients", "residuals", "loss"):

@@ -1,6 +1,6 @@
-"""Stages of work that takes long, announced by Python's logging: a terminal shows the last one, `--verbose` prints them all.
+"""Stages of work that takes long, announced by Python's logging: a terminal or notebook shows the last, `--verbose` all.
 
-A notebook sees them with `logging.basicConfig(level=logging.INFO)`.
+A program sees them with `logging.basicConfig(level=logging.INFO)`.
 """
 
 import logging

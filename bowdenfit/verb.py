@@ -1,13 +1,10 @@
-"""A verb: one function for notebooks, what the command line prints of its answer, and its progress bar. Loads little."""
+"""A verb: one function for notebooks, and what the command line prints of its answer. Loads little."""
 
-import io
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tqdm import tqdm
+from bowdenfit.stage_bar import Watch
 
 NOT_TRUSTED = 3  # exit code
 
@@ -31,23 +28,6 @@ class Reply:
     exit_code: int = 0
     csv: Callable[[], str] | None = None
     pieces: Iterable[str] = ()
-
-
-@dataclass(frozen=True)
-class Watch:
-    """Progress bar and interrupts of a verb that takes long.
-
-    Args:
-        kept: File in the results folder that lets it go on later; empty where nothing does.
-        remark: What is kept; the folder follows.
-        bar: Options of the progress bar.
-        show: Moves the bar by what the function reports.
-    """
-
-    kept: str
-    remark: str
-    bar: Mapping[str, Any]
-    show: Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -80,37 +60,3 @@ class Verb:
     warns: bool = False
     explains: str = ""
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
-
-
-@contextmanager
-def show_progress_bar(watch: Watch, report: Callable[..., None] | None) -> Iterator[Callable[..., None] | None]:
-    """Yield what to call while a verb runs: the caller's function, else in a notebook one that moves a bar.
-
-    The line is a display object rather than a stream, so that a notebook keeps one line; tqdm's own bar for notebooks asks
-    for ipywidgets.
-
-    Args:
-        watch: What the bar shows.
-        report: What the caller wants called; None if nothing.
-    """
-    if report is not None or not is_notebook():
-        yield report
-        return
-    from IPython.display import display  # which a notebook brings, and nothing else needs
-
-    line = display({"text/plain": ""}, raw=True, display_id=True)
-
-    class Bar(tqdm):
-        monitor_interval = 0  # no thread of its own: a process with threads is not copied
-
-        def display(self, msg: str | None = None, pos: int | None = None) -> None:  # noqa: ARG002
-            line.update({"text/plain": str(self) if msg is None else msg}, raw=True)
-
-    with Bar(file=io.StringIO(), **watch.bar) as bar:
-        yield lambda *progress: watch.show(bar, *progress)
-
-
-def is_notebook() -> bool:
-    """Return whether the program runs in the kernel of a notebook."""
-    shell: Any = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    return getattr(shell, "kernel", None) is not None

@@ -15,11 +15,11 @@ from contextvars import copy_context
 from pathlib import Path
 from typing import Any
 
-from bowdenfit.cli.stage_line import Report, show_stages
+from bowdenfit.cli.stage_line import show_stages
 from bowdenfit.cli.terminal import say_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.resources import refuse_low_memory
-from bowdenfit.verb import Watch
+from bowdenfit.stage_bar import Report, Watch
 
 INTERRUPTED = 130  # exit code, as shells have it
 _PATIENCE = 1.0  # s, in which a command may end by itself; a judgement

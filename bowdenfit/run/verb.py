@@ -14,8 +14,9 @@ from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_mem
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN, remove_checkpoint, reserve_folder
+from bowdenfit.stage_bar import Watch, show_progress_bar
 from bowdenfit.stages import announce_stage
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -52,7 +53,7 @@ def fit(
         seed: Seed of everything random.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
-        progress: Called while sampling; a notebook shows a bar if omitted.
+        progress: Called while sampling; a notebook shows one line with stage, clock and progress if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
         reading: Keywords of `bowdenfit.read`.
 
@@ -61,21 +62,21 @@ def fit(
     """
     refuse_low_memory()
     folder = Path(output) if output is not None else None
-    data = run.choose_sampler(read(dataset, **reading), sampler, mcmc)
-    announce_stage("loading JAX")
-    with reserve_folder(folder):
-        seed = run.choose_seed(folder, data, mcmc, seed, resume, force)
-        keep_compiled_programs()
-        if mcmc:
-            with show_progress_bar(WATCH, progress) as show:
+    with show_progress_bar(WATCH, progress) as show:
+        data = run.choose_sampler(read(dataset, **reading), sampler, mcmc)
+        announce_stage("loading JAX")
+        with reserve_folder(folder):
+            seed = run.choose_seed(folder, data, mcmc, seed, resume, force)
+            keep_compiled_programs()
+            if mcmc:
                 checkpoint = partial(run.start_checkpointing, folder, data, seed, resume)
                 result = run.fit_posterior(data, seed, checkpoint, resume, show)
-        else:
-            result = run.fit_classically(data, seed)
-        for sentence in run.write_results(result, folder, figures) if folder is not None else ():
-            report(sentence)
-        if folder is not None and result.converged:
-            remove_checkpoint(folder)
+            else:
+                result = run.fit_classically(data, seed)
+            for sentence in run.write_results(result, folder, figures) if folder is not None else ():
+                report(sentence)
+            if folder is not None and result.converged:
+                remove_checkpoint(folder)
     return result
 
 

@@ -6,8 +6,12 @@ import re
 import time
 from contextlib import redirect_stderr
 
+import pytest
+
+from bowdenfit import stage_bar
 from bowdenfit.cli.stage_line import say_beside_stages, show_stages
 from bowdenfit.run.verb import WATCH
+from bowdenfit.stage_bar import show_progress_bar
 from bowdenfit.stages import LOGGER, announce_stage
 
 TABLE = "wrap_angle_deg,input_force_N,output_force_N\n" + "".join(
@@ -38,9 +42,6 @@ def test_the_clock_of_a_stage_runs_and_its_line_goes_in_the_end():
 
 def test_progress_takes_the_line_and_the_next_stage_takes_it_back():
     terminal = Terminal()
-    class Progress:
-        steps, sampler, r_hat, ess = 300, "emcee", None, None
-
     with redirect_stderr(terminal), show_stages(WATCH) as report:
         announce_stage("compiling the posterior")
         time.sleep(1.8)
@@ -67,6 +68,70 @@ def test_a_quick_command_shows_nothing():
     with redirect_stderr(terminal), show_stages(None):
         announce_stage("reading my-cable")
     assert terminal.lines() == []
+
+
+class Output(list):
+    """What a notebook shows in one place, one text after the other."""
+
+    def update(self, data, raw):
+        assert raw
+        self.append(data["text/plain"])
+
+
+@pytest.fixture
+def outputs(monkeypatch):
+    """Places in which a notebook shows something, where this program is its kernel."""
+    places = []
+
+    def display(data, **_):
+        places.append(Output([data["text/plain"]]))
+        return places[-1]
+
+    monkeypatch.setattr("IPython.display.display", display)
+    monkeypatch.setattr(stage_bar, "is_notebook", lambda: True)
+    monkeypatch.setattr(stage_bar, "DELAY", 0.05)
+    monkeypatch.setattr(stage_bar, "_TICK", 0.02)
+    return places
+
+
+class Progress:
+    steps, sampler, r_hat, ess = 300, "emcee", None, None
+
+
+def test_a_notebook_shows_stages_and_progress_in_one_line_and_the_last_progress_in_the_end(outputs):
+    with show_progress_bar(WATCH, None) as report, show_progress_bar(None, None) as inner:
+        announce_stage("compiling the posterior")
+        time.sleep(0.3)
+        report(Progress)
+        announce_stage("drawing efficiency")
+        time.sleep(0.3)
+    assert inner is None and len(outputs) == 1  # what runs inside of other work has no line of its own
+    in_order = r"compiling the posterior, 00:00.*sampling with emcee 300 steps, 00:00.*drawing efficiency, 00:00.*"
+    assert re.search(in_order, " ".join(outputs[0]))
+    assert outputs[0].count("drawing efficiency, 00:00") > 1  # its clock runs
+    assert outputs[0][-1] == "sampling with emcee 300 steps, 00:00"
+    assert LOGGER.getEffectiveLevel() > logging.INFO and LOGGER.propagate
+
+
+def test_a_notebook_shows_at_which_stage_work_has_ended_or_stopped(outputs):
+    with show_progress_bar(None, None):
+        announce_stage("sampling the population")
+        time.sleep(0.2)
+    with pytest.raises(KeyboardInterrupt), show_progress_bar(WATCH, None):
+        announce_stage("compiling the posterior")
+        time.sleep(0.2)
+        raise KeyboardInterrupt
+    assert [output[-1] for output in outputs] == ["done, 00:00", "stopped while compiling the posterior, 00:00"]
+
+
+def test_quick_work_in_a_notebook_and_any_in_a_program_shows_nothing(outputs, monkeypatch, capsys):
+    with show_progress_bar(WATCH, None):
+        announce_stage("reading my-cable")
+    monkeypatch.setattr(stage_bar, "is_notebook", lambda: False)
+    with show_progress_bar(WATCH, None) as report:
+        announce_stage("reading my-cable")
+        time.sleep(0.2)
+    assert report is None and outputs == [] and capsys.readouterr() == ("", "")
 
 
 def test_in_a_pipe_there_is_nothing_but_with_verbose_every_stage_with_its_time(run, tmp_path):

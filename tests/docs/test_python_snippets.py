@@ -27,7 +27,7 @@ OF_JAX = ROOT / "docs" / "model.md"  # whose functions, and BlackJAX's, a strict
 IN_A_KERNEL = (ROOT / "README.md", ROOT / "docs" / "library.md")
 PROGRAMS = {ROOT / "docs" / "fleets.md": "cable-01"}  # and what they print
 CALIBRATING = """
-from bowdenfit.verb import show_progress_bar
+from bowdenfit.stage_bar import show_progress_bar
 from bowdenfit.questions.calibrate.verb import WATCH
 
 with show_progress_bar(WATCH, None) as report:

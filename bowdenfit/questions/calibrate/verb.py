@@ -14,7 +14,8 @@ from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.questions import calibrate as room
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import REPLICATIONS
-from bowdenfit.verb import Reply, Verb, Watch, show_progress_bar
+from bowdenfit.stage_bar import Watch, show_progress_bar
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset

@@ -9,7 +9,8 @@ from cyclopts import Parameter
 from bowdenfit.arguments import FITS, HIDDEN, Output, read_first
 from bowdenfit.questions import compare as room
 from bowdenfit.questions.writing import refuse_to_replace, write_answer
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
+from bowdenfit.stage_bar import Watch, show_progress_bar
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.compare.answer import Comparison

@@ -13,7 +13,8 @@ from bowdenfit.inference.resources import refuse_low_memory
 from bowdenfit.questions import fleet as _fleet
 from bowdenfit.reading import Reading
 from bowdenfit.results.folder import reserve_folder
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb, Watch, show_progress_bar
+from bowdenfit.stage_bar import Watch, show_progress_bar
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.questions.fleet.answer import Fleet

@@ -19,6 +19,7 @@ from bowdenfit.arguments import (
 )
 from bowdenfit.questions import pool as _pool
 from bowdenfit.questions.writing import refuse_to_replace
+from bowdenfit.stage_bar import show_progress_bar
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
@@ -61,11 +62,12 @@ def pool(
     """
     if output is not None:
         refuse_to_replace(Path(output), NAME, "pooled fleet", force)
-    answer = _pool.pool_results(
-        Path(results), as_pair(until), wrap_angles, cycles, None if measurements is None else Path(measurements), seed
-    )
-    if output is not None:
-        _pool.write_pool(answer, Path(output), NAME)
+    with show_progress_bar(None, None):
+        answer = _pool.pool_results(
+            Path(results), as_pair(until), wrap_angles, cycles, None if measurements is None else Path(measurements), seed
+        )
+        if output is not None:
+            _pool.write_pool(answer, Path(output), NAME)
     return answer
 
 

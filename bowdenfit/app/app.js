@@ -4,8 +4,12 @@
   globalThis.sendFiles = async (files, address) => {
     const refusals = [];
     for (const file of files) {
-      const answer = await fetch(`${address}?name=${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
-      if (!answer.ok) refusals.push(await answer.text());
+      try {
+        const answer = await fetch(`${address}?name=${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
+        if (!answer.ok) refusals.push(await answer.text());
+      } catch {
+        refusals.push(`${file.name} could not be read; of a folder choose the files in it.`);
+      }
     }
     return refusals;
   };

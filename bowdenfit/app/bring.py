@@ -13,6 +13,7 @@ from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
 from bowdenfit.app.sheet import FILE as TYPED
 from bowdenfit.app.sheet import TypedSheet
 from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name
+from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
 
@@ -129,8 +130,11 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
         await look_again()
 
     with block("label", "drop") as zone:
-        text("Drop the files that you measured here, or choose them: tables, recordings, workbooks.", "span")
-        endings = ",".join(FORMATS)
+        text(
+            "Drop the files that you measured here, or choose them: tables, recordings, workbooks. With a cable.toml among "
+            "them they become a data set as it says.", "span",
+        )  # fmt: skip
+        endings = ",".join([*FORMATS, ".toml"])
         chooser = block("input", type="file", multiple="", accept=endings, aria_label="Measured files", data_key="files")
     chooser.on("change", taken, js_handler=f"async event => emit(await sendFiles(event.target.files, '{address}'))")
     zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{address}'))")
@@ -138,14 +142,18 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
 
 def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
     """Show what is understood of a draft, and what is asked."""
-    if not draft.files:
+    if not (draft.files or draft.is_described):
         text("Nothing is here yet.")
         return
+    if draft.is_described:
+        with block("div", "row"):
+            text(DESCRIPTION_FILE, "h3")
+            _remove_button(draft, DESCRIPTION_FILE, look_again)
     for file in understanding.files:
         _show_file(draft, file, look_again)
     for path in [path for path in draft.files if path.name not in {file.name for file in understanding.files}]:
         with block("div", "row"):
-            text(path.name, "h3", dir="auto")
+            text(path.relative_to(draft.folder).as_posix(), "h3", dir="auto")
             _remove_button(draft, path.name, look_again)
     _show_refusals(understanding.refusals)
     _show_questions(draft, understanding, look_again)
@@ -257,7 +265,7 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
 
 def _show_writing(workbench: Workbench, draft: Draft) -> None:
     """Show where the data set goes, and the button that writes it."""
-    name = {"folder": Path(draft.files[0].name).stem.replace(" ", "-") or "my-cable"}
+    name = {"folder": draft.proposed_name}
 
     def write() -> None:
         refuse_folder_name(name["folder"])

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bowdenfit.app.brought_folder import lay_flat, put_in_place
 from bowdenfit.app.form import Form, FormEntry, UnansweredError
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -14,7 +15,7 @@ from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.describe import describe_measured_files, inspect_files
-from bowdenfit.questions.start.folder import refuse_existing, refuse_files, write_data_set
+from bowdenfit.questions.start.folder import copy_data_set, refuse_existing, refuse_files, write_data_set
 from bowdenfit.questions.start.measured_file import FileColumn, MeasuredFile
 from bowdenfit.units import dimension_of, usual_units
 from bowdenfit.words import printable, shown
@@ -22,6 +23,7 @@ from bowdenfit.words import printable, shown
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
 _DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
+_MOST_FILES = 300  # of a draft; a judgement: a description names 100 recordings at most
 _MOST_FAULTS, _MOST_CELLS = 40, 12  # refusals beside cells, and cells of such a row; judgements
 
 
@@ -111,6 +113,8 @@ class Draft:
         stated: What was stated of columns, as (quantity, unit), by file and heading.
         typed: Cells that are typed, the headings first; empty where nobody types.
         understanding: What was understood when it was last looked at.
+        is_described: Whether a cable.toml was brought with the files.
+        cable: What that calls the cable.
     """
 
     folder: Path
@@ -118,6 +122,8 @@ class Draft:
     stated: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
     typed: list[list[str]] = field(default_factory=list)
     understanding: Understanding = Understanding()
+    is_described: bool = False
+    cable: str = ""
 
     @property
     def key(self) -> str:
@@ -126,20 +132,34 @@ class Draft:
 
     @property
     def files(self) -> list[Path]:
-        """Its measured files."""
-        return [path for path in sorted(self.folder.iterdir()) if path.name != DESCRIPTION_FILE]
+        """Its measured files, without cable.toml."""
+        return [path for path in sorted(self.folder.rglob("*")) if path.is_file() and path != self.folder / DESCRIPTION_FILE]
+
+    @property
+    def proposed_name(self) -> str:
+        """What its folder may be called: after its cable, or after its first file."""
+        name = self.cable if self.is_described else Path(self.files[0].name).stem
+        return "-".join(name.split()) or "my-cable"
 
     def new_file(self, name: str) -> Path:
         """Return where a file of a name is to be written.
 
         Raises:
-            UsageError: The name is not one of a file that may lie in a data set.
+            UsageError: The name is not one of a file that may lie in a data set, or there are too many.
         """
+        if name == DESCRIPTION_FILE:
+            self.is_described = True
+            return self.folder / name
         refuse_file_name(name)
+        if len(self.files) >= _MOST_FILES:
+            raise UsageError(f"{shown(name)} is one file more than the {_MOST_FILES} that are taken; leave some out first.")
         return self.folder / name
 
     def remove_file(self, name: str) -> None:
-        """Remove one of the files."""
+        """Remove one of the files; without a cable.toml of its own it is understood by its files again."""
+        if name == DESCRIPTION_FILE:
+            self.is_described = False
+            (self.folder / name).unlink(missing_ok=True)
         for path in [path for path in self.files if path.name == name]:
             path.unlink()
         self.stated.pop(name, None)
@@ -158,6 +178,9 @@ class Draft:
 
     def understand(self) -> Understanding:
         """Return what is understood now: columns, questions, and what `check` says where all are answered."""
+        lay_flat(self.folder)
+        if self.is_described:
+            return self._understand_description()
         form, measured_files, description, report = Form(self.answers), list[MeasuredFile](), "", ""
         refusals: tuple[Refusal, ...] = ()
         try:
@@ -171,9 +194,22 @@ class Draft:
         except UnansweredError:
             pass
         except BowdenfitError as error:
-            refusals = add_cells(list_refusals(error), self.folder)
+            refusals = add_cells(list_refusals(error), self.files)
         files = tuple(map(_understood_file, measured_files))
         self.understanding = Understanding(files, tuple(form.entries), refusals, description, report)
+        return self.understanding
+
+    def _understand_description(self) -> Understanding:
+        """Return what `check` says of files that were brought with their own cable.toml."""
+        description, report, refusals = "", "", tuple[Refusal, ...]()
+        try:
+            refuse_files(self.files)
+            self.cable = put_in_place(self.folder).name
+            report = str(check(self.folder))
+            description = (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8-sig")
+        except BowdenfitError as error:
+            refusals = add_cells(list_refusals(error), self.files)
+        self.understanding = Understanding(refusals=refusals, description=description, report=report)
         return self.understanding
 
     def _state_columns(self, measured_files: Sequence[MeasuredFile]) -> None:
@@ -183,7 +219,7 @@ class Draft:
                 file.state(heading, quantity, unit)
 
     def write(self, folder: Path) -> None:
-        """Write it as a data set, as `bowdenfit init` does.
+        """Write it as a data set, as `bowdenfit init` does; with its own cable.toml as it was brought.
 
         Args:
             folder: The new folder.
@@ -192,9 +228,12 @@ class Draft:
             UsageError, StoreError: It exists, or cannot be written; or questions are open.
         """
         if not self.understanding.description:
-            raise UsageError("questions are still open; answer them first.")
+            raise UsageError("it cannot be read yet, or questions are still open; see above, and answer them first.")
         refuse_existing(folder)
-        write_data_set(folder, self.understanding.description, self.files)
+        if self.is_described:
+            copy_data_set(self.folder, folder)
+        else:
+            write_data_set(folder, self.understanding.description, self.files)
 
 
 def refuse_file_name(name: str) -> None:
@@ -218,17 +257,18 @@ def list_refusals(error: BowdenfitError) -> tuple[Refusal, ...]:
     return tuple(_refusal(fault) for fault in faults[:_MOST_FAULTS])
 
 
-def add_cells(refusals: Sequence[Refusal], folder: Path) -> tuple[Refusal, ...]:
+def add_cells(refusals: Sequence[Refusal], files: Sequence[Path]) -> tuple[Refusal, ...]:
     """Return refusals with the rows that they speak of.
 
     Args:
         refusals: The refusals.
-        folder: Where the files lie.
+        files: The files.
     """
     rows: dict[str, dict[int, tuple[Cell, ...]]] = {}
-    for name in {refusal.file for refusal in refusals if refusal.row}:
+    refused_files = {refusal.file for refusal in refusals if refusal.row}
+    for path in [path for path in files if path.name in refused_files]:
         with suppress(BowdenfitError):
-            rows[name] = {row[0].row: row for row in read_table(folder / name).rows}
+            rows[path.name] = {row[0].row: row for row in read_table(path).rows}
     with_cells = []
     for refusal in refusals:
         row = rows.get(refusal.file, {}).get(refusal.row, ())

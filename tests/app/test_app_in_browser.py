@@ -81,6 +81,13 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
         page.get_by_role("button", name="Add 2 rows").click()
         page.get_by_role("heading", name="bench-1").wait_for()
         page.get_by_text("4 runs").wait_for()
+        page.goto(app.root)
+        page.get_by_role("button", name="New data set").click()
+        page.set_input_files("input[type=file]", sorted((DATASETS / "on-body-exoskeleton").iterdir()))
+        page.get_by_label("Name of the folder").fill("brought")
+        page.get_by_role("button", name="Write the data set").click()
+        page.get_by_role("heading", name="brought").wait_for()
+    assert bf.read(folder / "brought").sha256 == bf.read(DATASETS / "on-body-exoskeleton").sha256
     assert not (folder / "fits" / "bench-1").exists()
     assert bf.check(folder / "bench-1").description.name == "bench 1"
     assert (folder / "bench-1" / "bench 1.csv").read_text() == f"{TABLE}20,15.1,4\n40,30.5,4\n"

@@ -134,11 +134,30 @@ def write_example(name: str, folder: Path, with_notebook: bool = False) -> None:
         fitted = [example for example, path in known.items() if find_verb(path) == "fit"]
         raise UsageError(f"{name} is no data set of one cable, which the notebook fits; there is one for {listed(fitted)}.")
     with new_folder(folder) as place:
-        for file in sorted(known[name].rglob("*")):  # shutil.copytree hides what the system says
-            copy = place / file.relative_to(known[name])
-            copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
+        _copy_files(known[name], place)
         if with_notebook:
             write_notebook(place)
+
+
+def copy_data_set(source: Path, folder: Path) -> None:
+    """Copy a data set as it is.
+
+    Args:
+        source: Its folder.
+        folder: The new one.
+
+    Raises:
+        UsageError, StoreError: See `new_folder`.
+    """
+    with new_folder(folder) as place:
+        _copy_files(source, place)
+
+
+def _copy_files(source: Path, place: Path) -> None:
+    """Copy all that lies in a folder; `shutil.copytree` hides what the system says."""
+    for file in sorted(source.rglob("*")):
+        copy = place / file.relative_to(source)
+        copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
 
 
 def find_measured_files(folder: Path, endings: Sequence[str]) -> list[Path]:

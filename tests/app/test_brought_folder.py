@@ -1,0 +1,111 @@
+"""A data set that is brought as it is: files beside their cable.toml, each put where that names it, and nowhere else."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import bowdenfit as bf
+from bowdenfit.app.brought_folder import put_in_place
+from bowdenfit.app.draft import Draft
+from bowdenfit.errors import UsageError
+
+DATASETS = Path(__file__).parents[2] / "datasets"
+DESCRIPTION = """schema = 1
+name = "worn cable"
+[[contact]]
+name = "cable"
+friction = "mu"
+wrap_angle = { value = 180, unit = "deg" }
+[tables]
+forces = { files = FILES }
+"""
+TABLE = "F_in (N),F_out (N),run\n20,15.2,1\n40,30.1,1\n20,15.0,2\n40,30.9,2\n"
+
+
+@pytest.fixture
+def draft(tmp_path):
+    """An empty draft."""
+    (tmp_path / "draft").mkdir()
+    return Draft(tmp_path / "draft")
+
+
+def bring(draft, **contents):
+    """Bring files, all in one place, and a cable.toml that names them."""
+    for name, content in contents.items():
+        file = "cable.toml" if name == "cable" else f"{name}.csv"
+        draft.new_file(file).write_text(content)
+    return draft.understand()
+
+
+def test_a_shipped_data_set_that_is_chosen_file_by_file_is_written_as_it_is(draft, tmp_path):
+    source = DATASETS / "on-body-exoskeleton"
+    for path in source.iterdir():
+        shutil.copyfile(path, draft.new_file(path.name))
+    understanding = draft.understand()
+    assert understanding.refusals == ()
+    assert understanding.report == str(bf.check(source))
+    assert draft.proposed_name == bf.read(source).description.name.replace(" ", "-")
+    draft.write(tmp_path / "kept")
+    kept, brought = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (tmp_path / "kept", source))
+    assert kept == brought
+
+
+def test_recordings_go_into_the_folder_that_their_cable_toml_names(draft):
+    source = DATASETS / "synthetic-recordings"
+    shutil.copyfile(source / "cable.toml", draft.new_file("cable.toml"))
+    for path in (source / "angles.csv", *(source / "recordings").iterdir()):
+        draft.new_file(path.name).write_text("")
+    put_in_place(draft.folder)
+    assert {path.parent.name for path in draft.files if path.name != "angles.csv"} == {"recordings"}
+    assert (draft.folder / "angles.csv").is_file()
+
+
+def test_a_file_goes_where_a_pattern_finds_it_and_comes_back_when_the_description_changes(draft):
+    assert bring(draft, cable=DESCRIPTION.replace("FILES", '"runs/*/**/*.csv"'), one=TABLE).refusals == ()
+    assert [path.relative_to(draft.folder).as_posix() for path in draft.files] == ["runs/files/one.csv"]
+    assert bring(draft, cable=DESCRIPTION.replace("FILES", '"*.csv"')).refusals == ()
+    assert [path.relative_to(draft.folder).as_posix() for path in draft.files] == ["one.csv"]
+    draft.remove_file("cable.toml")
+    assert draft.understand().entries[-1].words.startswith("By which angle")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/etc/passwd", "../outside.csv", "a/../../outside.csv", "~/x.csv", "C:/x.csv", "a\\\\..\\\\x.csv", "a/b/c/d/e/x.csv",
+        "..", "x" * 300,
+    ],
+)  # fmt: skip
+def test_what_a_description_names_elsewhere_is_refused_before_it_is_opened(draft, tmp_path, name):
+    (tmp_path / "outside.csv").write_text(TABLE)
+    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", f'"{name}"'), one=TABLE).refusals
+    assert "does not lie in its own folder; put that file beside cable.toml" in refusal.sentence
+    with pytest.raises(UsageError, match="cannot be read yet"):
+        draft.write(tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()
+
+
+def test_a_file_that_two_folders_could_hold_is_refused(draft):
+    files = '["pull/*.csv", "return/*.csv"]'
+    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", files), one=TABLE).refusals
+    assert "names 'one.csv' in several folders" in refusal.sentence
+
+
+def test_a_file_that_is_called_like_a_folder_is_refused(draft):
+    draft.new_file("a").write_text("x")
+    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", '"a/one.csv"'), one=TABLE).refusals
+    assert "names a folder 'a', which cannot be made" in refusal.sentence
+
+
+def test_a_cell_that_cannot_be_read_is_shown_wherever_its_file_lies(draft):
+    wrong = TABLE.replace("30.9", "many")
+    refusals = bring(draft, cable=DESCRIPTION.replace("FILES", '"runs/one.csv"'), one=wrong).refusals
+    assert [(refusal.row, refusal.cells[1]) for refusal in refusals] == [(5, ("F_out (N)", "many"))]
+
+
+def test_files_without_end_are_refused(draft):
+    for number in range(300):
+        (draft.folder / f"{number}.csv").write_text("")
+    with pytest.raises(UsageError, match="one file more than the 300"):
+        draft.new_file("more.csv")

@@ -24,6 +24,7 @@ from bowdenfit.questions.figures import FIGURES
 from bowdenfit.questions.identify.answer import Identifiability
 from bowdenfit.questions.next.answer import NextMeasurement, RankedCandidate, TargetQuantity
 from bowdenfit.questions.next.candidates import has_candidates
+from bowdenfit.questions.watch.answer import History, WatchedAnswer
 from bowdenfit.results.answer_cache import CAPTIONS
 
 pytestmark = pytest.mark.extended
@@ -102,6 +103,19 @@ def ranking(candidates, scale, words):
     return NextMeasurement(answer, ranked, None, (), "Cable length (mm)", (430.0, 530.0), True)
 
 
+def history(counts, words, unit):
+    """Of an answer that is known the better the more mountings there are; trusted, and good enough, from the second half on."""
+    generator, half = np.random.default_rng(3), counts[len(counts) // 2]
+    answers = [
+        WatchedAnswer(
+            NAME, count, 3 * count, words, words, unit, Interval.of(generator.normal(471.0, 20 / count, 500)),
+            count > half, "", {} if count > half else None,
+        )
+        for count in counts
+    ]  # fmt: skip
+    return History(tuple(answers))
+
+
 MANY = tuple(f"mu_{LONG}_{i}" for i in range(8))
 ROUTE = [Candidate(kind, 430.0 + 10 * i) for i in range(12) for kind in ("efficiency", "angle")]
 LOADS = [Candidate("loop", load=5.0 * i, angles=(1.0,)) for i in range(30)]
@@ -119,6 +133,8 @@ ANSWERS = {
     ),
     "along a route": (("next",), lambda: ranking(ROUTE, 5.2, "the efficiency at {} mm")),
     "small numbers": (("next",), lambda: ranking(LOADS, 6.5e-5, "the loop's output force at 180 deg under {} N")),
+    "one mounting": (("history",), lambda: history([1], "mu", "")),
+    "forty mountings": (("history",), lambda: history([*range(1, 41)], "the best cable length", "mm")),
     "large numbers, long words": (("next",), lambda: ranking(LOADS, 6.5e5, NAME + " {}")),
 }
 

@@ -162,7 +162,7 @@ def test_every_program_in_c_compiles_without_a_warning_and_runs(block, reader, t
     (tmp_path / "main.c").write_text(block.text, encoding="utf-8")
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
     subprocess.run(["gcc", *strict, "main.c", "-o", "main", "-lm"], cwd=tmp_path, check=True, timeout=60)
-    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([tmp_path / "main"], input="100 75\n", capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0 and any(char.isdigit() for char in done.stdout), done
 
 

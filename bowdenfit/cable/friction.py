@@ -60,11 +60,6 @@ class FrictionModel:
         """Groups of readings that have coefficients of their own; empty where all share them."""
         return self.conditions.groups if any(option.of_group for option in self._options) else ()
 
-    @property
-    def cautions(self) -> tuple[str, ...]:
-        """Sentences on options whose intervals are too narrow."""
-        return tuple(option.caution for option in self._options if option.caution)
-
     def parameters(self, defaults: PriorDefaults) -> list[Parameter]:
         """Return parameters of all options."""
         return [p for option in self._options for p in option.parameters(self.conditions, defaults)]

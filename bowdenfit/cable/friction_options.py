@@ -38,7 +38,6 @@ class FrictionOption(ABC):
     of_stroke = False
     of_group = False
     of_turns = False
-    caution = ""  # why its intervals are too narrow; empty where they hold
 
     @abstractmethod
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
@@ -230,11 +229,6 @@ class LuGre(Dahl):
 
     of_rate = True
     name = "lugre"
-    caution = (
-        "Under lugre, 90 % intervals of how friction changes with speed contained the truth in 3 to 11 of 13 simulated "
-        "recordings, since blocks lose how friction lags behind the speed. Take what depends on speed from --friction "
-        "rate-dependent, and the creep after a turn from --friction dahl."
-    )  # docs/theory.md
 
     def parameters(self, conditions: Conditions, defaults: PriorDefaults) -> list[Parameter]:
         """Return the presliding stiffness, what changes friction with speed, and the damping."""

@@ -6,13 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from cables import cable
-from creeping_rope import Truth, creep, pulled
+from creeping_rope import CONTACT, SPEED, Truth, model_recordings, record
 
-from bowdenfit.cable.conditions import Conditions
-from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.cable.friction_options import friction_options
 from bowdenfit.dataset import Dataset
-from bowdenfit.description import Preparation
 from bowdenfit.errors import DescriptionError
 from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.least_squares import find_maximum_posterior, fit_least_squares
@@ -24,41 +21,16 @@ from bowdenfit.kinds.recordings.turns import TurnsTerm, _subtract_common
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.models import build_model
 from bowdenfit.questions.recorded.presliding import Presliding
-from bowdenfit.recordings.preparation import prepare
-from bowdenfit.recordings.recording import RawRecording, Recording, Recordings
-from bowdenfit.recordings.strokes import find_strokes
-
-CONTACT = {"name": "sheath", "friction": "mu", "wrap_angle": {"column": "angle", "nominal": {"value": 90, "unit": "deg"}}}
-ANGLE, SPEED = 2.0, 20.0
-NOISE = 0.15  # N, a sample
-
-
-def _recorded(truth: Truth, rate: float, seed: int, name="turns") -> Recording:
-    """A recording of half a minute with noise in both cells, prepared and cut into strokes."""
-    generator, time = np.random.default_rng(seed), np.arange(0, 33.9, 1 / rate)
-    (force, speed), output = pulled(time), creep(truth, time)
-    noise = NOISE * generator.standard_normal((2, len(time)))
-    raw = RawRecording(name, f"{name}.csv", time, force + noise[0], time, output + noise[1], time, speed)
-    blocks, account = prepare(raw, Preparation(delay="none"))
-    own = np.array([ANGLE]), np.array([np.nan])
-    return Recording(name, raw.file, name, float("nan"), *own, blocks, find_strokes(blocks, raw.file, name), account)
-
-
-def _model(recordings, friction_model):
-    stated = {"reference_velocity": {"value": SPEED, "unit": "mm/s"}, "friction_model": friction_model}
-    description = cable(1, {"recordings": {"files": "*.csv"}}, contact=[CONTACT], **stated).model_copy(update={"route": None})
-    table = Recordings(("angle",), tuple(recordings), "mm/s")
-    return build_model(Dataset(description, Measurements((table,)), {}))
 
 
 @pytest.fixture(scope="module")
 def recording():
-    return _recorded(Truth(stiffness=30.0, reference_speed=SPEED), 100, 1)
+    return record(Truth(stiffness=30.0, reference_speed=SPEED), 100, 1)
 
 
 def test_a_standing_phase_is_known_as_if_its_blocks_had_one_error_in_common(recording):
     """The sum of squares is that of the covariance with a common error, and the log determinant differs by a constant."""
-    (term,) = _model([recording], "dahl").terms
+    (term,) = model_recordings([recording], "dahl").terms
     assert isinstance(term, TurnsTerm)
     data, generator = term.data, np.random.default_rng(5)
     deviation = generator.standard_normal(data["weight"].shape)
@@ -74,7 +46,8 @@ def test_a_standing_phase_is_known_as_if_its_blocks_had_one_error_in_common(reco
 
 
 def test_play_counts_the_same_blocks_as_dahl_and_a_capstan_fit_other_ones_with_a_remedy(recording):
-    kind, models = RecordingTerms(), {name: _model([recording], name) for name in ("play", "dahl", "lugre", "capstan")}
+    kind, names = RecordingTerms(), ("play", "dahl", "lugre", "capstan")
+    models = {name: model_recordings([recording], name) for name in names}
     events = {name: kind.events(model.terms[0], model.description) for name, model in models.items()}
     np.testing.assert_array_equal(events["play"], events["dahl"])
     np.testing.assert_array_equal(events["play"], events["lugre"])
@@ -84,7 +57,7 @@ def test_play_counts_the_same_blocks_as_dahl_and_a_capstan_fit_other_ones_with_a
 
 
 def test_friction_models_of_turns_add_their_parameters_and_need_recordings(recording):
-    names = [p.name for p in _model([recording], "lugre+drag").space.parameters if p.role == "friction_model"]
+    names = [p.name for p in model_recordings([recording], "lugre+drag").space.parameters if p.role == "friction_model"]
     assert names == ["presliding_stiffness", "stribeck", "stribeck_speed", "viscous", "bristle_damping", "drag"]
     with pytest.raises(DescriptionError, match='"dahl", which says what happens when the motion turns, and only recordings'):
         build_model(Dataset(cable(1, ("efficiencies",), contact=[CONTACT | {"wrap_angle": {"value": 90, "unit": "deg"}}],
@@ -97,7 +70,7 @@ def test_friction_models_of_turns_add_their_parameters_and_need_recordings(recor
 
 @pytest.mark.extended
 def test_the_likelihood_has_its_top_at_the_stiffness_that_the_recording_was_made_with(recording):
-    model = _model([recording], "dahl")
+    model = model_recordings([recording], "dahl")
     (term,) = model.terms
 
     @jax.jit
@@ -114,7 +87,7 @@ def test_the_likelihood_has_its_top_at_the_stiffness_that_the_recording_was_made
 @pytest.mark.parametrize("rate", [100, 1000])
 def test_least_squares_return_what_another_simulator_put_in(rate):
     truth = Truth(stiffness=25.0, reference_speed=SPEED)
-    posterior = LogDensity(_model([_recorded(truth, rate, 2)], "dahl"))
+    posterior = LogDensity(model_recordings([record(truth, rate, 2)], "dahl"))
     objective = make_objective(posterior)
     start = find_maximum_posterior(posterior, objective).z
     estimate = fit_least_squares(posterior, objective, start, intervals=False).estimates["presliding_stiffness"]
@@ -129,9 +102,3 @@ def test_the_summary_says_how_far_the_rope_creeps_or_that_it_cannot_be_told_from
     unknown = Presliding(Interval.of(np.abs(0.01 * generator.standard_normal(4000))), 50.0)
     assert unknown.is_play and not known.is_play
     assert "cannot tell the presliding stiffness" in unknown.sentence() and "force at 50 N" in unknown.sentence()
-
-
-@pytest.mark.parametrize(("options", "count"), [(("play", "rate-dependent"), 0), (("dahl",), 0), (("lugre",), 1)])
-def test_only_lugre_is_known_for_intervals_that_are_too_narrow(options, count):
-    cautions = FrictionModel(options, Conditions(20.0, 100.0, (10.0, 100.0), "mm/s")).cautions
-    assert len(cautions) == count and all("--friction rate-dependent" in caution for caution in cautions)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exported import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
+from exported import CASES, CREEPING, HOSTILE, cable, changing_speed, crept, followed, motion, of_equations, points
 
 from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.tables import LEVELS
@@ -119,9 +119,9 @@ def test_c_follows_a_rope_that_creeps_as_the_package_does(case, build):
     found, n, step = cable(case), 20_000, 0.001
     force, ask = motion(found, n), build(found)
     for level in (1, 4, 6):
-        place, speed = float(np.mean(found.points.values)), 31.0
-        same = {"level": level, "place": place, "speed": speed, "stroke": step}
-        asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force}
+        place, speed = float(np.mean(found.points.values)), changing_speed(n)
+        same = {"level": level, "place": place, "stroke": step}
+        asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force, "speed": speed}
         stepped, state, *_ = ask(asked, "step")
         np.testing.assert_allclose(stepped, crept(found, level, place, speed, force, step), rtol=1e-10, atol=1e-9)
         np.testing.assert_array_equal(stepped, state)

@@ -7,7 +7,7 @@ import types
 
 import numpy as np
 import pytest
-from exported import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
+from exported import CASES, CREEPING, HOSTILE, cable, changing_speed, crept, followed, motion, of_equations, points
 
 from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.python import python_module
@@ -40,8 +40,9 @@ def test_python_says_what_the_equations_say(case):
 def test_python_follows_any_motion(case):
     found, place = cable(case), float(np.mean(cable(case).points.values)) + 0.01
     force, follow = motion(found, 4000)[::4], module_of(found).Motion("q95", place)
-    output = np.array([follow.step(f, 31.0, 0.01) for f in force])
-    known = crept(found, 2, place, 31.0, force, 0.01) if case in CREEPING else followed(found, 2, place, 31.0, force)
+    speed = changing_speed(len(force)) if case in CREEPING else np.full(len(force), 31.0)
+    output = np.array([follow.step(f, v, 0.01) for f, v in zip(force, speed, strict=True)])
+    known = crept(found, 2, place, speed, force, 0.01) if case in CREEPING else followed(found, 2, place, 31.0, force)
     np.testing.assert_allclose(output, known, rtol=1e-10, atol=1e-9)
 
 

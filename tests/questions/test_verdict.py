@@ -11,7 +11,6 @@ from hand_bench import pull, write
 from one_page import faults
 
 import bowdenfit as bf
-from bowdenfit.cable.friction import FrictionModel
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.kinds.tables import Measurements
@@ -23,7 +22,6 @@ from bowdenfit.questions.summary.verdict import (
     NOT_CONVERGED,
     NOT_DESCRIBED,
     NOT_IDENTIFIABLE,
-    TOO_NARROW,
 )
 
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=400", "sampler.target_r_hat=1.03", "sampler.max_steps=4000")
@@ -158,9 +156,3 @@ def test_least_squares_that_runs_to_no_friction_at_all_is_no_fit_to_trust(on_bod
     assert list(found.troubles) == [NOT_IDENTIFIABLE]
     assert "do not determine mu2" in found.reasons[0]
     assert on_body_squares.verdict().trusted
-
-
-def test_what_a_friction_model_is_known_for_is_in_the_verdict(tmp_path, monkeypatch):
-    monkeypatch.setattr(FrictionModel, "cautions", ("Its intervals are too narrow.",))
-    fit = bf.fit(_bench(tmp_path, 4), mcmc=False, seed=1)
-    assert fit.verdict().troubles[TOO_NARROW] == ("Its intervals are too narrow.",)

@@ -1,4 +1,4 @@
-"""Recordings of a rope whose friction builds up after a turn, by an ODE solver that shares no code with the package.
+"""Recordings of a rope whose friction builds up after a turn, by an ODE solver that shares no code with the likelihood.
 
 Textbook LuGre (Canudas de Wit et al. 1995) with the motion of the load end, u = log F_out, in place of a displacement:
 z' = u' - stiffness |u'| z / g(v), friction = stiffness z + damping z'. With no damping and a constant g it is Dahl's model.
@@ -8,8 +8,20 @@ With damping the load end has a small damper, without which its speed would be a
 from dataclasses import dataclass
 
 import numpy as np
+from cables import cable
 from scipy.integrate import solve_ivp
 
+from bowdenfit.dataset import Dataset
+from bowdenfit.description import Preparation
+from bowdenfit.kinds.tables import Measurements
+from bowdenfit.models import Model, build_model
+from bowdenfit.recordings.preparation import prepare
+from bowdenfit.recordings.recording import RawRecording, Recording, Recordings
+from bowdenfit.recordings.strokes import find_strokes
+
+CONTACT = {"name": "sheath", "friction": "mu", "wrap_angle": {"column": "angle", "nominal": {"value": 90, "unit": "deg"}}}
+ANGLE, SPEED = 2.0, 20.0  # rad; mm/s, of reference
+NOISE = 0.15  # N, a sample
 LOAD_DAMPER = 2e-5  # s; the output comes later by that
 
 
@@ -73,6 +85,24 @@ def creep(truth: Truth, time, profile=pulled):
     x = float(np.log(profile(np.array([time[0]]))[0][0]))
     start = [x - 0.3 * truth.exponent, 0.3 * truth.exponent]
     function, method = (change_damped, "LSODA") if damping else (change, "RK45")
-    solved = solve_ivp(function, (time[0], time[-1]), start, method, time, rtol=1e-6, atol=1e-9, max_step=0.04)
+    solved = solve_ivp(function, (time[0], time[-1]), start, method, time, rtol=1e-9, atol=1e-12, max_step=0.01)
     assert solved.success
     return np.exp(solved.y[0])
+
+
+def record(truth: Truth, rate: float, seed: int, name: str = "turns") -> Recording:
+    """A recording of half a minute with noise in both cells, prepared and cut into strokes."""
+    generator, time = np.random.default_rng(seed), np.arange(0, 33.9, 1 / rate)
+    (force, speed), output = pulled(time), creep(truth, time)
+    noise = NOISE * generator.standard_normal((2, len(time)))
+    raw = RawRecording(name, f"{name}.csv", time, force + noise[0], time, output + noise[1], time, speed)
+    blocks, account = prepare(raw, Preparation(delay="none"))
+    own = np.array([ANGLE]), np.array([np.nan])
+    return Recording(name, raw.file, name, float("nan"), *own, blocks, find_strokes(blocks, raw.file, name), account)
+
+
+def model_recordings(recordings: list[Recording], friction_model: str) -> Model:
+    """The model of recordings of one rope under a friction model."""
+    stated = {"reference_velocity": {"value": SPEED, "unit": "mm/s"}, "friction_model": friction_model}
+    description = cable(1, {"recordings": {"files": "*.csv"}}, contact=[CONTACT], **stated).model_copy(update={"route": None})
+    return build_model(Dataset(description, Measurements((Recordings(("angle",), tuple(recordings), "mm/s"),)), {}))

@@ -130,7 +130,9 @@ def followed(found: TransmissionTables, level: int, place: float, speed: float, 
     return np.asarray(force_from_scale(play_operator(low, high, start)[0], *scale))
 
 
-def crept(found: TransmissionTables, level: int, place: float, speed: float, force: np.ndarray, step: float) -> np.ndarray:
+def crept(
+    found: TransmissionTables, level: int, place: float, speed: np.ndarray | float, force: np.ndarray, step: float
+) -> np.ndarray:
     """Output forces through a motion, from the middle of the band on, of a rope whose friction builds up."""
     n, one = len(force), found.levels[level]
     asked = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
@@ -143,6 +145,11 @@ def crept(found: TransmissionTables, level: int, place: float, speed: float, for
     start = x[0] - (limits[0] - limits[1])[0] / 2
     y = presliding_operator(x, limits, stiffness, start, None, one.presliding[1] / step)
     return np.asarray(force_from_scale(y, *scale))
+
+
+def changing_speed(n: int) -> np.ndarray:
+    """Speeds between 6 and 56 of a motion, slow beside its turns."""
+    return 31 + 25 * np.sin(np.linspace(0, 60, n))
 
 
 def motion(found: TransmissionTables, n: int) -> np.ndarray:

@@ -35,7 +35,6 @@ from bowdenfit.questions.summary.verdict import (
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
-    TOO_NARROW,
     Verdict,
     assess_fit,
 )
@@ -112,7 +111,6 @@ def _problem_headline(fit_verdict: Verdict) -> str:
         COPIED: "COPIED READINGS",
         COARSE: "READINGS TOO COARSE",
         NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
-        TOO_NARROW: "THE INTERVALS ARE TOO NARROW",
     }
     if NOT_CONVERGED in fit_verdict.troubles:
         return "NOT CONVERGED; do not use these numbers"

@@ -28,7 +28,6 @@ from bowdenfit.words import decimals, few, filled, listed
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 COPIED, COARSE = "made of copied readings", "finer than its readings"
-TOO_NARROW = "narrower in its intervals than it may be"
 
 
 _PROBLEMS = {
@@ -38,7 +37,6 @@ _PROBLEMS = {
     COPIED: "some of the readings are copies of others",
     COARSE: "the readings are too coarse for such intervals",
     NOT_DESCRIBED: "the model does not describe these readings",
-    TOO_NARROW: "the intervals of this friction model are too narrow",
     NOT_IDENTIFIABLE: "the measurements do not determine every coefficient",
 }
 _TRUSTED = "You can trust this: the fit has converged, and the readings agree with the model and with each other."
@@ -69,7 +67,7 @@ class Verdict(Display):
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
-            `NOT_DESCRIBED`, `COPIED`, `COARSE`, `TOO_NARROW`; each with sentences.
+            `NOT_DESCRIBED`, `COPIED`, `COARSE`; each with sentences.
         sampled: Whether there are draws.
         doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
@@ -104,7 +102,6 @@ def assess_fit(fit: Record) -> Verdict:
         COPIED: copies,
         COARSE: describe_coarse_readings(fit),
         NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
-        TOO_NARROW: fit.model.cable.friction.cautions,
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
     return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit))

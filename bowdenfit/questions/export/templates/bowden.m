@@ -128,32 +128,33 @@ function [output, flags, state] = crept(T, level, place, speed, force, seconds, 
     p = T.load(level, 1);
     d = T.load(level, 2);
     x = to_scale(max(force, 0), p, d, T.reference_force) - (pulling - returning) / 2;
+    k = T.presliding(level, 1) ./ rate;
     if isempty(state)
-        state = struct('output', NaN(size(force)), 'friction', zeros(size(force)));
+        none = zeros(size(force));
+        state = struct('output', NaN(size(force)), 'friction', none, 'limit', none, 'stiffness', none);
     end
     y = to_scale(max(state.output, 0), p, d, T.reference_force);
-    friction = min(max(state.friction, -half), half);
-    new = isnan(state.output);
-    y(new) = x(new);
-    friction(new) = 0;
-    slack = state.output <= 0;
-    y(slack) = x(slack) - half(slack);
-    friction(slack) = half(slack);
+    friction = state.friction;
+    new = ~(state.output > 0);  % it begins in the middle of its friction band, or was slack and slides
+    friction(new) = half(new) .* (state.output(new) <= 0);
+    y(new) = x(new) - friction(new);
+    state.limit(new) = half(new);
+    state.stiffness(new) = k(new);
+    lag = zeros(size(seconds));
+    lag(seconds > 0) = T.presliding(level, 2) ./ seconds(seconds > 0);
+    mean_k = (state.stiffness + k) / 2;
+    u = max(mean_k .* abs(x - y - friction), 1e-3);
+    limit = half + (1 ./ u - 1 ./ expm1(u)) .* (state.limit - half);  % what friction follows of it in this step
+    most = min(limit, half) + 0.9 ./ (mean_k .* (1 + lag));
+    friction = min(max(friction, -most), most);
     lead = x - y - friction;
     s = ones(size(lead));
     s(lead < 0) = -1;
-    build_up = half - s .* friction;
-    lag = zeros(size(seconds));
-    lag(seconds > 0) = T.presliding(level, 2) ./ seconds(seconds > 0);
-    k = T.presliding(level, 1) ./ rate;
-    a = build_up .* (1 + lag);
-    w = log(max(k .* a, 1e-300)) + k .* (a - abs(lead));
-    log_w = w;
-    log_w(w > 1) = log(w(w > 1));
-    for i = 1:5
-        log_w = log_w - (exp(log_w) + log_w - w) ./ (exp(log_w) + 1);
-    end
-    moved = min(max(abs(lead) - a + exp(log_w) ./ k, 0), abs(lead));
+    lead = abs(lead);
+    build_up = limit - s .* friction;
+    u = max(mean_k .* creep(lead, build_up .* (1 + lag), mean_k), 1e-9);
+    lag = lag .* u ./ expm1(u);  % the bristles are damped by how fast they bend at the end of the step
+    moved = creep(lead, build_up .* (1 + lag), mean_k);
     output = from_scale(y + s .* moved, p, d, T.reference_force);
     none = ~(force > 0) | ~(output > 0);
     output(none) = 0;
@@ -161,9 +162,28 @@ function [output, flags, state] = crept(T, level, place, speed, force, seconds, 
     bad = isnan(force) | isnan(half);
     output(bad) = NaN;
     flags(bad) = 4;
-    after = s .* (half - build_up .* exp(-k .* moved));
+    after = s .* (limit - build_up .* exp(-mean_k .* moved));
     state.output(~bad) = output(~bad);
     state.friction(~bad) = after(~bad);
+    state.limit(~bad) = half(~bad);
+    state.stiffness(~bad) = k(~bad);
+end
+
+function moved = creep(change, build_up, k)
+    % Solve moved + build_up (1 - exp(-k moved)) = change, by Newton's method.
+    w = log(max(k .* build_up, 1e-300)) + k .* (build_up - change);
+    log_w = w;
+    log_w(w > 1) = log(w(w > 1));
+    let_go = min(max(-k .* build_up, 0), 0.9);
+    falls = 2 * k .* change ./ (sqrt((1 - let_go).^2 + 2 * let_go .* k .* change) + 1 - let_go);
+    for i = 1:5
+        log_w = log_w - (exp(log_w) + log_w - w) ./ (exp(log_w) + 1);
+        left = let_go .* exp(-falls);
+        falls = falls - (falls - let_go + left - k .* change) ./ (1 - left);
+    end
+    moved = min(max(change - build_up + exp(log_w) ./ k, 0), change);
+    falls = falls ./ k;
+    moved(build_up < 0) = falls(build_up < 0);
 end
 
 function g = to_scale(force, p, d, reference)

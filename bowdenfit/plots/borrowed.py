@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
 _LETTER_WIDTH = 10.0  # pixels, more than a letter of a legend takes; a judgement
 _ALIKE = 1e-6  # of the page, up to which panels are in one row or column; rounding
@@ -94,12 +96,31 @@ def draw_on(draw: Callable[[], Figure], axes: Sequence[Axes]) -> None:
     for one, number in zip(axes, numbers, strict=False):
         _name_axes(one, panels[number], [panels[other] for other in numbers])
     for legend in page.legends:
-        words = [text.get_text() for text in legend.get_texts()]
-        handles = [handle for handle in legend.legend_handles if handle is not None]
-        letters = int(axes[0].bbox.width / _LETTER_WIDTH)
-        title = "\n".join(textwrap.wrap(legend.get_title().get_text(), max(letters, 1))) or None
-        own = axes[0].legend(handles, words, title=title, frameon=True, framealpha=0.8, edgecolor="none")
-        own.set_in_layout(False)  # or a long one would leave no room for panels
+        move_legend(legend, axes[0], [*axes, *page.axes])
+
+
+def move_legend(legend: Legend, axes: Axes, panels: Sequence[Axes]) -> None:
+    """Show the legend of a page on axes, beside one that they may have.
+
+    Args:
+        legend: Of the page.
+        axes: Where it goes.
+        panels: With what it explains.
+    """
+    explained: dict[str, Artist] = {}
+    for panel in panels:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            explained.setdefault(" ".join(label.split()), handle)
+    words = [text.get_text() for text in legend.get_texts()]
+    entries = zip(words, legend.legend_handles, strict=True)
+    handles = [explained.get(" ".join(label.split()), handle) for label, handle in entries]
+    letters = int(axes.bbox.width / _LETTER_WIDTH)
+    title = "\n".join(textwrap.wrap(legend.get_title().get_text(), max(letters, 1))) or None
+    of_panel = axes.get_legend()
+    moved = axes.legend(handles, words, title=title, frameon=True, framealpha=0.8, edgecolor="none")  # type: ignore[arg-type]
+    moved.set_in_layout(False)  # or a long one would leave no room for panels
+    if of_panel is not None:
+        axes.add_artist(of_panel)
 
 
 def _find_panels(draw: Callable[[], Figure]) -> tuple[list[Axes], list[int]]:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from figure_words import check_words
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import bowdenfit as bf
-from bowdenfit.plots.borrowed import count_panels
+from bowdenfit.plots.borrowed import count_panels, move_legend
 from bowdenfit.plots.style import in_paper_style
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, draw_on_axes, parse_page_width, warning_mark
 
@@ -87,6 +88,17 @@ def test_a_figure_is_drawn_on_axes_of_the_user(fit):
     wide = Figure().subplots(2, 2)
     fit.plot.wrap_angles(ax=wide)
     assert [axes.get_title() for axes in wide.ravel()] == ["free sheath", "squeezed sheath", "", ""]
+
+
+def test_the_legend_of_a_page_goes_beside_that_of_a_panel():
+    page = Figure()
+    page.legend(handles=[Line2D([], [], label="Reading of the bench"), Line2D([], [], label="no panel's")])
+    axes = page.subplots()
+    handle = axes.errorbar([1], [1], [1], fmt="D", label="Reading of\nthe bench")
+    own = axes.legend([handle], ["own"])
+    move_legend(page.legends[0], axes, [axes])
+    assert own in axes.get_children() and _words(axes.get_legend()) == ["Reading of the bench", "no panel's"]
+    assert isinstance(axes.get_legend().legend_handles[0], type(own.legend_handles[0]))  # a mark with its bar
 
 
 def _words(legend):

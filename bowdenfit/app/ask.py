@@ -12,7 +12,7 @@ from nicegui import ui
 
 import bowdenfit as bf
 from bowdenfit.app.add_rows import show_table_links
-from bowdenfit.app.elements import block, button, choice, field, link, markup, text
+from bowdenfit.app.elements import VALUE_AT_FIRST, block, button, choice, field, link, markup, text
 from bowdenfit.app.frame import refused, section
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.display import as_html
@@ -68,7 +68,7 @@ class ArrivingForce:
         self._values[dial.key] = dial.value
         with field(f"{dial.label} ({dial.unit})", key), block("div", "dial"):
             knob = block("input", id=key, type="range", data_key=key, min=f"{dial.low:.12g}", max=f"{dial.high:.12g}")
-            knob.props["step"], knob.props["value"] = f"{dial.step:.12g}", f"{dial.value:.12g}"
+            knob.props["step"], knob.props[VALUE_AT_FIRST] = f"{dial.step:.12g}", f"{dial.value:.12g}"
             number = text(f"{dial.value:g}", "output", for_=key)
 
         async def turn(event: Any) -> None:

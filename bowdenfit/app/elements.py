@@ -10,6 +10,7 @@ from nicegui.element import Element
 from bowdenfit.words import printable, unbroken
 
 _VALUE = "event => emit(event.target.value)"
+VALUE_AT_FIRST = "^value"  # set as an attribute: the property would be set back, over what is typed, whenever the page changes
 
 
 def text(words: str, tag: str = "p", classes: str = "", **attributes: str) -> ui.html:
@@ -71,7 +72,7 @@ def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
 def text_input(key: str, value: str, on_change: Callable[[str], Any], placeholder: str = "", label: str = "") -> Element:
     """Return a line of text that is asked for; told when it is left, or at Enter."""
     made = block("input", "", id=key, type="text", data_key=key, autocomplete="off", placeholder=placeholder)
-    made.props["value"] = value
+    made.props[VALUE_AT_FIRST] = value
     if label:
         made.props["aria-label"] = label
     return made.on("change", lambda event: on_change(str(event.args)), js_handler=_VALUE)

@@ -82,8 +82,9 @@ class CellGrid:
         """
         for (row, column), made in self._inputs.items():
             sentence = faults.get((row, self.cells[0][column].strip()), "")
-            made.props["aria-invalid"], made.props["title"] = str(bool(sentence)).lower(), sentence
-            made.update()
+            if sentence != made.props.get("title", ""):
+                made.props["aria-invalid"], made.props["title"] = str(bool(sentence)).lower(), sentence
+                made.update()
 
     def _draw(self) -> None:
         """Draw all cells anew."""
@@ -93,11 +94,11 @@ class CellGrid:
             if self._above is not None:
                 with block("tr"):
                     for heading in self.cells[0]:
-                        text(heading, "th", "fixed", scope="col", dir="auto")
+                        text(heading, "th", "as-it-is", scope="col", dir="auto")
                 for cells in self._above:
                     with block("tr"):
                         for cell in cells:
-                            text(cell, "td", "fixed", dir="auto")
+                            text(cell, "td", "as-it-is", dir="auto")
             for row, line in enumerate(self.cells):
                 if row or self._above is None:
                     with block("tr"):

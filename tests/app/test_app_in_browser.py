@@ -74,7 +74,8 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
             page.get_by_label(f"{heading}, new row 1", exact=True).fill(typed)
         page.keyboard.press("Tab")
         page.get_by_text("'many' is not a number").wait_for()
-        assert page.get_by_label("F_out (N), new row 1", exact=True).get_attribute("aria-invalid") == "true"
+        cell = page.get_by_label("F_out (N), new row 1", exact=True)
+        assert (cell.get_attribute("aria-invalid"), cell.input_value()) == ("true", "many")
         assert (folder / "bench-1" / "bench 1.csv").read_text() == TABLE
         pasted = "F_in (N)\tF_out (N)\trun\n20\t15.1\t4\n40\t30.5\t4"
         page.get_by_label("F_in (N), new row 1", exact=True).evaluate(PASTE, pasted)
@@ -108,6 +109,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         page.wait_for_timeout(500)
         page.wait_for_function("document.querySelector('#arrives').innerText.includes(document.querySelector('output').innerText)")
         length, force = (page.inner_text(f"output[for=dial-{number}]") for number in (0, 1))
+        assert [float(page.input_value(f"#dial-{number}")) for number in (0, 1)] == [float(length), float(force)]
         printed = printed_by("predict", results, length, "--input-force", f"{force}N")
         assert text_on(page, "#arrives").split() == printed.split()
         page.get_by_role("button", name="Rank what could be measured next").click()

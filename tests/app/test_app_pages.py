@@ -96,7 +96,9 @@ def test_two_tabs_show_the_same_and_every_page_can_be_read(chromium, tmp_path, q
         page.get_by_label("By which angle").fill("180 deg")
         page.keyboard.press("Tab")
         page.get_by_text("cells that cannot be read").wait_for()
-        assert page.get_by_label("Row 1, column 2", exact=True).get_attribute("aria-invalid") == "true"
+        cell = page.get_by_label("Row 1, column 2", exact=True)
+        assert (cell.get_attribute("aria-invalid"), cell.input_value()) == ("true", "many")
+        assert page.get_by_label("Row 1, column 1", exact=True).input_value() == "20"
         assert faults_of(page) == []
         other.goto(page.url)
         other.get_by_text("'many' is not a number").wait_for()

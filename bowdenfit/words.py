@@ -22,6 +22,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 15]}...{text[-12:]}"
 
 
+def begin_sentence(quantity: str) -> str:
+    """Return a quantity as it begins a sentence or names an axis: in words with a capital, a coefficient under its name."""
+    return capitalized(quantity) if " " in quantity else quantity
+
+
 def capitalized(text: str) -> str:
     """Return text whose first letter is upper case; all others keep their case, so that "freie Hülle" becomes "Freie Hülle"."""
     return text[:1].upper() + text[1:]

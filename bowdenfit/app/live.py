@@ -140,7 +140,7 @@ def _render_history(bench: WatchedBench) -> str:
     if not history.answers:
         return ""
     last = history.answers[-1]
-    caption = watch_room.history_figure.caption(history)
+    caption = watch_room.history_figure.describe_history_charts(history)
     charts = watch_room.history_figure.make_history_charts(history)
     picture = Picture("history", _HEADING, caption, charts, caption, alone=True)
     headline = last.stop or last.warning

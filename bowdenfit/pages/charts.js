@@ -1,10 +1,14 @@
 "use strict";
 // Charts of this page: drag to zoom, hover or arrow keys to read values; without this script the drawings stand in their place.
 (() => {
-  const BAND = 0.25, INNER_BAR = 0.45, NEAR = 12, STEP = 1.6, WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500], LETTER = 7.5, SHORTEST = 4, MARGINS = 90;
+  const BAND = 0.25, INNER_BAR = 0.45, NEAR = 12, STEP = 1.6;
+  const WHOLE = [0, 1, 2, 3, 4, 5].flatMap(power => [1, 2, 5].map(digit => digit * 10 ** power)); // between marks of what is counted
+  const SHORTEST = 4, LETTER = 0.47, MARGIN = 5.6; // letters of a name; widths [rem] of a letter, and beside the panel
   const make = (tag, parent, given = {}) => parent.appendChild(Object.assign(document.createElement(tag), given));
   const color = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
   const shown = value => typeof value === "string" ? value : String(Number(value.toPrecision(4)));
+  const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
+  const font = () => `${Math.round(0.8 * rem())}px system-ui, sans-serif`;
   const isBar = one => one.look === "from" || one.look === "to";
 
   function seriesOf(chart) {
@@ -64,7 +68,7 @@
 
   // What stands below places that have names: as much of each as there is room for, or its number.
   function nameSplits(plot, splits, names) {
-    const room = Math.floor((plot.width - MARGINS) / Math.max(splits.length, 1) / LETTER) - 1;
+    const room = Math.floor((plot.width - MARGIN * rem()) / Math.max(splits.length, 1) / (LETTER * rem())) - 1;
     const short = name => name.length <= room ? name : room > SHORTEST ? `${name.slice(0, room - 1)}\u2026` : null;
     const texts = splits.map(place => short(names[place - 1] ?? ""));
     return texts.includes(null) ? splits.map(place => names[place - 1] === undefined ? "" : String(place)) : texts;
@@ -126,16 +130,16 @@
       this.plot?.destroy();
       const tables = chart.groups.map(group => [group.x, ...group.series.map(one => one.values)]);
       const data = uPlot.join(tables, tables.map(table => table.map(() => 1)));
-      const named = chart.names.length > 0;
+      const named = chart.names.length > 0, counts = data[0].every(Number.isInteger);
       this.ends = named ? [0.5, chart.names.length + 0.5] : [data[0][0], data[0].at(-1)];
-      const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: "13px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif" });
+      const axis = label => ({ label, stroke: text, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid }, font: font(), labelFont: font() });
       const bands = series.flatMap((one, i) => one.look === "low" ? [{ series: [i + 2, i + 1], fill: color(one.color) + Math.round(255 * BAND).toString(16) }] : []);
       this.addKey(chart, series);
       this.plot = new uPlot({
         ...this.size(),
         legend: { show: false },
         scales: { x: { time: false } },
-        axes: [{ ...axis(chart.x), ...(named ? { incrs: WHOLE, values: (plot, splits) => nameSplits(plot, splits, chart.names) } : {}) }, { ...axis(chart.y), size: 62 }],
+        axes: [{ ...axis(chart.x), ...(counts ? { incrs: WHOLE } : {}), ...(named ? { values: (plot, splits) => nameSplits(plot, splits, chart.names) } : {}) }, { ...axis(chart.y), size: 3.9 * rem() }],
         series: [{}, ...series.map(looks)],
         bands,
         cursor: { dataIdx: (plot, number, hovered) => number === 0 ? hovered : place(plot, number, hovered, series), drag: { x: true, y: false } },
@@ -190,7 +194,7 @@
     }
 
     size() {
-      return { width: Math.max(this.box.clientWidth - 2, 240), height: Math.round(Math.min(Math.max(this.box.clientWidth * 0.5, 260), 420)) };
+      return { width: Math.max(this.box.clientWidth - 2, 240), height: Math.round(Math.min(Math.max(this.box.clientWidth * 0.5, 260), 26 * rem())) };
     }
 
     fit() {

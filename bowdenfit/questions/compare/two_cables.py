@@ -13,7 +13,7 @@ from bowdenfit.plots.curves import GRID_POINTS, density, limits, support
 from bowdenfit.plots.style import MEDIAN, WIDE_INTERVAL
 from bowdenfit.questions.groups import Contrast
 from bowdenfit.results.record import OPTIMAL_EFFICIENCY, OPTIMAL_LENGTH, Record
-from bowdenfit.words import capitalized, listed
+from bowdenfit.words import begin_sentence, listed
 
 TITLE = "Two cables side by side"
 _COLORS = ("blue", "vermillion")
@@ -37,7 +37,7 @@ class TwoCables(Display):
 
     def sentences(self) -> list[str]:
         """Return the differences in words."""
-        return [f"{_named(contrast.coefficient)}: {contrast.sentence()}." for contrast in self.contrasts]
+        return [f"{begin_sentence(contrast.coefficient)}: {contrast.sentence()}." for contrast in self.contrasts]
 
     def _table(self) -> Rows:
         rows = [contrast.row for contrast in self.contrasts]
@@ -76,11 +76,6 @@ def contrast_cables(one: Record, other: Record, names: tuple[str, str]) -> TwoCa
     charts = _efficiency_charts(one, other, names)
     charts = charts or tuple(_density_chart(quantity, draws, names) for quantity, draws in pairs.items())
     return TwoCables(names, tuple(contrasts), charts)
-
-
-def _named(quantity: str) -> str:
-    """Return a quantity as it begins a sentence; a coefficient keeps its name."""
-    return capitalized(quantity) if " " in quantity else quantity
 
 
 def _files(fit: Record) -> Iterator[tuple[str, str]]:

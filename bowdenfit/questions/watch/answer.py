@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.interval import Interval
+from bowdenfit.words import begin_sentence, counted
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,7 +83,7 @@ class History(Display):
             return ["Nothing has been fitted yet."]
         last = self.answers[-1]
         unit = f" {last.unit}" if last.unit else ""
-        return [f"{last.words[:1].upper()}{last.words[1:]} after {last.mountings} mountings: {last.interval}{unit}."]
+        return [f"{begin_sentence(last.words)} after {counted(last.mountings, 'mounting')}: {last.interval}{unit}."]
 
     def add(self, answer: WatchedAnswer) -> "History":
         """Return the history with an answer in place of an earlier one of as many mountings."""

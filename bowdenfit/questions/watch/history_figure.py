@@ -10,7 +10,7 @@ from bowdenfit.pages.section import Chart, Series, SeriesGroup
 from bowdenfit.plots.layout import TITLE, legend_above, panels
 from bowdenfit.plots.panels import show_plain_numbers
 from bowdenfit.plots.style import BLACK, MEDIAN, SERIES_COLORS, WIDE_INTERVAL, axis_label, in_paper_style
-from bowdenfit.words import counted
+from bowdenfit.words import begin_sentence, counted
 
 if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
@@ -23,13 +23,26 @@ _WHOLE_STEPS = 15  # mountings up to which each has its own mark on the axis
 
 def caption(history: History) -> str:
     """Say what is drawn, in plain words."""
+    return f"{_describe_marks(history)} Ring: from here on enough is known. {_count_fits(history)}"
+
+
+def describe_history_charts(history: History) -> str:
+    """Describe the chart, in which nothing has a ring."""
+    return f"{_describe_marks(history)} {_count_fits(history)}"
+
+
+def _describe_marks(history: History) -> str:
+    """Return the sentences that explain lines and points."""
     last = history.answers[-1]
     what = "mounting" if last.mountings else "reading"
     return (
         f"The answer ({last.words}) after each {what}: median and 90 % interval of all that was measured by then. Filled: a "
-        "fit that may be trusted; open: one that must not be, or was not checked since more was measured. Ring: from here on "
-        f"enough is known. n = {counted(len(history.answers), 'fit')}."
+        "fit that may be trusted; open: one that must not be, or was not checked since more was measured."
     )
+
+
+def _count_fits(history: History) -> str:
+    return f"n = {counted(len(history.answers), 'fit')}."
 
 
 @in_paper_style
@@ -58,7 +71,7 @@ def draw(history: History) -> Figure:
         )
     axes.set_xlabel("Mountings" if by_mounting else "Readings")
     words = answers[-1].words.removeprefix("the ")
-    axes.set_ylabel(axis_label(words[:1].upper() + words[1:] if " " in words else words, _unit(answers[-1].unit)))
+    axes.set_ylabel(axis_label(begin_sentence(words), _unit(answers[-1].unit)))
     axes.set_xlim(count.min() - 0.7, count.max() + 0.7)
     if np.ptp(count) <= _WHOLE_STEPS:
         axes.set_xticks(np.arange(count.min(), count.max() + 1))
@@ -89,7 +102,7 @@ def make_history_charts(history: History) -> tuple[Chart, ...]:
     )
     unit = f" ({_unit(last.unit)})" if last.unit else ""
     what = "Mountings" if last.mountings else "Readings"
-    return (Chart("History", what, f"{last.words[:1].upper()}{last.words[1:]}{unit}", (SeriesGroup(count, series),)),)
+    return (Chart("History", what, f"{begin_sentence(last.words)}{unit}", (SeriesGroup(count, series),)),)
 
 
 def _unit(unit: str) -> str:

@@ -65,7 +65,8 @@ class FitPage:
         if not job.running:
             await self.show()
             return
-        for element, words in zip(elements, (job.stage, job.progress, _clock(job.seconds)), strict=True):
+        stage = "" if job.progress.startswith(job.stage) else job.stage  # which says the same and more
+        for element, words in zip(elements, (stage, job.progress, _clock(job.seconds)), strict=True):
             element.set_content(escape(words))
 
     def _show_job(self, job: FitJob) -> None:

@@ -31,9 +31,9 @@ from bowdenfit.kinds.row_angles import resolve_angles
 from bowdenfit.recordings.preparation.hysteresis import smooth_input
 from bowdenfit.recordings.recording import Recording, Recordings
 
-# Middles of parts of a block, in blocks. Of 20 ropes at 1000 samples a second, 90 % intervals of the Stribeck speed, the viscous
-# part and the damping contained the truth in 17, 18 and 10 of 13 with three parts, and 19, 19 and 16 of 17 with five;
-# scripts/check_creeping_ropes.py.
+# Middles of parts of a block, in blocks. Of 20 ropes at 1000 samples a second, 90 % intervals of the Stribeck speed, the
+# viscous part and the damping contained the truth in 17, 18 and 10 of 13 with three parts, and in 19, 19 and 16 of 17 with
+# five; scripts/check_creeping_ropes.py.
 _PARTS = {f"force_{i}": (i - 2) / 5 for i in range(5)}
 _VELOCITIES = tuple(f"velocity_{i}" for i in range(len(_PARTS)))
 _SAME_STEP = 1e-3  # relative difference of times between blocks that are evenly spaced

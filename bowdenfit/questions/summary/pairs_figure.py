@@ -42,7 +42,7 @@ LEFT, BOTTOM, GAP = 0.62, 0.62, 0.09  # in, margins at least, and between panels
 NAMES = 0.38  # in, of the left margin, for names in two lines and the marks of the axis
 UPRIGHT = 0.07  # in, height of a number that does not stand upright
 LARGEST, SMALLEST = 1.45, 0.66  # in, of a panel with its gap
-HEADROOM = 1.55  # height of a panel on the diagonal over that of its highest bar
+HEADROOM, LINE_ROOM = 1.55, 0.3  # height of a panel on the diagonal over its highest bar's, of two lines and more for a third
 MARK = 0.26  # in, of a color in the key, with the gap to its words
 BINS = 32  # of each axis, in two dimensions
 FINER = 2  # so many bins of a chart, which has no contours between them, for one of these
@@ -156,20 +156,20 @@ def _height_of_upright_numbers(quantities: list[SampledQuantity], width: float) 
 
 
 def _draw_marginal(axes: Axes, quantity: SampledQuantity, width: float) -> None:
-    """Draw the histogram of a quantity, and above it its median and 90 % interval, as far as a panel of some width [in] has
-    room.
-    """
+    """Draw the histogram of a quantity, and above it its median and 90 % interval, which takes two lines in a narrow panel."""
     n_bins = round(2 * quantity.draws.size ** (1 / 3))  # Rice's rule
     axes.hist(
         quantity.draws.ravel(), n_bins, range=axes.get_xlim(), histtype="stepfilled", facecolor=FILLS[0.95], edgecolor=BLUE
     )
     low, median, high = np.quantile(quantity.draws, (0.05, 0.5, 0.95))
-    for value in (low, median, high):
-        axes.axvline(value, 0, 1 / HEADROOM, color=BLUE, linewidth=0.7, linestyle="--")
     digits = decimals(high - low, median)
-    interval = f"{low:z.{digits}f} to {high:z.{digits}f}"
-    texts = [f"{median:z.{digits}f}", *([interval] if text_width(interval, LEAST) < width else [])]
-    axes.set_ylim(0, HEADROOM * axes.get_ylim()[1])
+    middle, *ends = (f"{value:z.{digits}f}" for value in (median, low, high))
+    interval = " to ".join(ends)
+    texts = [middle, interval] if text_width(interval, LEAST) < width else [middle, f"{ends[0]} to", ends[1]]
+    room = HEADROOM + LINE_ROOM * (len(texts) - 2)
+    for value in (low, median, high):
+        axes.axvline(value, 0, 1 / room, color=BLUE, linewidth=0.7, linestyle="--")
+    axes.set_ylim(0, room * axes.get_ylim()[1])
     axes.text(0.5, 0.97, "\n".join(texts), transform=axes.transAxes, ha="center", va="top", fontsize=LEAST, linespacing=1.1)
 
 

@@ -75,7 +75,7 @@ def compare_advice(texts: list[str]) -> tuple[int, float]:
     for column in zip(*numbers, strict=True):
         unit = 10.0 ** -min(len(number.partition(".")[2]) for number in column)
         middle = statistics.median_low(map(float, column))
-        worst = max(worst, *(abs(float(number) - middle) / unit for number in column))
+        worst = max(worst, *(round(abs(float(number) - middle) / unit, 6) for number in column))
     return 1, worst
 
 
@@ -94,7 +94,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as scratch:
             for seed in range(1, options.seeds + 1):
                 once = bf.next_measurement(bf.fit(write(Path(scratch) / "once", first), seed=seed))
-                texts.append(next_measurement_text(once))
+                texts.append(" ".join(next_measurement_text(once).split()))
                 second = bench.measure(np.random.default_rng([options.seed, number, seed]), "2")
                 twice = bf.fit(write(Path(scratch) / "twice", join(first, second)), seed=seed)
                 interval, stated = twice.parameter("mu"), once.second_mounting

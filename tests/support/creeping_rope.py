@@ -101,8 +101,9 @@ def record(truth: Truth, rate: float, seed: int, name: str = "turns") -> Recordi
     return Recording(name, raw.file, name, float("nan"), *own, blocks, find_strokes(blocks, raw.file, name), account)
 
 
-def model_recordings(recordings: list[Recording], friction_model: str) -> Model:
+def model_recordings(recordings: list[Recording], friction_model: str, delay_sd: float = 0.0) -> Model:
     """The model of recordings of one rope under a friction model."""
     stated = {"reference_velocity": {"value": SPEED, "unit": "mm/s"}, "friction_model": friction_model}
     description = cable(1, {"recordings": {"files": "*.csv"}}, contact=[CONTACT], **stated).model_copy(update={"route": None})
-    return build_model(Dataset(description, Measurements((Recordings(("angle",), tuple(recordings), "mm/s"),)), {}))
+    table = Recordings(("angle",), tuple(recordings), "mm/s", delay_sd)
+    return build_model(Dataset(description, Measurements((table,)), {}))

@@ -51,12 +51,12 @@ def pull(
         noise: Standard deviation of a reading at the input and at the output [N].
         drag: Hidden tension [N].
         offset: What each cell shows of no force [N].
-        scatter: Standard deviation of the exponent from mounting to mounting.
+        scatter: Standard deviation of the exponent from mounting to mounting, none of which has less than no friction.
     """
     run, stroke, load, _ = (
         axis.ravel() for axis in np.meshgrid(np.arange(len(places)), strokes, loads, np.arange(repeats), indexing="ij")
     )
-    exponent = np.asarray(loss)[run] + scatter * generator.standard_normal(len(places))[run]
+    exponent = np.maximum(np.asarray(loss) + scatter * generator.standard_normal(len(places)), 0.0)[run]
     out = (load + drag) * np.exp(-stroke * exponent) - drag
     names = np.array(labels if labels is not None else [str(i + 1) for i in range(len(places))])
     read_in, read_out = (

@@ -28,6 +28,8 @@ def start() -> None:
     os.environ.setdefault("JAX_PLATFORMS", "cpu")  # a GPU takes 1.5 to 1.9 times as long for a fit, and most of its memory
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # XLA says on stderr where a busy machine compiles slowly
     if not (sys.warnoptions or os.environ.get("BOWDENFIT_DEBUG")):
+        # Python frees the semaphores of helpers that were ended, and would say so below our own words.
+        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")
         warnings.simplefilter("ignore")  # of libraries, in words of their own; what matters is said in ours
     _open_what_is_closed()
     for name in ("stdout", "stderr"):

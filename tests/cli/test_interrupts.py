@@ -150,3 +150,14 @@ def test_an_interrupt_at_a_prompt_needs_no_further_key():
     os.close(keyboard)
     os.close(screen)
     assert (process.returncode, output) == (130, "Interrupted.\n")
+
+
+def test_what_python_frees_after_helpers_that_were_ended_is_no_warning_below_our_words():
+    """It warns in a process of its own, which outlives the program."""
+    late = "import warnings; warnings.warn('resource_tracker: There appear to be 5 leaked semaphores'); warnings.warn('x')"
+    program = (
+        "import subprocess, sys; import bowdenfit.cli as cli; "
+        f"cli.main = lambda: subprocess.run([sys.executable, '-c', {late!r}]); cli.start()"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    assert "semaphore" not in done.stderr and "UserWarning: x" in done.stderr

@@ -20,6 +20,7 @@ from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.outputs import refuse_link, replace_atomically
 from bowdenfit.questions.check.verb import check
+from bowdenfit.questions.watch.files import link_neighbors
 from bowdenfit.words import shown
 
 
@@ -134,10 +135,8 @@ class OpenTable:
         """Yield a folder that reads as the data set would with other contents of this file; the rest are links to it."""
         with TemporaryDirectory(prefix="bowdenfit-") as place:
             copy = Path(place) / "bench" / (self.folder.resolve().name or "data-set")
-            copy.mkdir(parents=True)
+            link_neighbors(self.folder, copy)
             _link_all(self.folder, copy, PurePosixPath(self.name).parts)
-            if ".." in (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8", errors="replace"):
-                _link_all(self.folder.resolve().parent, copy.parent, (copy.name,))
             (copy / self.name).write_bytes(content)
             yield copy
 

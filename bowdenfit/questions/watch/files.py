@@ -77,7 +77,7 @@ class BenchFiles:
 
     def __post_init__(self) -> None:
         if self.path.is_dir():
-            self._link_neighbors()
+            link_neighbors(self.path, self.copy)
 
     @property
     def copy(self) -> Path:
@@ -88,15 +88,6 @@ class BenchFiles:
     def joined_copy(self) -> Path | None:
         """Where the file of a second logger is copied to."""
         return None if self.join is None else self.copies / "joined" / self.join.name
-
-    def _link_neighbors(self) -> None:
-        """Link what lies beside the folder, since its description may name it as ../angles.csv."""
-        description = self.path / DESCRIPTION_FILE
-        self.copy.mkdir(parents=True, exist_ok=True)
-        if description.is_file() and ".." in description.read_text(encoding="utf-8", errors="replace"):
-            for neighbor in self.path.resolve().parent.iterdir():
-                if neighbor.name != self.copy.name:
-                    (self.copy.parent / neighbor.name).symlink_to(neighbor)
 
     def look(self, now: float) -> bool:
         """Look at every file; return whether what is settled is not what was read last.
@@ -164,6 +155,21 @@ class BenchFiles:
                 if not name.startswith((".", "~$")) and count < _MOST_FILES:
                     count += 1
                     yield Path(folder, name)
+
+
+def link_neighbors(folder: Path, copy: Path) -> None:
+    """Link what lies beside a data set to beside a copy of it, where its description may name it as ../angles.csv.
+
+    Args:
+        folder: The data set.
+        copy: The folder of the copy, which is made if it is not there, in a folder of its own.
+    """
+    description = folder / DESCRIPTION_FILE
+    copy.mkdir(parents=True, exist_ok=True)
+    if description.is_file() and ".." in description.read_text(encoding="utf-8", errors="replace"):
+        for neighbor in folder.resolve().parent.iterdir():
+            if neighbor.name != copy.name:
+                (copy.parent / neighbor.name).symlink_to(neighbor)
 
 
 def _mark(path: Path) -> Mark | None:

@@ -206,3 +206,19 @@ class Recordings(Part):
     def runs(self) -> tuple[str, ...]:
         """Names of the runs, each once."""
         return tuple(dict.fromkeys(r.run for r in self.items))
+
+    def time_of_loss(self, least_share: float) -> float:
+        """Return the time in which the input force of a single rope changes by as much as is lost [s].
+
+        A delay by a share of it looks like a change of the friction by that share.
+
+        Args:
+            least_share: Of the largest force, below which no logarithm is taken.
+        """
+        losses, rates = [], []
+        for blocks in (item.blocks for item in self.items):
+            forces = np.maximum([blocks.input_force, blocks.output_force], least_share * np.max(np.abs(blocks.input_force)))
+            log_input, log_output = np.log(forces)
+            losses.append(np.abs(log_input - log_output))
+            rates.append(np.gradient(log_input, blocks.time))
+        return float(np.median(np.concatenate(losses)) / np.sqrt(np.mean(np.square(np.concatenate(rates)))))

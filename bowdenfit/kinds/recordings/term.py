@@ -90,7 +90,9 @@ class RecordingTerms(TermKind[Recordings]):
     @override
     def parameters(self, table: Recordings, at: Circumstances) -> list[Parameter]:
         """Return scatter of mountings, noise of blocks, errors of the load cells, and the preload of a loop."""
-        late = _delay_sd(table, at)
+        late = table.delay_sd
+        if late > 0 and at.cable.friction.depends_on_rate and not table.loop:  # it was estimated as if it did not
+            late = float(np.hypot(late, at.defaults.stribeck * table.time_of_loss(LEAST_SHARE)))
         block_noise = declare_noise_of_forces(at, BLOCK_NOISE, r"$\sigma_B$", "standard deviation of a block's mean force")
         delay = Parameter(
             DELAY_ERROR, r"$\delta$", "error of the estimated delay between the load cells' channels", "sensor",
@@ -394,18 +396,3 @@ def refuse_saturated(recordings: Recordings) -> None:
                 "the end of a load cell's range, and what else would be clipped with another friction cannot be known from "
                 "blocks; leave the recording out to calibrate."
             )
-
-
-def _delay_sd(table: Recordings, at: Circumstances) -> float:
-    """Return how far the delay between the channels may be off [s]; 0 where it is known.
-
-    It was estimated as if friction did not depend on the speed. Where it may, a change of the friction by as much as its prior
-    allows looks like a delay: that of the time in which the input force changes by as much.
-    """
-    if not table.delay_sd > 0 or not at.cable.friction.depends_on_rate or table.loop:
-        return table.delay_sd
-    blocks = [recording.blocks for recording in table.items]
-    logs = [np.log(np.maximum([b.input_force, b.output_force], LEAST_SHARE * np.max(np.abs(b.input_force)))) for b in blocks]
-    loss = np.median(np.abs(np.concatenate([one[0] - one[1] for one in logs])))
-    rates = np.concatenate([np.gradient(one[0], b.time) for one, b in zip(logs, blocks, strict=True)])
-    return float(np.hypot(table.delay_sd, at.defaults.stribeck * loss / np.sqrt(np.mean(np.square(rates)))))

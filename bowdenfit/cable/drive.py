@@ -105,8 +105,9 @@ class RopeDrive:
     ) -> PerTime:
         """Return the output on the scale g where friction builds up after a turn."""
         band, step = self.band(mounting), jnp.asarray(self.step)
-        known = step > 0
-        damping = jnp.where(known, self.friction.bristle_damping(self.values) / jnp.where(known, step, 1.0), 0.0)
+        damping, known = self.friction.bristle_damping(self.values), step > 0
+        if damping is not None:
+            damping = jnp.where(known, damping / jnp.where(known, step, 1.0), 0.0)
         by_band = stiffness * jnp.maximum(self.exponent + mounting, LEAST_EXPONENT) / band
         return presliding_operator(x, self.friction.shifts(self.values, band), by_band, start, restart, damping)
 

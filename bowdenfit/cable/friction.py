@@ -51,9 +51,10 @@ class FrictionModel:
         stated = [option.presliding_stiffness(values) for option in self._options]
         return next((stiffness for stiffness in stated if stiffness is not None), None)
 
-    def bristle_damping(self, values: Mapping[str, Array]) -> Array:
-        """Return the damping of the bristles over their stiffness [s]."""
-        return sum((option.bristle_damping(values) for option in self._options), jnp.zeros(()))
+    def bristle_damping(self, values: Mapping[str, Array]) -> Array | None:
+        """Return the damping of the bristles over their stiffness [s]; None where they have none."""
+        stated = [option.bristle_damping(values) for option in self._options]
+        return next((damping for damping in stated if damping is not None), None)
 
     @property
     def groups(self) -> tuple[str, ...]:

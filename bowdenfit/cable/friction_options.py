@@ -72,10 +72,10 @@ class FrictionOption(ABC):
         del values
         return None
 
-    def bristle_damping(self, values: Mapping[str, Array]) -> Array:
-        """Return its tau, see there [s]."""
+    def bristle_damping(self, values: Mapping[str, Array]) -> Array | None:
+        """Return its tau, see there [s]; None where bristles are not damped."""
         del values
-        return jnp.zeros(())
+        return None
 
 
 class Drag(FrictionOption):

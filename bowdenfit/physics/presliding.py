@@ -99,7 +99,7 @@ def presliding_operator(
     stiffness: Float[Array, "time *batch"],
     start: Float[Array, "*batch"],
     restart: Float[Array, "time *batch"] | None = None,
-    damping: Array | float = 0.0,
+    damping: Array | float | None = None,
 ) -> Float[Array, "time *batch"]:
     """Return the output of a rope whose friction builds up as Dahl's and the LuGre model have it, on the scale g.
 
@@ -114,7 +114,7 @@ def presliding_operator(
         stiffness: sigma Lambda_0/Lambda(v): of friction over its steady value.
         start: Output before the first sample; what is left of the input there is friction, as far as there is so much.
         restart: Output where it must be set anew, because the input before was not known; NaN elsewhere.
-        damping: tau over the time since the sample before [1].
+        damping: tau over the time since the sample before [1]; None without any.
 
     Returns:
         y.
@@ -124,7 +124,7 @@ def presliding_operator(
     first = jnp.broadcast_to(start, scaled_input.shape[1:]).astype(scaled_input.dtype)
     anew = jnp.full(scaled_input.shape, jnp.nan) if restart is None else restart
     anew = anew.at[0].set(jnp.where(jnp.isnan(anew[0]), first, anew[0]))
-    damped = jnp.broadcast_to(jnp.asarray(damping), scaled_input.shape)
+    damped = jnp.broadcast_to(jnp.asarray(0.0 if damping is None else damping), scaled_input.shape)
 
     def step(carry: tuple[Array, Array], now: tuple[Array, ...]) -> tuple[tuple[Array, Array], Array]:
         (y, friction), (x, half, before, sigma, lag, anew) = carry, now
@@ -137,8 +137,9 @@ def presliding_operator(
         lead = x - y - friction
         sign = jnp.where(lead < 0, -1.0, 1.0)
         build_up = limit - sign * friction
-        at_end = lag * share_at_end(sigma * creep(jnp.abs(lead), build_up * (1 + lag), sigma))
-        moved = creep(jnp.abs(lead), build_up * (1 + at_end), sigma)
+        if damping is not None:
+            lag = lag * share_at_end(sigma * creep(jnp.abs(lead), build_up * (1 + lag), sigma))
+        moved = creep(jnp.abs(lead), build_up * (1 + lag), sigma)
         y = y + sign * moved
         return (y, sign * (limit - build_up * jnp.exp(-sigma * moved))), y
 

@@ -4,19 +4,12 @@ import shutil
 
 import pytest
 from app_in_browser import served, visiting, watch
+from half_turn import describe_half_turn
 from reading_room import FAULTS, browser
 
 import bowdenfit as bf
 
-DESCRIPTION = """schema = 1
-name = "bench"
-[[contact]]
-name = "cable"
-friction = "mu"
-wrap_angle = { value = 180, unit = "deg" }
-[tables]
-forces = { file = "forces.csv" }
-[sampler]
+QUICK = """[sampler]
 n_walkers = 64
 target_ess = 200
 target_r_hat = 1.05
@@ -35,7 +28,7 @@ def chromium():
 def write_bench(folder, share, runs=5):
     """Write a data set of a cable that lets through a share of the force."""
     folder.mkdir()
-    (folder / "cable.toml").write_text(DESCRIPTION.replace('"bench"', f'"{folder.name}"'))
+    (folder / "cable.toml").write_text(describe_half_turn(name=folder.name) + QUICK)
     (folder / "forces.csv").write_text("input_force_N,output_force_N,run\n")
     for run in range(runs):
         mount(folder, share, run)

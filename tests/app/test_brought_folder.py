@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from half_turn import TABLE, describe_half_turn
 
 import bowdenfit as bf
 from bowdenfit.app.brought_folder import put_in_place
@@ -11,16 +12,6 @@ from bowdenfit.app.draft import Draft
 from bowdenfit.errors import UsageError
 
 DATASETS = Path(__file__).parents[2] / "datasets"
-DESCRIPTION = """schema = 1
-name = "worn cable"
-[[contact]]
-name = "cable"
-friction = "mu"
-wrap_angle = { value = 180, unit = "deg" }
-[tables]
-forces = { files = FILES }
-"""
-TABLE = "F_in (N),F_out (N),run\n20,15.2,1\n40,30.1,1\n20,15.0,2\n40,30.9,2\n"
 
 
 @pytest.fixture
@@ -62,9 +53,9 @@ def test_recordings_go_into_the_folder_that_their_cable_toml_names(draft):
 
 
 def test_a_file_goes_where_a_pattern_finds_it_and_comes_back_when_the_description_changes(draft):
-    assert bring(draft, cable=DESCRIPTION.replace("FILES", '"runs/*/**/*.csv"'), one=TABLE).refusals == ()
+    assert bring(draft, cable=describe_half_turn('files = "runs/*/**/*.csv"'), one=TABLE).refusals == ()
     assert [path.relative_to(draft.folder).as_posix() for path in draft.files] == ["runs/files/one.csv"]
-    assert bring(draft, cable=DESCRIPTION.replace("FILES", '"*.csv"')).refusals == ()
+    assert bring(draft, cable=describe_half_turn('files = "*.csv"')).refusals == ()
     assert [path.relative_to(draft.folder).as_posix() for path in draft.files] == ["one.csv"]
     draft.remove_file("cable.toml")
     assert draft.understand().entries[-1].words.startswith("By which angle")
@@ -79,7 +70,7 @@ def test_a_file_goes_where_a_pattern_finds_it_and_comes_back_when_the_descriptio
 )  # fmt: skip
 def test_what_a_description_names_elsewhere_is_refused_before_it_is_opened(draft, tmp_path, name):
     (tmp_path / "outside.csv").write_text(TABLE)
-    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", f'"{name}"'), one=TABLE).refusals
+    (refusal,) = bring(draft, cable=describe_half_turn(f'files = "{name}"'), one=TABLE).refusals
     assert "does not lie in its own folder; put that file beside cable.toml" in refusal.sentence
     with pytest.raises(UsageError, match="cannot be read yet"):
         draft.write(tmp_path / "kept")
@@ -88,19 +79,19 @@ def test_what_a_description_names_elsewhere_is_refused_before_it_is_opened(draft
 
 def test_a_file_that_two_folders_could_hold_is_refused(draft):
     files = '["pull/*.csv", "return/*.csv"]'
-    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", files), one=TABLE).refusals
+    (refusal,) = bring(draft, cable=describe_half_turn(f"files = {files}"), one=TABLE).refusals
     assert "names 'one.csv' in several folders" in refusal.sentence
 
 
 def test_a_file_that_is_called_like_a_folder_is_refused(draft):
     draft.new_file("a").write_text("x")
-    (refusal,) = bring(draft, cable=DESCRIPTION.replace("FILES", '"a/one.csv"'), one=TABLE).refusals
+    (refusal,) = bring(draft, cable=describe_half_turn('files = "a/one.csv"'), one=TABLE).refusals
     assert "names a folder 'a', which cannot be made" in refusal.sentence
 
 
 def test_a_cell_that_cannot_be_read_is_shown_wherever_its_file_lies(draft):
     wrong = TABLE.replace("30.9", "many")
-    refusals = bring(draft, cable=DESCRIPTION.replace("FILES", '"runs/one.csv"'), one=wrong).refusals
+    refusals = bring(draft, cable=describe_half_turn('files = "runs/one.csv"'), one=wrong).refusals
     assert [(refusal.row, refusal.cells[1]) for refusal in refusals] == [(5, ("F_out (N)", "many"))]
 
 

@@ -1,21 +1,12 @@
 """Rows that are added to a table: read as the reader reads them, refused at their cell, and written whole or not at all."""
 
 import pytest
+from half_turn import TABLE, describe_half_turn
 
 import bowdenfit as bf
 from bowdenfit.app.new_rows import list_tables, open_table
 from bowdenfit.errors import BowdenfitError, UsageError
 
-DESCRIPTION = """schema = 1
-name = "bench"
-[[contact]]
-name = "cable"
-friction = "mu"
-wrap_angle = { value = 180, unit = "deg" }
-[tables]
-forces = { file = "FILE" }
-"""
-TABLE = "F_in (N),F_out (N),run\n20,15.2,1\n40,30.1,1\n20,15.0,2\n40,30.9,2\n"
 NEW = [["20", "15.3", "3"], ["40", "30.4", "3"]]
 
 
@@ -26,7 +17,7 @@ def data_set(tmp_path):
     def make(content=TABLE, file="forces.csv", more=""):
         folder = tmp_path / "bench"
         (folder / file).parent.mkdir(parents=True)
-        (folder / "cable.toml").write_text(DESCRIPTION.replace("FILE", file) + more)
+        (folder / "cable.toml").write_text(describe_half_turn(f'file = "{file}"') + more)
         (folder / file).write_bytes(content if isinstance(content, bytes) else content.encode())
         return folder
 
@@ -111,16 +102,16 @@ def test_neither_files_elsewhere_nor_links_nor_workbooks_are_opened(data_set, tm
     for name in ("../outside.csv", "cable.toml", "", "/etc/passwd", "forces.csv/"):
         with pytest.raises(UsageError, match="has no table"):
             open_table(folder, name)
-    (folder / "cable.toml").write_text(DESCRIPTION.replace("FILE", "../outside.csv"))
+    (folder / "cable.toml").write_text(describe_half_turn('file = "../outside.csv"'))
     assert list_tables(folder) == []
     assert bf.check(folder)
-    (folder / "cable.toml").write_text(DESCRIPTION.replace("FILE", "forces.csv"))
+    (folder / "cable.toml").write_text(describe_half_turn('file = "forces.csv"'))
     (folder / "forces.csv").rename(folder / "real.csv")
     (folder / "forces.csv").symlink_to("real.csv")
     with pytest.raises(BowdenfitError, match="is a link"):
         open_table(folder, "forces.csv")
     (folder / "forces.csv").unlink()
     (folder / "forces.xlsx").write_bytes(b"PK")
-    (folder / "cable.toml").write_text(DESCRIPTION.replace("FILE", "forces.xlsx"))
+    (folder / "cable.toml").write_text(describe_half_turn('file = "forces.xlsx"'))
     with pytest.raises(UsageError, match="is a workbook"):
         open_table(folder, "forces.xlsx")

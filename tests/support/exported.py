@@ -131,15 +131,15 @@ def followed(found: TransmissionTables, level: int, place: float, speed: float, 
 
 
 def crept(
-    found: TransmissionTables, level: int, place: float, speed: np.ndarray | float, force: np.ndarray, step: float
+    tables: TransmissionTables, level: int, place: float, speed: np.ndarray | float, force: np.ndarray, step: float
 ) -> np.ndarray:
     """Output forces through a motion, from the middle of the band on, of a rope whose friction builds up."""
-    n, one = len(force), found.levels[level]
-    asked = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
-    limits = tuple(jnp.asarray(_there(found, asked, np.full(n, stroke))[0]) for stroke in (1.0, -1.0))
-    reference = replace(found, speed_unit="")
-    at_reference = sum(_there(reference, asked, np.full(n, stroke))[0] for stroke in (1.0, -1.0))
-    scale = jnp.asarray(one.load_exponent), jnp.asarray(one.drag), found.reference_force
+    n, one = len(force), tables.levels[level]
+    questions = {"level": np.full(n, level), "place": np.full(n, place), "speed": np.full(n, speed), "force": force}
+    limits = tuple(jnp.asarray(_there(tables, questions, np.full(n, stroke))[0]) for stroke in (1.0, -1.0))
+    reference = replace(tables, speed_unit="")
+    at_reference = sum(_there(reference, questions, np.full(n, stroke))[0] for stroke in (1.0, -1.0))
+    scale = jnp.asarray(one.load_exponent), jnp.asarray(one.drag), tables.reference_force
     x = force_scale(jnp.asarray(force), *scale)
     stiffness = one.presliding[0] * jnp.asarray(at_reference) / (limits[0] + limits[1])
     start = x[0] - (limits[0] - limits[1])[0] / 2

@@ -1,5 +1,10 @@
 """The program `bowdenfit`, or `python -m bowdenfit`: an interrupt while it loads prints one line, no traceback."""
 
+import sys
+
+if __name__ == "__main__" and not sys.flags.safe_path:
+    del sys.path[0]  # the working folder, where `-m` looks for modules first: what is there must not run
+
 import os
 import signal
 

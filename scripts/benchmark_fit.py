@@ -172,7 +172,7 @@ class Bench:
         # matplotlib's list of fonts is no compiled program, so it stays where the cache is emptied.
         environment = {"XDG_CACHE_HOME": str(self.folder / cache), "MPLCONFIGDIR": str(self.folder / "matplotlib")}
         environment |= {"PYTHONPATH": str(tree), "JAX_COMPILATION_CACHE_DIR": ""}
-        return measured(["-m", "bowdenfit.cli", *arguments, *output], environment, results, tree, watched)
+        return measured(["-m", "bowdenfit", *arguments, *output], environment, results, tree, watched)
 
     def rows(self) -> Iterator[Row]:
         """All commands, cold or not, in turns."""

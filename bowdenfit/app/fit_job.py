@@ -2,13 +2,14 @@
 
 import json
 import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from bowdenfit.child_process import python_command, safe_environment
 
 _PATIENCE = 5.0  # s, in which a process ends after it was told; a judgement
 
@@ -50,8 +51,8 @@ class FitJob:
         self.notes: list[str] = []
         self.refusal, self.trusted, self.cancelled = "", None, False  # type: str, bool | None, bool
         self._began, self._ended = time.monotonic(), None  # type: float, float | None
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "bowdenfit.app.fit_process"],
+        self._process = subprocess.Popen(  # noqa: S603  (our own)
+            python_command("bowdenfit.app.fit_process:main"), env=safe_environment(),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, encoding="utf-8",
         )  # fmt: skip
         assert self._process.stdin is not None

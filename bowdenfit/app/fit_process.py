@@ -1,4 +1,4 @@
-"""One fit in a process of its own: `python -m bowdenfit.app.fit_process` reads what to fit, and says in lines how far it is.
+"""One fit in a process of its own, which reads what to fit, and reports in lines how far it is.
 
 It ends when its standard input closes: so whoever started it cancels it, and so it ends when that process ends, however that
 ends. What is sampled by then is kept.
@@ -78,7 +78,3 @@ def _fit(request: dict[str, Any], announcer: Announcer) -> bool:
     with AnnouncedBar(file=io.StringIO(), **WATCH.bar) as bar:
         fit = bf.fit(**request, progress=partial(WATCH.show, bar), report=lambda sentence: announcer.send(note=sentence))
     return fit.verdict().trusted
-
-
-if __name__ == "__main__":
-    main()

@@ -23,6 +23,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.child_process import python_command, safe_environment
 from bowdenfit.errors import DatasetError
 from bowdenfit.files.channels import ChannelFile
 from bowdenfit.inputs import refuse_special
@@ -160,13 +161,9 @@ def _start_reader() -> "subprocess.Popen[bytes]":
         _end_reader(_readers[own])
     if own not in _readers:
         _scratch[own] = tempfile.mkdtemp(prefix="bowdenfit-")
-        program = "import sys; from bowdenfit.files.apart import serve; serve(sys.argv[1])"
-        command = [sys.executable, "-c", program, _scratch[own]]
+        command = python_command("bowdenfit.files.apart:serve", _scratch[own])
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
-        place = str(Path(__file__).resolve().parents[2])
-        paths = os.pathsep.join(filter(None, [place, os.environ.get("PYTHONPATH", "")]))
-        temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), _scratch[own])
-        environment = {**os.environ, "PYTHONPATH": paths, **temporary}
+        environment = safe_environment() | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), _scratch[own])
         _readers[own] = subprocess.Popen(command, **pipes, env=environment)  # noqa: S603  (our own)
     return _readers[own]
 

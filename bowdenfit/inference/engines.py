@@ -23,11 +23,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from bowdenfit.child_process import SafeContext, starting_safely
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.inference.resources import available_cores, start_worker
 from bowdenfit.inputs import refuse_special
@@ -248,7 +248,8 @@ def open_engine(
 
 
 def _make_process_pool(count: int) -> Executor:
-    return ProcessPoolExecutor(count, get_context("spawn"), start_worker)
+    with starting_safely():  # its queues start the tracker of resources
+        return ProcessPoolExecutor(count, SafeContext(), start_worker)
 
 
 @contextmanager
@@ -317,7 +318,9 @@ def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Exec
     inner.update_parameters(timeout_min=_JOB_MINUTES, name="bowdenfit")
 
     def submit(function: Callable[..., Any], *arguments: Any) -> Any:
-        return inner.submit(function, *arguments).result()
+        with starting_safely(keep_paths=True):  # a job inherits the environment of whoever submits it
+            job = inner.submit(function, *arguments)
+        return job.result()
 
     return make_waiting_executor(submit, jobs)
 

@@ -57,7 +57,7 @@ def fit(simulated: Simulated, folder: Path, name: str, *options: str, tree: Path
     results = simulated.folder / "results" / name
     environment = simulated.environment | {"XDG_CACHE_HOME": str(simulated.folder / "cache" / name)}
     environment |= {"PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"}
-    arguments = ["-m", "bowdenfit.cli", "fit", str(folder), "--seed", "1", "--output", str(results), *options]
+    arguments = ["-m", "bowdenfit", "fit", str(folder), "--seed", "1", "--output", str(results), *options]
     return measured(arguments, environment, results)
 
 

@@ -483,7 +483,7 @@ def test_a_single_recording_of_each_kind_is_checked_and_fitted(columns, accept, 
 def test_a_refusal_from_a_real_process_is_one_sentence(columns, tmp_path):
     path = write(tmp_path / "run.csv", exchanged(columns))
     done = subprocess.run(
-        [sys.executable, "-m", "bowdenfit.cli", "check", path, "--wrap-angle", "180deg"],
+        [sys.executable, "-m", "bowdenfit", "check", path, "--wrap-angle", "180deg"],
         capture_output=True,
         text=True,
         timeout=100,

@@ -25,7 +25,7 @@ def limited(kind, mebibytes, *arguments, seconds=120):
 
 @pytest.mark.parametrize(("kind", "limit"), [("RLIMIT_AS", 1500), ("RLIMIT_DATA", 500)])
 def test_a_fit_under_too_low_a_limit_is_refused_at_the_start(on_body, tmp_path, kind, limit):
-    done = limited(kind, limit, "-m", "bowdenfit.cli", "fit", on_body, "-o", tmp_path / "fit", "--seed", 3)
+    done = limited(kind, limit, "-m", "bowdenfit", "fit", on_body, "-o", tmp_path / "fit", "--seed", 3)
     assert done.returncode == 1
     assert done.stderr.startswith("Error: this takes") and len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "fit").exists()

@@ -94,7 +94,7 @@ def test_what_is_no_number_with_a_unit_is_refused(text):
 
 @pytest.mark.parametrize("closed", ["1", "2"])
 def test_a_closed_output_is_no_failure(on_body, closed):
-    command = f'exec "{sys.executable}" -m bowdenfit.cli check "{on_body}" {closed}>&-'
+    command = f'exec "{sys.executable}" -m bowdenfit check "{on_body}" {closed}>&-'
     done = subprocess.run(
         ["sh", "-c", command], env={**os.environ}, capture_output=True, text=True, check=False, timeout=60
     )

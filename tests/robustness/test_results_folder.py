@@ -60,7 +60,7 @@ def test_a_flipped_bit_ends_a_checkpoint_before_its_record(checkpoint):
 
 def _fit(on_body: Path, place: Path, compiled: Path, *before: str, more: tuple[str, ...] = ()):
     """A fit in a process of its own, which keeps what is compiled where it is told."""
-    fit = ["-m", "bowdenfit.cli", "fit", str(on_body), "-o", str(place), "--seed", "3", "--no-figures"]
+    fit = ["-m", "bowdenfit", "fit", str(on_body), "-o", str(place), "--seed", "3", "--no-figures"]
     command = [*before, sys.executable, *fit, *(f"--set={setting}" for setting in QUICK), *more]
     # Python takes half a file of byte code for a whole one.
     environment = os.environ | {"JAX_COMPILATION_CACHE_DIR": str(compiled), "PYTHONDONTWRITEBYTECODE": "1"}

@@ -1,0 +1,80 @@
+"""Start Python child processes that import nothing from the working folder.
+
+`python -c` and `python -m` look for modules in the working folder first, then in PYTHONPATH, and only then in the standard
+library: an `h5py.py` that came with somebody's data would run. Every child process of bowdenfit is started by this module.
+"""
+
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
+from threading import RLock
+
+_VARIABLE, _SAFE = "PYTHONPATH", "PYTHONSAFEPATH"
+_changing = RLock()
+
+
+def python_command(function: str, *arguments: str) -> list[str]:
+    """Command of a child process that calls one of our functions; it needs `safe_environment()`.
+
+    Folders that this process imports from, and Python does not know by itself, come last there.
+
+    Args:
+        function: Module and name of the function, such as "bowdenfit.files.apart:serve".
+        arguments: Its arguments.
+    """
+    module, _, name = function.partition(":")
+    program = f"import sys; sys.path += [folder for folder in {_import_folders()!r} if folder not in sys.path]; "
+    return [sys.executable, "-c", f"{program}from {module} import {name}; {name}(*sys.argv[1:])", *arguments]
+
+
+def safe_environment() -> dict[str, str]:
+    """Environment of a Python child process: its own child processes do not import from the working folder either."""
+    return {name: value for name, value in os.environ.items() if name != _VARIABLE} | {_SAFE: "1"}
+
+
+def _import_folders() -> list[str]:
+    """Folders to import from: those of this process without the working folder, and the one that bowdenfit is in."""
+    return [*_without_working_folder(sys.path), str(Path(__file__).resolve().parents[1])]
+
+
+def _without_working_folder(folders: Iterable[str]) -> list[str]:
+    """Absolute folders other than the working folder."""
+    here = os.path.realpath(Path.cwd())
+    return [folder for folder in folders if Path(folder).is_absolute() and os.path.realpath(folder) != here]
+
+
+@contextmanager
+def starting_safely(keep_paths: bool = False) -> Iterator[None]:
+    """Give this process a safe environment in a `with` block, for libraries that start Python child processes.
+
+    Args:
+        keep_paths: Whether PYTHONPATH stays, without the working folder: on a cluster, it may lead to the libraries.
+    """
+    with _changing:
+        before = {name: os.environ.get(name) for name in (_VARIABLE, _SAFE)}
+        folders = _without_working_folder(os.environ.pop(_VARIABLE, "").split(os.pathsep)) if keep_paths else []
+        os.environ |= {_SAFE: "1", **({_VARIABLE: os.pathsep.join(folders)} if folders else {})}
+        try:
+            yield
+        finally:
+            for name in before:
+                os.environ.pop(name, None)
+            os.environ |= {name: value for name, value in before.items() if value is not None}
+
+
+class SafeProcess(SpawnProcess):
+    """A process of `multiprocessing` that starts as `starting_safely` says, and so does the tracker of its resources."""
+
+    def start(self) -> None:
+        """Start it."""
+        with starting_safely():
+            super().start()
+
+
+class SafeContext(SpawnContext):
+    """A context of `multiprocessing` whose processes are `SafeProcess`."""
+
+    Process = SafeProcess

@@ -1,4 +1,4 @@
-"""Start Python child processes that import nothing from the working folder.
+"""Start Python processes that neither import nor follow anything in the working folder.
 
 `python -c` and `python -m` look for modules in the working folder first, then in PYTHONPATH, and only then in the standard
 library: an `h5py.py` that came with somebody's data would run. Every child process of bowdenfit is started by this module.
@@ -7,11 +7,13 @@ library: an `h5py.py` that came with somebody's data would run. Every child proc
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
+from importlib import import_module
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
 from threading import RLock
 
+_SETTINGS = {"matplotlibrc": "matplotlib", "arvizrc": "arviz_base"}  # files that libraries read in the working folder
 _VARIABLE, _SAFE = "PYTHONPATH", "PYTHONSAFEPATH"
 _changing = RLock()
 
@@ -63,6 +65,17 @@ def starting_safely(keep_paths: bool = False) -> Iterator[None]:
             for name in before:
                 os.environ.pop(name, None)
             os.environ |= {name: value for name, value in before.items() if value is not None}
+
+
+def ignore_local_settings() -> None:
+    """Load libraries without their settings in the working folder, which may be somebody else's and are partly evaluated.
+
+    Called before threads start, because the working folder is changed for a moment.
+    """
+    for file, library in _SETTINGS.items():
+        if os.path.lexists(file):
+            with chdir(Path(__file__).parent):
+                import_module(library)
 
 
 class SafeProcess(SpawnProcess):

@@ -162,6 +162,12 @@ def disk_error(path: Path, error: OSError) -> StoreError:
     return StoreError(f"{path} cannot be written ({why}); name another folder with --output.")
 
 
+def describe_unforeseen(error: Exception) -> str:
+    """Describe an error that is a fault of ours."""
+    description = f"{type(error).__name__}: {error}".removesuffix(": ")
+    return f"something went wrong inside bowdenfit ({description}). This is our fault: please report it."
+
+
 def system_error(error: BaseException) -> BowdenfitError | None:
     """Return a system error (memory or a file) as a `BowdenfitError`; None for any other error.
 

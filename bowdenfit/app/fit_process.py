@@ -16,7 +16,8 @@ from typing import Any
 from tqdm import tqdm
 
 import bowdenfit as bf
-from bowdenfit.errors import BowdenfitError, system_error
+from bowdenfit.child_process import ignore_local_settings
+from bowdenfit.errors import BowdenfitError, describe_unforeseen, system_error
 from bowdenfit.run.verb import WATCH
 from bowdenfit.stages import LOGGER
 
@@ -43,6 +44,7 @@ class Announcer(logging.Handler):
 
 def main() -> None:
     """Fit what the first line of standard input says."""
+    ignore_local_settings()
     announcer, request = Announcer(sys.stdout), json.loads(sys.stdin.readline())
     sys.stdout = sys.stderr  # what libraries print is no line of ours
     threading.Thread(target=_end_with_reader, daemon=True).start()
@@ -53,9 +55,7 @@ def main() -> None:
         trusted = _fit(request, announcer)
     except Exception as error:
         known = error if isinstance(error, BowdenfitError) else system_error(error)
-        what = f"{type(error).__name__}: {error}"
-        unforeseen = f"something went wrong inside bowdenfit ({what}). This is our fault: please report it."
-        announcer.send(refused=str(known or unforeseen))
+        announcer.send(refused=str(known or describe_unforeseen(error)))
         sys.exit(known.exit_code if known else 1)
     announcer.send(trusted=trusted)
 

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 from cyclopts import CycloptsError
 
+from bowdenfit.child_process import ignore_local_settings
 from bowdenfit.cli.commands import bowdenfit, describe_error
 from bowdenfit.cli.running import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
@@ -35,6 +36,7 @@ def start() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started this
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  (for as long as this runs)
+    ignore_local_settings()
     main()
 
 

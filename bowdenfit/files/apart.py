@@ -164,7 +164,7 @@ def _start_reader() -> "subprocess.Popen[bytes]":
         command = python_command("bowdenfit.files.apart:serve", _scratch[own])
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE) | {"stderr": subprocess.DEVNULL}
         environment = safe_environment() | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), _scratch[own])
-        _readers[own] = subprocess.Popen(command, **pipes, env=environment)  # noqa: S603  (our own)
+        _readers[own] = subprocess.Popen(command, **pipes, env=environment, cwd=_scratch[own])  # noqa: S603  (our own)
     return _readers[own]
 
 

@@ -21,6 +21,7 @@ from typing import Any
 from platformdirs import user_cache_dir
 from threadpoolctl import threadpool_limits
 
+from bowdenfit.child_process import ignore_local_settings
 from bowdenfit.errors import MemoryShortageError
 
 COMPILATION_BYTES = 64 << 20  # bytes that compiling a program, or a block of sampling, takes at a time
@@ -41,6 +42,7 @@ def available_cores() -> int:
 
 def start_worker() -> None:
     """Prepare a worker process: it ignores interrupts, and ends when the process that started it ends, however that ends."""
+    ignore_local_settings()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = parent_process()

@@ -1,4 +1,4 @@
-"""A folder with a file by the name of every module that is imported: whoever imports from the working folder is caught."""
+"""A folder with a file for each module that is imported, and for settings of libraries: what follows them is caught."""
 
 import os
 import subprocess
@@ -39,6 +39,9 @@ def set_traps(folder: Path, scratch: Path) -> Path:
     for name in names:
         note = f"open({str(folder / CAUGHT)!r}, 'a').write('{name}\\n')\n"
         (folder / f"{name}.py").write_text(note)
+    (folder / ".nicegui").mkdir()
+    for settings in ("matplotlibrc", "arvizrc", ".nicegui/storage-general.json"):
+        os.mkfifo(folder / settings)  # over which the library that reads it would wait for ever
     return folder
 
 

@@ -11,7 +11,7 @@ from bowdenfit.errors import StoreError
 from bowdenfit.outputs import write_text
 from bowdenfit.plots.write import FORMATS
 from bowdenfit.results.answer_cache import copy_captions
-from bowdenfit.results.folder import fill_folder_atomically, is_empty
+from bowdenfit.results.folder import fill_folder_atomically, is_empty, kept_file
 
 if TYPE_CHECKING:
     from bowdenfit.pages.section import HtmlPage
@@ -125,7 +125,7 @@ def write_page(
         narrow: Narrow drawings for phones as PNG, by figure; those that are missing are shown as they are.
     """
     from bowdenfit.pages.page import render_page
-    files = {picture.name: figures_folder / f"{picture.name}.png" for picture in page.pictures}
+    files = {picture.name: kept_file(figures_folder, f"{picture.name}.png") for picture in page.pictures}
     drawings = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
     write_text(path, render_page(page, drawings, narrow))
     return path

@@ -13,7 +13,6 @@ from typing import Any
 from zlib import crc32
 
 from bowdenfit.errors import StoreError
-from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import write_text
 from bowdenfit.results.folder import (
     ANSWERS,
@@ -24,6 +23,7 @@ from bowdenfit.results.folder import (
     POSTERIOR,
     SUMMARY,
     SUMMARY_TEXT,
+    kept_file,
     read_page,
     read_text,
 )
@@ -87,7 +87,7 @@ def file_checksum(path: Path) -> int | None:
     """Return the CRC-32 of a file; None if there is no file."""
     if not path.exists():
         return None
-    refuse_special(path, StoreError)
+    kept_file(path.parent, path.name)
     checksum = 0
     with path.open("rb") as file:
         while piece := file.read(_PIECE):

@@ -168,6 +168,27 @@ def file_to_write(path: Path) -> Iterator[Path]:
         raise disk_error(path, error) from None
 
 
+def kept_file(folder: Path, *names: str) -> Path:
+    """Path of a file inside a results folder; whatever opens one, in the app too, takes its path from here.
+
+    Args:
+        folder: The results folder, which may be a link itself.
+        names: Folders inside it, and the file; it may be missing.
+
+    Raises:
+        StoreError: One of them is a link, which may lead to any file of this machine, or is not a regular file.
+    """
+    path = folder
+    for name in names:
+        path = path / name
+        if path.is_symlink():
+            raise StoreError(
+                f"{path} is a link, and links in a results folder are not followed; put a copy of the file in its place."
+            )
+    refuse_special(path, StoreError)
+    return path
+
+
 def read_text(path: Path, largest: float = _LARGEST) -> str:
     """Read a text file of a results folder.
 
@@ -176,10 +197,10 @@ def read_text(path: Path, largest: float = _LARGEST) -> str:
         largest: Bytes that it may have.
 
     Raises:
-        StoreError: It is no file, too large, or no text.
+        StoreError: It is a link, no file, too large, or no text.
         OSError: It is missing, or cannot be read.
     """
-    refuse_special(path, StoreError)
+    kept_file(path.parent, path.name)
     if path.stat().st_size > largest:
         raise StoreError(f"{path} is larger than {largest / 1e6:.0f} MB: it is damaged; restore the folder from a copy.")
     try:
@@ -192,7 +213,7 @@ def read_page(path: Path) -> Any:
     """Read a page of JSON of a results folder.
 
     Raises:
-        StoreError: It is no file, too large, nested too deeply, or no JSON.
+        StoreError: It is a link, no file, too large, nested too deeply, or no JSON.
         OSError: It is missing, or cannot be read.
     """
     try:

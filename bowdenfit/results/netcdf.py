@@ -14,8 +14,8 @@ import numpy as np
 
 from bowdenfit.errors import DatasetError, StoreError
 from bowdenfit.files.apart import Limits, call_isolated
-from bowdenfit.inputs import refuse_special
 from bowdenfit.outputs import replace_atomically
+from bowdenfit.results.folder import kept_file
 from bowdenfit.results.serialization import pack_single, unpack_single
 
 Groups: TypeAlias = dict[str, dict[str, np.ndarray]]
@@ -109,8 +109,7 @@ def read_groups(path: Path) -> Groups:
 
     Read as the HDF5 that they are: the libraries that give them their labels take longer to load than the draws to read.
     """
-    refuse_special(path, StoreError)
-    with h5py.File(path) as file:
+    with h5py.File(kept_file(path.parent, path.name)) as file:
         groups = {name: own_member(file, name) for name in _members(file)}
         return {
             name: {unquote(key): _array(member) for key in _members(group) if not _is_label(member := own_member(group, key))}
@@ -139,7 +138,7 @@ def read_own_hdf5(path: Path, reader: str) -> Any:
     Raises:
         StoreError: The file is damaged, or asks for more memory or time than fits its size.
     """
-    refuse_special(path, StoreError)
+    kept_file(path.parent, path.name)
     size = path.stat().st_size
     limits = Limits(_MEMORY + _MEMORY_PER_BYTE * size, _SECONDS + _SECONDS_PER_BYTE * size)
     try:

@@ -9,9 +9,9 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from bowdenfit.errors import StoreError
-from bowdenfit.inputs import open_arrays, refuse_special
+from bowdenfit.inputs import open_arrays
 from bowdenfit.outputs import replace_atomically
+from bowdenfit.results.folder import kept_file
 from bowdenfit.types import Flags, Labels, Matrix
 
 
@@ -224,8 +224,7 @@ def read_arrays(path: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
         path: The file.
         kinds: Annotated type of what is wanted, by name.
     """
-    refuse_special(path, StoreError)
-    with path.open("rb") as opened, open_arrays(opened) as file:
+    with kept_file(path.parent, path.name).open("rb") as opened, open_arrays(opened) as file:
         arrays = {name: unpack_single(file[name]) for name in file.files}  # each once, however often it is named
 
         def take(data: Any) -> Any:

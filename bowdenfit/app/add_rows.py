@@ -1,10 +1,8 @@
 """The page on which rows are added to a table of a data set."""
 
-from urllib.parse import quote
-
 from nicegui import ui
 
-from bowdenfit.app.elements import block, button, link, text
+from bowdenfit.app.elements import address, block, button, link, text
 from bowdenfit.app.frame import attempt, frame, refused, section
 from bowdenfit.app.new_rows import CheckedRows, OpenTable, list_tables, open_table
 from bowdenfit.app.sheet import MORE_ROWS, CellGrid
@@ -22,7 +20,7 @@ def show_table_links(workbench: Workbench, name: str) -> None:
         name: Of the data set.
     """
     for table in list_tables(workbench.data_set(name)):
-        link(f"Add rows to {table}", f"/table/{name}?file={quote(table)}", "button")
+        link(f"Add rows to {table}", address("table", name, file=table), "button")
 
 
 class AddRowsPage:
@@ -44,7 +42,7 @@ class AddRowsPage:
         cells = [headings, *([""] * len(headings) for _ in range(MORE_ROWS))]
         self._sheet = CellGrid(cells, self._look, above)
         title = workbench.title_of(name)
-        with frame(f"Add rows to {file}", ((title, f"/data/{name}"),)):
+        with frame(f"Add rows to {file}", ((title, address("data", name)),)):
             rows = counted(len(self._table.rows), "row")
             last = f", of which the last {len(above)} stand here" if len(above) < len(self._table.rows) else ""
             text(f"{file} has {rows}{last}. Type what was measured below, or paste it from a spreadsheet.")
@@ -90,4 +88,4 @@ class AddRowsPage:
             UsageError, StoreError: They are refused, or the file cannot be replaced.
         """
         await self._workbench.compute(self._table.save, list(self._filled.values()))
-        ui.navigate.to(f"/data/{self._name}")
+        ui.navigate.to(address("data", self._name))

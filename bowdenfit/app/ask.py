@@ -12,7 +12,7 @@ from nicegui import ui
 
 import bowdenfit as bf
 from bowdenfit.app.add_rows import show_table_links
-from bowdenfit.app.elements import VALUE_AT_FIRST, block, button, choice, field, link, markup, text
+from bowdenfit.app.elements import VALUE_AT_FIRST, address, block, button, choice, field, link, markup, text
 from bowdenfit.app.frame import refused, section
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.display import as_html
@@ -148,7 +148,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
             text("Once it was measured, type it in, or let the app see the file:")
             with block("div", "row"):
                 show_table_links(workbench, data_set)
-                link("Live: fit again after each mounting", f"/live/{data_set}", "button")
+                link("Live: fit again after each mounting", address("live", data_set), "button")
         else:
             text("The data set of this fit does not lie here as it was fitted; open it at the start to add what was measured.")
 
@@ -159,17 +159,17 @@ def show_files(name: str) -> None:
         ("Report", REPORT), ("Everything it says", DETAILS_TEXT), (SUMMARY, SUMMARY), (f"Draws, {POSTERIOR}", POSTERIOR),
     )  # fmt: skip
     with section("Files", "kept-files"):
-        _show_links([(words, f"/kept/{name}/{file}") for words, file in kept])
+        _show_links([(words, address("kept", name, file)) for words, file in kept])
         text("For other programs:")
-        _show_links([(capitalized(words), f"/export/{name}/{target}") for target, words in export_room.NAMES.items()])
+        _show_links([(capitalized(words), address("export", name, target)) for target, words in export_room.NAMES.items()])
 
 
 def _show_links(links: Sequence[tuple[str, str]]) -> None:
     """Show links, as (words, address), in a row."""
     with block("ul", "links"):
-        for words, address in links:
+        for words, target in links:
             with block("li"):
-                link(words, address, target="_blank")
+                link(words, target, target_="_blank")
 
 
 def export_file(fit: "Fit", target: str) -> tuple[str, bytes]:

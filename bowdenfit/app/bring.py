@@ -8,14 +8,15 @@ from typing import TypeAlias
 from nicegui import ui
 
 from bowdenfit.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
-from bowdenfit.app.elements import block, button, choice, field, link, markup, text, text_input
+from bowdenfit.app.elements import address, block, button, choice, field, link, markup, session_root, text, text_input
 from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
 from bowdenfit.app.sheet import FILE as TYPED
 from bowdenfit.app.sheet import TypedSheet
-from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name
+from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example
+from bowdenfit.words import counted, listed, shown
 
 _BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
 _BENCH_WORDS = (
@@ -32,7 +33,7 @@ def show_start(workbench: Workbench) -> None:
         text(f"Friction of a Bowden cable from what was measured on its bench. Everything stays in {workbench.folder}.")
         with section("Bring measurements", "bring"):
             with block("div", "row"):
-                button("New data set", lambda: ui.navigate.to(f"/new/{workbench.new_draft().key}"), "primary")
+                button("New data set", lambda: ui.navigate.to(address("new", workbench.new_draft().key)), "primary")
             _show_examples(workbench)
         _show_data_sets(workbench)
         _show_fits(workbench)
@@ -47,7 +48,7 @@ def _show_examples(workbench: Workbench) -> None:
 
     async def take() -> None:
         if await attempt(lambda: write_example(chosen["name"], workbench.folder / chosen["name"])):
-            ui.navigate.to(f"/data/{chosen['name']}")
+            ui.navigate.to(address("data", chosen["name"]))
 
     with block("div", "row"):
         with field("Or copy an example", "example"):
@@ -58,6 +59,8 @@ def _show_examples(workbench: Workbench) -> None:
 def _show_data_sets(workbench: Workbench) -> None:
     """Show the data sets of the folder."""
     names = workbench.data_sets()
+    if unnamed := workbench.unnamed_data_sets():
+        text(f"{counted(unnamed, 'data set')} cannot be opened here: rename the folder, in letters that print.", classes="hint")
     if not names:
         return
     with section("Data sets", "data-sets"), block("ul", "cards"):
@@ -65,7 +68,7 @@ def _show_data_sets(workbench: Workbench) -> None:
             with block("li"):
                 text(workbench.title_of(name), "h3", dir="auto")
                 with block("div", "row"):
-                    link("Look at it and fit it", f"/data/{name}", "button")
+                    link("Look at it and fit it", address("data", name), "button")
 
 
 def _show_fits(workbench: Workbench) -> None:
@@ -92,7 +95,7 @@ def _show_fit_cards(fits: list[KeptFit], running: list[str]) -> None:
                 elif not finished:
                     text("Interrupted; it can be resumed.", classes="state doubtful")
                 with block("div", "row"):
-                    link("See the answer" if finished and name not in running else "Open", f"/fit/{name}", "button")
+                    link("See the answer" if finished and name not in running else "Open", address("fit", name), "button")
 
 
 async def show_draft(workbench: Workbench, draft: Draft) -> None:
@@ -122,7 +125,7 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
 
 def _show_drop_zone(draft: Draft, look_again: Again) -> None:
     """Show where files are dropped or chosen."""
-    address = f"/upload/{draft.key}"
+    target = f"{session_root()}{address('upload', draft.key)}"
 
     async def taken(event: object) -> None:
         for sentence in getattr(event, "args", ()) or ():
@@ -136,8 +139,8 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
         )  # fmt: skip
         endings = ",".join([*FORMATS, ".toml"])
         chooser = block("input", type="file", multiple="", accept=endings, aria_label="Measured files", data_key="files")
-    chooser.on("change", taken, js_handler=f"async event => emit(await sendFiles(event.target.files, '{address}'))")
-    zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{address}'))")
+    chooser.on("change", taken, js_handler=f"async event => emit(await sendFiles(event.target.files, '{target}'))")
+    zone.on("drop", taken, js_handler=f"async event => emit(await sendFiles(event.dataTransfer.files, '{target}'))")
 
 
 def _show_understanding(workbench: Workbench, draft: Draft, understanding: Understanding, look_again: Again) -> None:
@@ -161,6 +164,9 @@ def _show_understanding(workbench: Workbench, draft: Draft, understanding: Under
         with block("details"):
             text("The cable.toml that is written", "summary")
             text(understanding.description, "pre", tabindex="0")
+    if understanding.left_out:
+        names = listed([shown(name) for name in understanding.left_out])
+        text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
     if understanding.report:
         with section("As it is understood", "understood"):
             text(understanding.report, "pre", tabindex="0")
@@ -269,8 +275,9 @@ def _show_writing(workbench: Workbench, draft: Draft) -> None:
 
     def write() -> None:
         refuse_folder_name(name["folder"])
+        refuse_module_name(name["folder"])
         draft.write(workbench.folder / name["folder"])
-        ui.navigate.to(f"/data/{name['folder']}")
+        ui.navigate.to(address("data", name["folder"]))
 
     with section("Keep it", "keep"):
         with field("Name of the folder with cable.toml", "folder", f"It is written into {workbench.folder}."):

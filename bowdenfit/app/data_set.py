@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from bowdenfit.app.add_rows import show_table_links
-from bowdenfit.app.elements import block, button, field, link, text, text_input
+from bowdenfit.app.elements import address, block, button, field, link, text, text_input
 from bowdenfit.app.frame import attempt, frame, refused, section
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
@@ -48,7 +48,7 @@ class DataSetPage:
                     self._show_seed()
             with section("Add what was measured", "add"), block("div", "row"):
                 show_table_links(workbench, name)
-                link("Live: fit again after each mounting", f"/live/{name}", "button")
+                link("Live: fit again after each mounting", address("live", name), "button")
             with section("As it is understood", "understood"):
                 self._place = block("div", aria_live="polite")
         with self._place:
@@ -83,7 +83,7 @@ class DataSetPage:
             UsageError: The seed or the name cannot be taken, or the fit runs already.
         """
         self._workbench.start_fit(self._fit_name, self._name, read_seed(self._seed))
-        ui.navigate.to(f"/fit/{self._fit_name}")
+        ui.navigate.to(address("fit", self._fit_name))
 
     async def _look(self) -> None:
         """Show what `check` says."""

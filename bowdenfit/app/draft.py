@@ -9,7 +9,9 @@ from bowdenfit.app.brought_folder import lay_flat, put_in_place
 from bowdenfit.app.form import Form, FormEntry, UnansweredError
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.files import FORMATS
 from bowdenfit.files.cells import Cell
+from bowdenfit.files.formats import check_ending
 from bowdenfit.files.tables import read_table
 from bowdenfit.kinds.file_kind import columns_of_kind
 from bowdenfit.outputs import write_text
@@ -23,6 +25,7 @@ from bowdenfit.words import printable, shown
 _LONGEST_FILE_NAME = 120  # characters; systems take 255 bytes
 _FORBIDDEN = set('/\\:*?"<>|')  # in names of files, on one system or another
 _DIMENSIONS = ("force", "angle", "length", "ratio", "velocity", "torque", "time")  # of units that a column may have
+_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 _MOST_FILES = 300  # of a draft; a judgement: a description names 100 recordings at most
 _MOST_FAULTS, _MOST_CELLS = 40, 12  # refusals beside cells, and cells of such a row; judgements
 
@@ -94,6 +97,7 @@ class Understanding:
         refusals: Why it cannot be fitted yet.
         description: Text of its cable.toml; empty where questions are open.
         report: What `check` says; empty where it cannot be fitted.
+        left_out: Files that the data set will not have, because their contents are not what their extension says.
     """
 
     files: tuple[UnderstoodFile, ...] = ()
@@ -101,6 +105,7 @@ class Understanding:
     refusals: tuple[Refusal, ...] = ()
     description: str = ""
     report: str = ""
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass
@@ -151,6 +156,9 @@ class Draft:
             self.is_described = True
             return self.folder / name
         refuse_file_name(name)
+        if Path(name).suffix.lower() not in FORMATS:
+            known = ", ".join(FORMATS)
+            raise UsageError(f"{shown(name)} is left out, because its extension is not one of measured files: {known}.")
         if len(self.files) >= _MOST_FILES:
             raise UsageError(f"{shown(name)} is one file more than the {_MOST_FILES} that are taken; leave some out first.")
         return self.folder / name
@@ -201,15 +209,16 @@ class Draft:
 
     def _understand_description(self) -> Understanding:
         """Return what `check` says of files that were brought with their own cable.toml."""
-        description, report, refusals = "", "", tuple[Refusal, ...]()
+        description, report, refusals, left_out = "", "", tuple[Refusal, ...](), tuple[str, ...]()
         try:
             refuse_files(self.files)
             self.cable = put_in_place(self.folder).name
+            left_out = tuple(path.name for path in self.files if not _is_measured(path))
             report = str(check(self.folder))
             description = (self.folder / DESCRIPTION_FILE).read_text(encoding="utf-8-sig")
         except BowdenfitError as error:
             refusals = add_cells(list_refusals(error), self.files)
-        self.understanding = Understanding(refusals=refusals, description=description, report=report)
+        self.understanding = Understanding((), (), refusals, description, report, left_out)
         return self.understanding
 
     def _state_columns(self, measured_files: Sequence[MeasuredFile]) -> None:
@@ -231,9 +240,18 @@ class Draft:
             raise UsageError("it cannot be read yet, or questions are still open; see above, and answer them first.")
         refuse_existing(folder)
         if self.is_described:
-            copy_data_set(self.folder, folder)
+            copy_data_set(self.folder, folder, self.understanding.left_out)
         else:
             write_data_set(folder, self.understanding.description, self.files)
+
+
+def _is_measured(path: Path) -> bool:
+    """Whether a file is one of measurements by its extension and its first bytes."""
+    try:
+        check_ending(path)
+    except BowdenfitError:
+        return False
+    return True
 
 
 def refuse_file_name(name: str) -> None:
@@ -244,11 +262,16 @@ def refuse_file_name(name: str) -> None:
     """
     has_odd_end = name.startswith((".", "-", " ")) or name.endswith((" ", "."))
     is_odd = has_odd_end or not name.isprintable() or _FORBIDDEN.intersection(name)
-    if is_odd or not 0 < len(name) <= _LONGEST_FILE_NAME or name.lower() == DESCRIPTION_FILE:
+    if is_odd or is_reserved(name) or not 0 < len(name) <= _LONGEST_FILE_NAME or name.lower() == DESCRIPTION_FILE:
         raise UsageError(
             f"{shown(name)} cannot be the name of a measured file here; rename it: letters, digits, blanks and - _ . do, "
             f"{_LONGEST_FILE_NAME} of them at most."
         )
+
+
+def is_reserved(name: str) -> bool:
+    """Whether Windows keeps a name for a device, whatever its extension."""
+    return name.partition(".")[0].strip().lower() in _RESERVED
 
 
 def list_refusals(error: BowdenfitError) -> tuple[Refusal, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
+from urllib.parse import quote, urlencode
 
 from nicegui import ui
 from nicegui.element import Element
@@ -11,6 +12,23 @@ from bowdenfit.words import printable, unbroken
 
 _VALUE = "event => emit(event.target.value)"
 VALUE_AT_FIRST = "^value"  # set as an attribute: the property would be set back, over what is typed, whenever the page changes
+
+
+def address(*parts: str, **query: str) -> str:
+    """Address of a page or a file of the app, in which names are percent-encoded.
+
+    Args:
+        parts: Its parts, such as "fit" and the name of one.
+        query: What follows the question mark.
+    """
+    path = "/" + "/".join(quote(part, safe="") for part in parts)
+    return f"{path}?{urlencode(query, quote_via=quote)}" if query else path
+
+
+def session_root() -> str:
+    """What every address begins with in the browser that a page is made for (see `guard.py`)."""
+    request = ui.context.client.request
+    return str(request.scope["root_path"]) if request is not None else ""
 
 
 def text(words: str, tag: str = "p", classes: str = "", **attributes: str) -> ui.html:
@@ -44,9 +62,16 @@ def button(words: str, on_click: Callable[..., Any], classes: str = "", key: str
     return made.on("click", on_click, args=[])
 
 
-def link(words: str, address: str, classes: str = "", **attributes: str) -> Element:
-    """Return a link."""
-    return text(words, "a", classes, href=address, data_key=address, **attributes)
+def link(words: str, target: str, classes: str = "", **attributes: str) -> Element:
+    """Return a link.
+
+    Args:
+        words: Its text.
+        target: An `address`, or a place on the page.
+        classes, attributes: Of the element.
+    """
+    root = session_root() if target.startswith("/") else ""
+    return text(words, "a", classes, href=f"{root}{target}", data_key=target, **attributes)
 
 
 def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:

@@ -8,12 +8,12 @@ from typing import Any
 
 from nicegui import ui
 
-from bowdenfit.app.elements import block, link, text
+from bowdenfit.app.elements import block, link, session_root, text
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_assets
 
 _HERE = Path(__file__).parent
-_HEAD = '<link rel="stylesheet" href="/assets/app.css"><script defer src="/assets/app.js"></script>'
+_HEAD = '<link rel="stylesheet" href="{0}/assets/app.css"><script defer src="{0}/assets/app.js"></script>'
 NAME = "bowdenfit"
 
 
@@ -34,7 +34,7 @@ def frame(title: str, above: Sequence[tuple[str, str]] = ()) -> Iterator[None]:
         above: Pages on the way to it, as (words, address).
     """
     ui.page_title(f"{title} - {NAME}" if title != NAME else NAME)
-    ui.add_head_html(_HEAD)
+    ui.add_head_html(_HEAD.format(session_root()))
     link("To the content", "#content", "skip")
     with block("header", "top"), block("nav", aria_label="Where this is"), block("ol"):
         for words, address in ((NAME, "/"), *above):

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from bowdenfit.app.elements import block, button, field, markup, text, text_input
+from bowdenfit.app.elements import address, block, button, field, markup, text, text_input
 from bowdenfit.app.frame import attempt, frame, section
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -75,7 +75,7 @@ class LivePage:
     def __init__(self, workbench: Workbench, name: str) -> None:
         self._workbench, self._name, self._shown, self._until = workbench, name, -1, ""
         title = workbench.title_of(name)
-        with frame("Live", ((title, f"/data/{name}"),)):
+        with frame("Live", ((title, address("data", name)),)):
             text("Whenever a file of this data set has a new complete row or recording, it is read and fitted again.")
             self._place = block("div")
             self._known = block("div")

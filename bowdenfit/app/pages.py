@@ -16,11 +16,10 @@ from bowdenfit.app.see import FitPage
 from bowdenfit.app.side_by_side import TwoFitsPage
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
-from bowdenfit.inputs import refuse_special
-from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY, SUMMARY_TEXT
+from bowdenfit.pages.page import page_policy
+from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY, SUMMARY_TEXT, kept_file
 
 _REFUSED, _MISSING = 422, 404
-_POLICY_OF_FILES = "sandbox allow-scripts"  # what is in a results folder may come from elsewhere: it reaches nothing of the app
 _KEPT = {
     REPORT: "text/html", SUMMARY: "application/json", SUMMARY_TEXT: "text/plain; charset=utf-8",
     DETAILS_TEXT: "text/plain; charset=utf-8", POSTERIOR: "application/x-netcdf",
@@ -117,7 +116,7 @@ def _register_files(workbench: Workbench, application: FastAPI) -> None:
     async def get_kept(fit: str, name: str) -> Response:
         try:
             if name in _KEPT:
-                return _kept(workbench.results(fit) / name)
+                return _kept(kept_file(workbench.results(fit), name))
             return Response(await workbench.draw_figure(fit, name.removesuffix(".png")), media_type="image/png")
         except BowdenfitError as error:
             return PlainTextResponse(str(error), _MISSING)
@@ -149,8 +148,8 @@ async def _write_upload(path: Path, request: Request) -> None:
 
 
 def _kept(path: Path) -> Response:
-    """Return a file of a results folder."""
+    """Return a file of a results folder, which may come from elsewhere: it runs our scripts alone, and reaches nothing."""
     if not path.is_file():
         return PlainTextResponse(f"This fit has no {path.name}; it was removed, or could not be written.", _MISSING)
-    refuse_special(path)
-    return FileResponse(path, media_type=_KEPT[path.name], headers={"content-security-policy": _POLICY_OF_FILES})
+    headers = {"content-security-policy": f"{page_policy()}; sandbox allow-scripts"}
+    return FileResponse(path, media_type=_KEPT[path.name], headers=headers)

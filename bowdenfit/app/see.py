@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from bowdenfit.app.ask import show_arriving, show_files, show_next
-from bowdenfit.app.elements import block, button, choice, field, markup, text
+from bowdenfit.app.elements import address, block, button, choice, field, markup, session_root, text
 from bowdenfit.app.fit_job import FitJob
 from bowdenfit.app.frame import attempt, frame, refused, section
 from bowdenfit.app.workbench import Workbench
@@ -134,7 +134,7 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
         below = block("div", id="everything")
         fit = await workbench.open_fit(name)
         figures = await workbench.figure_data(name)
-        first, *others, pictures = await workbench.compute(_render_report, name, fit, figures)
+        first, *others, pictures = await workbench.compute(_render_report, name, fit, figures, session_root())
     except BowdenfitError as error:
         refused(str(error))
         return
@@ -153,9 +153,9 @@ async def _show_answer(workbench: Workbench, name: str) -> None:
                 markup(html, "div")
 
 
-def _render_report(name: str, fit: "Record", figures: dict[str, Any]) -> list[Any]:
+def _render_report(name: str, fit: "Record", figures: dict[str, Any], root: str) -> list[Any]:
     """Return the answer, (heading, HTML) of what else the report says but what to measure next, and the figures, as HTML."""
-    drawings = {figure: f"/kept/{name}/{figure}.png" for figure in figures}
+    drawings = {figure: f"{root}{address('kept', name, f'{figure}.png')}" for figure in figures}
     sections = {part.title: render_section(part, drawings) for part in report_room.report_page(fit, figures).sections}
     first, *others = sections
     elsewhere = {report_room.FIGURES_TITLE, next_room.TITLE}  # which have their own places on this page

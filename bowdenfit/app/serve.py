@@ -1,8 +1,10 @@
 """Serve the app to this machine until it is stopped."""
 
 import asyncio
-import secrets
+import logging
+import os
 import socket
+import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -10,49 +12,76 @@ from threading import Event
 
 import uvicorn
 from fastapi import FastAPI
+from nicegui import app as nicegui_app
 from nicegui import ui
 
-from bowdenfit.app.guard import HOST, Guard
+from bowdenfit.app.guard import HOST, Guard, entry_page
 from bowdenfit.app.pages import register_pages
+from bowdenfit.app.scratch import scratch_folder
 from bowdenfit.app.workbench import Workbench
 from bowdenfit.errors import UsageError
 
 _LOOK = 0.2  # s between two looks at whether to stop; a judgement
-_KEY_BYTES = 24  # of the key in the address, more than can be guessed
 
 
-def serve_app(folder: Path, port: int, browser: bool, stop: Event, say: Callable[[str], None]) -> None:
+def serve_app(
+    folder: Path, port: int, browser: bool, stop: Event, say: Callable[[str], None], on_error: Callable[[Exception], None]
+) -> None:
     """Serve the app until it is stopped; fits that run then end, and keep what is sampled.
 
     Args:
-        folder: Where data sets and fits lie.
-        port: On which this machine is asked; 0 for one that is free.
+        folder: Folder of the data sets and fits.
+        port: Port to listen on; 0 for one that is free.
         browser: Whether to open the page in the default browser.
-        stop: Set where the program is to stop.
+        stop: Set when the program is to stop.
         say: Prints the address.
+        on_error: Called with what goes wrong in a page.
 
     Raises:
         UsageError: There is no such folder, or the port is in use.
     """
     if not folder.is_dir():
-        raise UsageError(f"{folder} is not a folder; name the one in which data sets and fits lie, or leave it out.")
-    with _listen(port) as listening:
-        bound, key = listening.getsockname()[1], secrets.token_urlsafe(_KEY_BYTES)
-        workbench = Workbench(folder, stop)
+        raise UsageError(f"{folder} is not a folder; name the one in which data sets and fits are, or leave it out.")
+    with _listen(port) as listening, scratch_folder() as scratch:
+        workbench = Workbench(folder, stop, scratch)
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         register_pages(workbench, application)
         ui.run_with(
             application, title="bowdenfit", dark=None, language="en-US", tailwind=False, show_welcome_message=False,
             reconnect_timeout=60.0,  # s; JAX loads slowly on a busy machine
         )  # fmt: skip
-        address = f"http://{HOST}:{bound}/?key={key}"
-        say(f"The app is open at {address}\nCtrl-C ends it.")
+        printed = {""}
+
+        def print_address(used: str = "", words: str = "To open the app in another browser:") -> None:
+            if used in printed:
+                printed.add(key := guard.new_key())
+                say(f"{words} {guard.address(key)}")
+
+        guard = Guard(application, listening.getsockname()[1], print_address, on_error)
+        nicegui_app.on_exception(on_error)
+        print_address(words="The app is open at")
+        say("This address opens it once. Ctrl-C ends the app.")
         if browser:
-            webbrowser.open(address)
+            open_browser(guard.address(guard.new_key()), scratch)
         try:
-            asyncio.run(_serve(Guard(application, bound, key), listening, stop))
+            asyncio.run(_serve(guard, listening, stop))
         finally:
             workbench.close()
+
+
+def open_browser(address: str, scratch: Path) -> None:
+    """Open an address in the default browser by a file that only this user can read.
+
+    The command line of a browser can be read by every user of this machine, and the address has a key.
+
+    Args:
+        address: The address.
+        scratch: Folder that only this user can read.
+    """
+    page = scratch / "open.html"
+    with open(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
+        file.write(entry_page(address))
+    threading.Thread(target=webbrowser.open, args=(page.as_uri(),), daemon=True).start()  # some browsers do not return
 
 
 def _listen(port: int) -> socket.socket:
@@ -69,8 +98,9 @@ def _listen(port: int) -> socket.socket:
 
 
 async def _serve(guarded: Guard, listening: socket.socket, stop: Event) -> None:
-    """Serve until it is stopped."""
-    config = uvicorn.Config(guarded, log_level="error", access_log=False, timeout_graceful_shutdown=1, server_header=False)
+    """Serve until it is stopped; libraries do not print, because each browser that waits no longer is an error to them."""
+    logging.getLogger("nicegui").setLevel(logging.CRITICAL)
+    config = uvicorn.Config(guarded, log_level="critical", access_log=False, timeout_graceful_shutdown=1, server_header=False)
     server = uvicorn.Server(config)
     serving = asyncio.create_task(server.serve([listening]))
     while not (stop.is_set() or serving.done()):

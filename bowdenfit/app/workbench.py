@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
@@ -15,14 +17,14 @@ from threading import Event
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import bowdenfit as bf
-from bowdenfit.app.draft import Draft
+from bowdenfit.app.draft import Draft, is_reserved
 from bowdenfit.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.inputs import refuse_special
 from bowdenfit.plots.write import PNG
 from bowdenfit.questions.figures import FIGURES, collect_figure_data, read_figure_data, warning_mark, write_figure_files
-from bowdenfit.results.folder import CHAIN
+from bowdenfit.results.folder import CHAIN, kept_file
 from bowdenfit.results.folder import FIGURES as FIGURES_FOLDER
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.words import shown
@@ -35,7 +37,6 @@ FITS = "fits"  # the folder in which the command line keeps them, too
 _HERE = "."  # the data set that the folder itself is
 _NAME = re.compile(r"[^\W_][\w .()+-]{0,79}")  # of folders that are made: no separator, no leading dot, one line
 _MOST_OPEN = 4  # fits that are kept in memory; a judgement
-_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 
 
 @dataclass(frozen=True)
@@ -64,21 +65,21 @@ class Workbench:
 
     Args:
         folder: Where data sets and fits lie.
-        stop: Set where the app is to end.
+        stop: Set when the app is to end.
+        scratch: Folder for temporary files, which goes with the app.
     """
 
-    def __init__(self, folder: Path, stop: Event) -> None:
-        self.folder, self.stop = folder.resolve(), stop
+    def __init__(self, folder: Path, stop: Event, scratch: Path) -> None:
+        self.folder, self.stop, self._scratch = folder.resolve(), stop, scratch
         self.jobs: dict[str, FitJob] = {}
         self.drafts: dict[str, Draft] = {}
         self.watched: dict[str, Watched] = {}
-        self._temporary = TemporaryDirectory(prefix="bowdenfit-", ignore_cleanup_errors=True)  # of drafts
         self._open: dict[str, tuple[int, Fit]] = {}
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="answers")  # one, as libraries of files are not made for more
 
     def new_draft(self) -> Draft:
         """Return a new data set that is to be brought."""
-        folder = Path(self._temporary.name) / token_hex(4)
+        folder = self._scratch / token_hex(4)
         folder.mkdir()
         draft = Draft(folder)
         self.drafts[draft.key] = draft
@@ -86,8 +87,15 @@ class Workbench:
 
     def data_sets(self) -> list[str]:
         """Return the data sets in the folder, by name."""
-        inside = [path.name for path in sorted(self.folder.iterdir()) if (path / DESCRIPTION_FILE).is_file()]
+        inside = [name for name in self._data_set_folders() if name.isprintable()]
         return [_HERE, *inside] if (self.folder / DESCRIPTION_FILE).is_file() else inside
+
+    def unnamed_data_sets(self) -> int:
+        """Number of data sets whose folder has a name that no address can have."""
+        return sum(not name.isprintable() for name in self._data_set_folders())
+
+    def _data_set_folders(self) -> list[str]:
+        return [path.name for path in sorted(self.folder.iterdir()) if (path / DESCRIPTION_FILE).is_file()]
 
     def data_set(self, name: str) -> Path:
         """Return the folder of a data set.
@@ -117,8 +125,8 @@ class Workbench:
     def fits(self) -> list[KeptFit]:
         """Return the fits that are kept, those that were interrupted among them."""
         place = self.folder / FITS
-        folders = sorted(path for path in place.iterdir() if path.is_dir()) if place.is_dir() else []
-        kept = [KeptFit(path.name, (path / FIT_FILE).is_file()) for path in folders]
+        folders = [path for path in sorted(place.iterdir()) if path.is_dir()] if place.is_dir() else []
+        kept = [KeptFit(path.name, (path / FIT_FILE).is_file()) for path in folders if path.name.isprintable()]
         return [fit for fit in kept if fit.finished or (place / fit.name / CHAIN).is_file()]
 
     def results(self, name: str) -> Path:
@@ -194,9 +202,8 @@ class Workbench:
         """
         if figure not in FIGURES:
             raise UsageError(f"there is no figure {shown(figure)}.")
-        drawing = self.results(name) / FIGURES_FOLDER / f"{figure}.png"
+        drawing = kept_file(self.results(name), FIGURES_FOLDER, f"{figure}.png")
         if drawing.is_file():
-            refuse_special(drawing)
             return drawing.read_bytes()
         data = (await self.figure_data(name)).get(figure)
         if data is None:
@@ -212,7 +219,6 @@ class Workbench:
         for bench in self.watched.values():
             bench.stop()
         self._thread.shutdown(wait=False, cancel_futures=True)
-        self._temporary.cleanup()
 
 
 def _checksum(path: Path) -> str:
@@ -242,5 +248,18 @@ def refuse_folder_name(name: str) -> None:
         UsageError: It has a separator, begins with a dot, is reserved on some systems, or is too long.
     """
     plain = name.strip()
-    if plain != name or not _NAME.fullmatch(name) or name.endswith((".", " ")) or name.partition(".")[0].lower() in _RESERVED:
+    if plain != name or not _NAME.fullmatch(name) or name.endswith((".", " ")) or is_reserved(name):
         raise UsageError(f"{shown(name)} cannot be the name of a folder; use letters, digits, blanks and - _ . ( ) +.")
+
+
+def refuse_module_name(name: str) -> None:
+    """Refuse a name that a new data set may not have, because Python started next to it would load the data set as a module.
+
+    Raises:
+        UsageError: It is the name of a module.
+    """
+    if name.isidentifier() and (name in sys.stdlib_module_names or find_spec(name) is not None):
+        raise UsageError(
+            f"{shown(name)} is also the name of a Python module, and a program started next to the folder could load it "
+            f"instead; use another name, such as {name}-cable."
+        )

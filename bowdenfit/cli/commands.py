@@ -2,6 +2,7 @@
 
 import json
 import os
+import traceback
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -30,7 +31,7 @@ from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_argumen
 from bowdenfit.cli.running import requested, watch_verb
 from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stages
 from bowdenfit.cli.terminal import say
-from bowdenfit.errors import UsageError
+from bowdenfit.errors import BowdenfitError, UsageError, describe_unforeseen, system_error
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import read_answers
 from bowdenfit.results.folder import FIT as FIT_FILE
@@ -338,7 +339,15 @@ def app(
         if error.name not in _OF_APP:
             raise
         raise UsageError("the app needs NiceGUI, which is not installed; install it: pip install 'bowdenfit[app]'.") from None
-    serve_app(folder, port, browser, requested, say)
+    serve_app(folder, port, browser, requested, say, _report_error)
+
+
+def _report_error(error: Exception) -> None:
+    """Print what went wrong in a page, while the app goes on."""
+    if os.environ.get("BOWDENFIT_DEBUG"):
+        traceback.print_exception(error)
+    known = error if isinstance(error, BowdenfitError) else system_error(error)
+    say(f"Error: {known or describe_unforeseen(error)}", err=True)
 
 
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -23,6 +23,7 @@ TOO_LARGE = "<p>This figure would make the page too large; it lies in the folder
 _PNG = b"\x89PNG\r\n\x1a\n"  # its first bytes; width and height follow in the first block
 _CSS_PIXELS = 0.6  # of a page for one of a figure: 96 in an inch for 160
 _COLUMN = 576  # px of a page, 6 in: wider figures take both columns of a printed page
+_NOTHING = "'none'"  # as policies write it
 _HERE, _MARK = Path(__file__).parent, "\0"  # which no text on a page has
 _STYLES = (_HERE / "page.css", _HERE / "uplot" / "uPlot.min.css")  # the second of charts alone
 
@@ -75,6 +76,19 @@ def page_assets() -> tuple[str, str]:
     return "\n".join(map(_read_text, _STYLES)), "\n".join(_load_scripts())
 
 
+def page_policy(scripts: Sequence[str] | None = None) -> str:
+    """Content security policy of a page: it requests nothing, and runs some scripts of ours alone.
+
+    Args:
+        scripts: The scripts; all that a page may have if omitted.
+    """
+    allowed = " ".join(f"'sha256-{_digest(script)}'" for script in (_load_scripts() if scripts is None else scripts))
+    return (
+        f"default-src 'none'; script-src {allowed or _NOTHING}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
 def _render_body(environment: Environment, section: PageSection) -> str:
     """A section, with marks about the places of its drawings."""
     return environment.from_string(_read_text(section.template)).render(section.context)
@@ -105,7 +119,7 @@ def _assemble(page: HtmlPage) -> str:
         bodies=[Markup(_render_body(environment, section)) for section in page.sections],  # noqa: S704
         style=Markup("\n".join(map(_read_text, styles))),  # noqa: S704  (ours)
         scripts=[Markup(script) for script in scripts],  # noqa: S704  (ours)
-        allowed=" ".join(f"'sha256-{_digest(script)}'" for script in scripts) or "'none'",
+        policy=Markup(page_policy(scripts)),  # noqa: S704  (ours)
     )
 
 

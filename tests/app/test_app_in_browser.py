@@ -82,7 +82,7 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
         page.get_by_role("button", name="Add 2 rows").click()
         page.get_by_role("heading", name="bench-1").wait_for()
         page.get_by_text("4 runs").wait_for()
-        page.goto(app.root)
+        page.goto(visit.root + "/")
         page.get_by_role("button", name="New data set").click()
         page.set_input_files("input[type=file]", sorted((DATASETS / "on-body-exoskeleton").iterdir()))
         page.get_by_label("Name of the folder").fill("brought")
@@ -100,7 +100,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
     results = folder / "fits" / "on-body"
     with visiting(chromium, app) as visit:
         page = visit.page
-        page.goto(f"{app.root}/fit/on-body")
+        page.goto(f"{visit.root}/fit/on-body")
         page.get_by_text("As the command line prints it").click()
         assert text_on(page, "#printed") == printed_by("summary", results).strip()
         page.locator("#arrives p").first.wait_for()
@@ -119,7 +119,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
         assert " ".join(advice) in " ".join(text_on(page, "#ranking").split())
         for name in ("efficiency", "pairs", "coefficients", "residuals", "loss"):
             page.locator(f"#figure-{name} .uplot").wait_for(state="attached")
-        answer = page.request.get(f"{app.root}/export/on-body/csv")
+        answer = page.request.get(f"{visit.root}/export/on-body/csv")
         printed_by("export", results, "--to", "csv", "--output", folder / "table.csv")
         assert answer.body() == (folder / "table.csv").read_bytes()
 
@@ -127,7 +127,7 @@ def test_every_number_of_a_fit_is_that_of_the_command_line(chromium, bench):
 @pytest.mark.extended
 def test_who_asks_without_the_key_or_from_elsewhere_gets_a_sentence(bench):
     _, app = bench
-    refused = (({}, "whole address"), ({"Host": "evil.example"}, "this machine alone"), ({"Origin": "http://a.b"}, "site"))
+    refused = (({}, "printed last"), ({"Host": "evil.example"}, "this machine alone"), ({"Origin": "http://a.b"}, "site"))
     for headers, words in refused:
         for path in ("/", "/kept/on-body/report.html", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
             with closing(http.client.HTTPConnection("127.0.0.1", app.port)) as connection:

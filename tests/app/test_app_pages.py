@@ -55,7 +55,7 @@ def test_a_cancelled_fit_and_one_of_a_killed_app_are_resumed(chromium, tmp_path)
     checkpoint = tmp_path / "fits" / "bench" / "chain.checkpoint"
     with served(tmp_path) as app, visiting(chromium, app) as visit:
         page = visit.page
-        page.goto(f"{app.root}/data/bench")
+        page.goto(f"{visit.root}/data/bench")
         page.get_by_role("button", name="Fit", exact=True).click()
         page.get_by_text("sampling with").wait_for(timeout=180_000)
         page.get_by_role("button", name="Cancel").click()
@@ -95,10 +95,10 @@ def test_two_tabs_show_the_same_and_every_page_can_be_read(chromium, tmp_path, q
         assert faults_of(page) == []
         other.goto(page.url)
         other.get_by_text("'many' is not a number").wait_for()
-        other.goto(f"{app.root}/fit/on-body")
+        other.goto(f"{visit.root}/fit/on-body")
         other.locator("#arrives p").first.wait_for()
         assert faults_of(other) == []
-        other.goto(f"{app.root}/fit/..%2F..")
+        other.goto(f"{visit.root}/fit/..%2F..")
         assert other.locator("[role=alert]").count() == 1 or "Not Found" in other.content()
         visit.console.remove("Failed to load resource: the server responded with a status of 404 (Not Found)")
 
@@ -115,7 +115,7 @@ def test_two_cables_stand_side_by_side_and_a_bench_is_watched(chromium, tmp_path
         assert "new minus worn" in page.inner_text("#comparison")
         assert "different (higher) with probability" in page.inner_text("#comparison")
         assert faults_of(page) == []
-        page.goto(f"{app.root}/live/worn")
+        page.goto(f"{visit.root}/live/worn")
         page.get_by_role("button", name="Watch the bench").click()
         page.get_by_text("5 mountings: mu").wait_for(timeout=180_000)
         mount(tmp_path / "worn", 0.70, 5)

@@ -9,6 +9,7 @@ from half_turn import TABLE, describe_half_turn
 import bowdenfit as bf
 from bowdenfit.app.brought_folder import put_in_place
 from bowdenfit.app.draft import Draft
+from bowdenfit.app.workbench import refuse_module_name
 from bowdenfit.errors import UsageError
 
 DATASETS = Path(__file__).parents[2] / "datasets"
@@ -31,15 +32,17 @@ def bring(draft, **contents):
 
 def test_a_shipped_data_set_that_is_chosen_file_by_file_is_written_as_it_is(draft, tmp_path):
     source = DATASETS / "on-body-exoskeleton"
-    for path in source.iterdir():
+    for path in [path for path in source.iterdir() if path.suffix != ".md"]:
         shutil.copyfile(path, draft.new_file(path.name))
+    with pytest.raises(UsageError, match="'README.md' is left out, because its extension"):
+        draft.new_file("README.md")
     understanding = draft.understand()
     assert understanding.refusals == ()
     assert understanding.report == str(bf.check(source))
     assert draft.proposed_name == bf.read(source).description.name.replace(" ", "-")
     draft.write(tmp_path / "kept")
     kept, brought = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (tmp_path / "kept", source))
-    assert kept == brought
+    assert kept == {name: content for name, content in brought.items() if name != "README.md"}
 
 
 def test_recordings_go_into_the_folder_that_their_cable_toml_names(draft):
@@ -84,9 +87,9 @@ def test_a_file_that_two_folders_could_hold_is_refused(draft):
 
 
 def test_a_file_that_is_called_like_a_folder_is_refused(draft):
-    draft.new_file("a").write_text("x")
-    (refusal,) = bring(draft, cable=describe_half_turn('files = "a/one.csv"'), one=TABLE).refusals
-    assert "names a folder 'a', which cannot be made" in refusal.sentence
+    draft.new_file("a.csv").write_text("x")
+    (refusal,) = bring(draft, cable=describe_half_turn('files = "a.csv/one.csv"'), one=TABLE).refusals
+    assert "names a folder 'a.csv', which cannot be made" in refusal.sentence
 
 
 def test_a_cell_that_cannot_be_read_is_shown_wherever_its_file_lies(draft):
@@ -100,3 +103,29 @@ def test_files_without_end_are_refused(draft):
         (draft.folder / f"{number}.csv").write_text("")
     with pytest.raises(UsageError, match="one file more than the 300"):
         draft.new_file("more.csv")
+
+
+@pytest.mark.parametrize("name", ["__init__.py", "numpy.py", "scipy.so", "x.pth", "metadata.yaml", "README.md", "a"])
+def test_a_file_that_is_not_measured_by_its_extension_is_left_out_with_the_reason(draft, name):
+    with pytest.raises(UsageError, match="left out, because its extension"):
+        draft.new_file(name)
+    assert draft.files == []
+
+
+def test_a_file_whose_content_is_not_what_its_extension_says_is_left_out_and_named(draft, tmp_path):
+    draft.new_file("program.csv").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(200))
+    understanding = bring(draft, cable=describe_half_turn('file = "one.csv"'), one=TABLE)
+    assert (understanding.refusals, understanding.left_out) == ((), ("program.csv",))
+    draft.write(tmp_path / "kept")
+    assert sorted(path.name for path in (tmp_path / "kept").iterdir()) == ["cable.toml", "one.csv"]
+
+
+@pytest.mark.parametrize("name", ["scipy", "h5py", "numpy", "json", "bowdenfit"])
+def test_a_data_set_may_not_have_the_name_of_a_module(name):
+    with pytest.raises(UsageError, match=f"'{name}' is also the name of a Python module.* such as {name}-cable"):
+        refuse_module_name(name)
+
+
+@pytest.mark.parametrize("name", ["my-cable", "bench 1", "knee", "Seil_3"])
+def test_usual_names_of_data_sets_are_taken(name):
+    refuse_module_name(name)

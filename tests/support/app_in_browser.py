@@ -1,62 +1,83 @@
 """The app in a process of its own, and a browser that may ask nobody else for anything."""
 
+import queue
 import re
 import subprocess
 import sys
+import threading
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 PATIENCE = 60_000  # ms; a machine with other work on it loads JAX slowly
 
 
-@dataclass
 class Served:
     """An app that runs.
 
     Args:
-        address: With the key, as it was printed.
-        process: Its process.
+        process: Its process, whose standard output and error are pipes.
     """
 
-    address: str
-    process: Any
+    def __init__(self, process: Any) -> None:
+        self.process, self.errors = process, list[str]()
+        self._addresses: queue.Queue[str] = queue.Queue()
+        readers = (self._listen, lambda: self.errors.extend(process.stderr))
+        self._readers = [threading.Thread(target=read, daemon=True) for read in readers]
+        for reader in self._readers:
+            reader.start()
+        self._next = self._addresses.get(timeout=PATIENCE / 1000)
+        self.port = urlsplit(self._next).port
 
-    @property
-    def root(self) -> str:
-        """The address without the key."""
-        return self.address.partition("?")[0].rstrip("/")
+    def close(self) -> None:
+        """End it."""
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        for reader, stream in zip(self._readers, (self.process.stdout, self.process.stderr), strict=True):
+            reader.join()
+            stream.close()
 
-    @property
-    def port(self) -> int:
-        """Its port."""
-        return int(self.root.rpartition(":")[2])
+    def _listen(self) -> None:
+        """Keep every address that is printed."""
+        for line in self.process.stdout:
+            if address := re.search(r"http\S+", line):
+                self._addresses.put(address[0])
+
+    def new_address(self) -> str:
+        """An address that opens the app, once."""
+        address, self._next = self._next or self._addresses.get(timeout=PATIENCE / 1000), ""
+        return address
 
 
 @contextmanager
-def served(folder: Path, *options: str):
+def served(folder: Path, *options: str, **settings: Any):
     """The app of a folder; killed at the end, if it has not ended."""
-    command = [sys.executable, "-m", "bowdenfit", "app", str(folder), "--no-browser", *options]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "bowdenfit", "app", str(folder), *(options or ("--no-browser",))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **settings)
+    app = Served(process)
     try:
-        line = process.stdout.readline()
-        assert "http" in line, process.stderr.read()
-        yield Served(re.search(r"http\S+", line)[0], process)
+        yield app
     finally:
-        process.terminate()
-        try:
-            process.communicate(timeout=20)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
+        app.close()
 
 
 @dataclass
 class Visit:
-    """A page, what it said on the console, and what it asked of others than the app."""
+    """A page, what it said on the console, and what it asked of others than the app.
+
+    Args:
+        page: The page.
+        root: Address of the start page in this browser, without a slash at its end.
+    """
 
     page: Any
+    root: str = ""
     console: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
 
@@ -73,7 +94,9 @@ def visiting(chromium, app: Served, width=1280, **settings):
     try:
         visit = Visit(context.new_page())
         watch(visit, visit.page, app)
-        visit.page.goto(app.address)
+        visit.page.goto(app.new_address())
+        visit.page.wait_for_url(re.compile(r"/[\w-]{20,}/$"))
+        visit.root = visit.page.url.rstrip("/")
         yield visit
         assert visit.faults() == [], visit.faults()
     finally:
@@ -84,6 +107,6 @@ def watch(visit, page, app):
     """Note what a page says on the console, and what it asks of others than the app."""
     page.on("console", lambda message: visit.console.append(message.text))
     page.on("pageerror", lambda error: visit.console.append(str(error)))
-    asked = ("data:", "blob:", app.root, app.root.replace("http", "ws"))
+    asked = ("data:", "blob:", f"http://127.0.0.1:{app.port}/", f"ws://127.0.0.1:{app.port}/")
     page.on("request", lambda request: request.url.startswith(asked) or visit.elsewhere.append(request.url))
     page.on("websocket", lambda socket: socket.url.startswith(asked) or visit.elsewhere.append(socket.url))

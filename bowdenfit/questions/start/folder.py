@@ -1,7 +1,7 @@
 """Write a new data set into a folder that exists whole or not at all."""
 
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -139,23 +139,24 @@ def write_example(name: str, folder: Path, with_notebook: bool = False) -> None:
             write_notebook(place)
 
 
-def copy_data_set(source: Path, folder: Path) -> None:
+def copy_data_set(source: Path, folder: Path, left_out: Collection[str] = ()) -> None:
     """Copy a data set as it is.
 
     Args:
         source: Its folder.
         folder: The new one.
+        left_out: Names of files that are not copied.
 
     Raises:
         UsageError, StoreError: See `new_folder`.
     """
     with new_folder(folder) as place:
-        _copy_files(source, place)
+        _copy_files(source, place, left_out)
 
 
-def _copy_files(source: Path, place: Path) -> None:
-    """Copy all that lies in a folder; `shutil.copytree` hides what the system says."""
-    for file in sorted(source.rglob("*")):
+def _copy_files(source: Path, place: Path, left_out: Collection[str] = ()) -> None:
+    """Copy the files in a folder; `shutil.copytree` hides what the system says."""
+    for file in [file for file in sorted(source.rglob("*")) if file.is_dir() or file.name not in left_out]:
         copy = place / file.relative_to(source)
         copy.mkdir() if file.is_dir() else shutil.copyfile(file, copy)
 

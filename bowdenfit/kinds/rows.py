@@ -1,6 +1,7 @@
 """Rows of tables as people write them: route value, wrap angles, stroke, forces at both ends; read, and written to files."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -27,6 +28,8 @@ _DIGITS = 5  # significant digits of the largest value of a written column; a ju
 STROKE_NAMES = {1: "pull", -1: "return"}
 Stroke = Literal["pull", "return"]
 _SIGNS = {name: sign for sign, name in STROKE_NAMES.items()}
+_WHOLE_NUMBER = re.compile(r"([+\-−]?)0*(\d{1,15})(?:[.,]0*)?")
+_LEADING_SIGNS = re.compile(r"[\W_]+")
 
 
 @dataclass(frozen=True)
@@ -192,6 +195,48 @@ def number_names(names: Sequence[str]) -> tuple[Labels, tuple[str, ...]]:
     """Return the number of each name among those that differ, in the order in which they come, and these."""
     numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
     return np.array([numbers[name] for name in names], dtype=int), tuple(numbers)
+
+
+def read_labels(cells: Sequence[Cell], if_blank: str) -> list[str]:
+    """Return the label of every row, such as the name of its run; see `unify_labels`.
+
+    Raises:
+        DatasetError: Two labels may be the same.
+    """
+    places = [f"row {cell.row}" for cell in cells]
+    where = f"{cells[0].file}, column {shown(cells[0].column)}" if cells else ""
+    return unify_labels([cell.text.strip() or if_blank for cell in cells], places, where)
+
+
+def unify_labels(labels: Sequence[str], places: Sequence[str], where: str) -> list[str]:
+    """Return labels with whole numbers that are written differently, such as 7, 7.0 and +7, as they are written first.
+
+    Args:
+        labels: What stands in each place.
+        places: Each in words.
+        where: Where all of them are.
+
+    Raises:
+        DatasetError: A label is another one behind a sign, as #11 is 11.
+    """
+    keys = [label_key(label) for label in labels]
+    first = {key: i for i, key in reversed(list(enumerate(keys)))}
+    for key, i in first.items():
+        sign = None if _WHOLE_NUMBER.fullmatch(key) else _LEADING_SIGNS.match(key)
+        other = first.get(label_key(key[sign.end() :])) if sign else None
+        if other is not None:
+            raise DatasetError(
+                f"{where}: {shown(labels[i])} in {places[i]} and {shown(labels[other])} in {places[other]} are two labels that "
+                "may mean the same; the usual cause is that one of them was typed differently. Write them alike if they are "
+                "one mounting of the cable, or call one of them by another name."
+            )
+    return [labels[first[key]] for key in keys]
+
+
+def label_key(label: str) -> str:
+    """Return what equal labels share: a whole number without plus, leading zeros and decimals, or the label itself."""
+    number = _WHOLE_NUMBER.fullmatch(label)
+    return f"{'' if number[1] in ('', '+') else '-'}{number[2]}" if number else label
 
 
 def origin_of_rows(table: RawTable) -> RowOrigin:

@@ -22,6 +22,7 @@ from bowdenfit.kinds.rows import (
     check_spelling,
     number_names,
     origin_of_rows,
+    read_labels,
     read_own_angles,
     read_route,
     shared_columns,
@@ -131,7 +132,7 @@ def _check_strokes(strokes: Labels, columns: Mapping[str, Column]) -> Labels | N
 
 def _assign_runs(column: Column | None, route: Vector, own: OwnAngles) -> tuple[Labels, tuple[str, ...]]:
     """Return the run of each row and the names of runs: one label at one route value and one set of wrap angles."""
-    labels = [cell.text.strip() or "(no run)" for cell in column.cells] if column is not None else [""] * len(route)
+    labels = read_labels(column.cells, "(no run)") if column is not None else [""] * len(route)
     conditions = [
         ", ".join(
             [f"{at:.5g}"] * bool(np.isfinite(at)) + [f"{angle:.5g} deg" for angle in angles if np.isfinite(angle)]

@@ -32,6 +32,7 @@ from bowdenfit.kinds.rows import (
     OwnAngles,
     RowOrigin,
     origin_of_rows,
+    read_labels,
     read_own_angles,
     read_route,
     route_cells,
@@ -212,8 +213,8 @@ def _refuse_shared_runs(labels: Sequence[Cell], table: EfficiencyTable) -> None:
     """
     conditions = np.nan_to_num(np.column_stack([table.route, table.own.angle]))
     first: dict[tuple[object, ...], Cell] = {}
-    for cell, condition in zip(labels, conditions, strict=True):
-        before = first.setdefault((cell.text.strip(), *condition), cell)
+    for cell, label, condition in zip(labels, read_labels(labels, ""), conditions, strict=True):
+        before = first.setdefault((label, *condition), cell)
         if before is not cell:
             raise cell.refuse(
                 f"run {cell.shown} has an efficiency in row {before.row} too. Efficiencies of one run (one mounting of the "

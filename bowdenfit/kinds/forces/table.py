@@ -1,5 +1,6 @@
 """Pairs of forces read at both ends of a cable, in runs: one run is one mounting."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,8 +37,10 @@ from bowdenfit.kinds.rows import (
     RowOrigin,
     convert_to_forces,
     find_end_column,
+    label_key,
     number_names,
     origin_of_rows,
+    read_labels,
     read_own_angles,
     read_route,
     shared_columns,
@@ -46,7 +49,7 @@ from bowdenfit.kinds.strokes import read_strokes_by_loss
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.units import INTERNAL_UNITS, speed_dimension
-from bowdenfit.words import listed
+from bowdenfit.words import few, listed
 
 # How readings fall together at loads: judgements, which a sentence and the guess of a file's kind rest on, and no fit.
 _MOST_LOADS = 25  # loads that are counted
@@ -149,6 +152,8 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
     )
     remarks = dict.fromkeys(remark for _, file_remarks, _ in parts for remark in file_remarks)
     remarks |= dict.fromkeys(_remark_on_missing_noise(merged))
+    if source.settings.run != "each row":
+        remarks |= dict.fromkeys(_remark_on_labels_of_several_files(tables))
     accounts = tuple(account for *_, account in parts)
     return TableFromFiles(merged, {source.name_of(path): path for path in paths}, tuple(remarks), accounts)
 
@@ -168,6 +173,19 @@ def _remark_on_missing_noise(table: ForceTable) -> list[str]:
         f"{listed(table.origin.files)}: all loads of a run and stroke lose the same share of the force to within "
         f"{NO_NOISE:.0e} of it, finer than any load cell reads. The usual cause is that these forces were computed, by a "
         "simulation or a spreadsheet; their intervals have almost no width. Fit what was read on a bench."
+    ]
+
+
+def _remark_on_labels_of_several_files(tables: Sequence[ForceTable]) -> list[str]:
+    """Return a remark on labels of runs that several files have, each of which is a mounting of its own in each file."""
+    files = Counter(key for table in tables for key in {label_key(name) for name in table.run_names})
+    again = [key for key, count in files.items() if count > 1]
+    if not again:
+        return []
+    return [
+        f"runs are counted file by file: {few(again)} {'is' if len(again) == 1 else 'are'} in several of the "
+        f"{len(tables)} files of forces, and each file's is taken as a mounting of its own. If the cable stayed mounted from "
+        "one file to the next, put its rows into one file."
     ]
 
 
@@ -253,7 +271,7 @@ def _assign_runs(
             f"{' and of one group' if group else ''} are taken as one run (one mounting of the cable); where each row had a "
             'mounting of its own, write run = "each row" beside the file in cable.toml.'
         ]  # fmt: skip
-    labels = [cell.text.strip() or "(no run)" for cell in column.cells]
+    labels = read_labels(column.cells, "(no run)")
     if how != "at one length":
         return *number_names(labels), []
     run, distinct = find_mountings(labels, group, route, own, limits)

@@ -16,7 +16,7 @@ from bowdenfit.files.missing_codes import MissingCodes
 from bowdenfit.files.row_account import RowAccount
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.recordings.locations import locate_by_channels, location_names, parse_file_name
-from bowdenfit.kinds.rows import OwnAngles, RowConditions
+from bowdenfit.kinds.rows import OwnAngles, RowConditions, unify_labels
 from bowdenfit.kinds.table_files import Source, TableFromFiles
 from bowdenfit.recordings.angle_channels import refuse_other_angle
 from bowdenfit.recordings.forces import to_recording
@@ -178,6 +178,9 @@ def _list_entries(source: Source) -> list[tuple[Path, RecordingFile]]:
         refuse_special(path)
         if path.resolve() not in named:
             entries.append((path, parse_file_name(description, source.settings.pattern, path, source.name_of(path))))
+    labels, files = [entry.run or "" for _, entry in entries], [path.name for path, _ in entries]
+    runs_of_files = zip(entries, unify_labels(labels, files, "runs of recordings"), strict=True)
+    entries = [(path, entry.model_copy(update={"run": run or None})) for (path, entry), run in runs_of_files]
     runs = Counter(entry.run for _, entry in entries if not entry.name)
     return [(path, _name_within_run(path, entry) if runs[entry.run] > 1 else entry) for path, entry in entries]
 

@@ -16,7 +16,7 @@ from bowdenfit.errors import DatasetError
 from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.kind import Kind, Readings
-from bowdenfit.kinds.rows import FileRows, RowOrigin, number_names, origin_of_rows
+from bowdenfit.kinds.rows import FileRows, RowOrigin, number_names, origin_of_rows, read_labels
 from bowdenfit.kinds.table_files import RUN, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.types import Labels, Vector
@@ -116,7 +116,7 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
 def _read_runs(columns: Mapping[str, Column], n: int) -> tuple[Labels, tuple[str, ...]]:
     if "run" not in columns:
         return np.zeros(n, dtype=int), ("",)
-    return number_names([cell.text.strip() for cell in columns["run"].cells])
+    return number_names(read_labels(columns["run"].cells, ""))
 
 
 def _find_release(clock: Column, file: str, name: str, in_run: np.ndarray, time: Vector, added: Vector) -> tuple[float, float]:

@@ -25,6 +25,7 @@ from bowdenfit.kinds.rows import (
     number_names,
     origin_of_rows,
     read_angle,
+    read_labels,
     read_tension,
 )
 from bowdenfit.kinds.table_files import InitQuestions, Source, TableFromFiles, WantedColumn
@@ -116,7 +117,7 @@ def _read_branch(cell: Cell) -> bool:
 
 def _assign_cycles(column: Column | None, wrap_angle: Vector) -> tuple[Labels, tuple[str, ...]]:
     """Return the cycle of each row and the names of cycles: one name at one wrap angle."""
-    names = [cell.text.strip() or "(no cycle)" for cell in column.cells] if column else [""] * len(wrap_angle)
+    names = read_labels(column.cells, "(no cycle)") if column else [""] * len(wrap_angle)
     return number_names(
         [
             f"{name + ', ' if name else ''}{np.rad2deg(angle):.4g} deg"

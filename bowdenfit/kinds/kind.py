@@ -36,6 +36,7 @@ from bowdenfit.description.file import Stated
 from bowdenfit.description.values import Frozen
 from bowdenfit.errors import DatasetError, Faults
 from bowdenfit.kinds.bench_error import BenchError
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import CoarseReadings
 from bowdenfit.kinds.rows import FileRows, ForceRows, Rows
 from bowdenfit.kinds.table_files import AnyTable, InitQuestions, Source, TableFromFiles
@@ -175,6 +176,10 @@ class Kind(ABC, Generic[AnyTable]):
     def coarse_readings(self, table: AnyTable) -> CoarseReadings | None:
         """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
         return None
+
+    def measured_columns(self, table: AnyTable) -> list[MeasuredColumn]:
+        """Return the columns that a table's instruments filled, in which readings may be cut off or far from all others."""
+        return []
 
     def with_bench_error(self, table: AnyTable, error: BenchError) -> AnyTable:
         """Return the table as a bench with another systematic error would have given it; the same where it shows none."""

@@ -78,7 +78,7 @@ def _is_calculated(numbers: Vector, reading: Vector) -> bool:
     columns = np.column_stack([np.ones(len(numbers)), reading])
     left = np.max(np.abs(numbers - columns @ np.linalg.lstsq(columns, numbers, rcond=None)[0]))
     rounded = min(float(np.max(np.abs(numbers - scale * reading))) for scale in (1.0, 100.0))
-    half_a_digit = 0.51 * _last_digit(np.abs(numbers[numbers != 0]))
+    half_a_digit = 0.51 * find_last_digit(np.abs(numbers[numbers != 0]))
     return bool(left <= _CALCULATED * np.ptp(numbers) or rounded <= half_a_digit)
 
 
@@ -266,13 +266,13 @@ def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " 
         if freedom < _LEAST_FREEDOM or len(values) < 2:
             continue
         scatter = np.sqrt(squares / freedom)
-        last_digit = _step_of_display(values)
+        last_digit = find_display_step(values)
         if scatter > max(_FINE * last_digit, NO_NOISE * np.sqrt(np.mean(values**2))):
             probabilities[c] = last_digit / (2 * np.sqrt(np.pi) * scatter)
     return probabilities
 
 
-def _step_of_display(values: Vector) -> float:
+def find_display_step(values: Vector) -> float:
     """Return the step in which a display or converter counts: the largest of which all values may be rounded multiples.
 
     A converter with steps of 0.0488 N shows 0.049, 0.098 and 0.146 N. Where there are too few values to see its steps, the
@@ -281,7 +281,7 @@ def _step_of_display(values: Vector) -> float:
     Args:
         values: Different values, in increasing order.
     """
-    smallest, last_digit = float(np.diff(values).min()), _last_digit(np.abs(values[values != 0]))
+    smallest, last_digit = float(np.diff(values).min()), find_last_digit(np.abs(values[values != 0]))
     if last_digit == 0 or len(values) < _FEWEST_VALUES:
         return smallest
     some = values[:: max(len(values) // _MOST_VALUES, 1)][:_MOST_VALUES]
@@ -343,14 +343,14 @@ def find_coarse_readings(
     different = np.unique(np.column_stack([settings, read]), axis=0)[:, -1]
     if len(different) > len(conditions) or len(read) - len(conditions) < _LEAST_AGAIN:
         return None
-    last_digit = _last_digit(read)
+    last_digit = find_last_digit(read)
     if last_digit == 0:
         return None
     log_sd = float(np.sqrt(np.mean((last_digit / different) ** 2) / 12))
     return CoarseReadings(file, f"{last_digit:g} {unit}".strip(), last_digit / 12**0.5, len(different), log_sd)
 
 
-def _last_digit(values: Vector) -> float:
+def find_last_digit(values: Vector) -> float:
     """Return the largest power of ten of which all values are multiples; 0 if there is none that a display would show."""
     for power in _POWERS:
         if 10.0**power < NO_NOISE * values.max():

@@ -14,6 +14,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
     LARGEST_ANGLE,
@@ -130,6 +131,13 @@ class AngleKind(PlannedKind[AngleTable]):
     @override
     def copied_readings(self, table: AngleTable) -> list[str]:
         return describe_copies(compare_without_runs(table.origin, table.route, table.angle, table.route))
+
+    @override
+    def measured_columns(self, table: AngleTable) -> list[MeasuredColumn]:
+        return [
+            MeasuredColumn(name, "deg", np.rad2deg(angle), table.route)
+            for name, angle in zip(table.names, table.angle.T, strict=True)
+        ]
 
     @override
     def with_bench_error(self, table: AngleTable, error: BenchError) -> AngleTable:

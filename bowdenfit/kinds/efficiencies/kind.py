@@ -18,6 +18,7 @@ from bowdenfit.files.columns import (
 )
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, efficiency_readings
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import (
     GAIN_ERROR,
     CoarseReadings,
@@ -156,6 +157,10 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
             return None
         settings = np.column_stack([table.route, table.own.angle])
         return find_coarse_readings(listed(table.origin.files), settings, table.efficiency)
+
+    @override
+    def measured_columns(self, table: EfficiencyTable) -> list[MeasuredColumn]:
+        return [MeasuredColumn("efficiency", "", table.efficiency, route_or_wrap_angle(table))]
 
     @override
     def with_bench_error(self, table: EfficiencyTable, error: BenchError) -> EfficiencyTable:

@@ -16,6 +16,7 @@ from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.stated_noise import describe_scatter, log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, efficiency_readings
+from bowdenfit.kinds.measured_columns import MeasuredColumn, pair_forces
 from bowdenfit.kinds.plausibility import (
     SCATTER,
     CoarseReadings,
@@ -195,6 +196,10 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         stroke = table.stroke.astype(float)
         settings = np.column_stack([table.route, table.own.angle, stroke, table.input_force])
         return find_coarse_readings(listed(table.origin.files), settings, table.output_force, "N")
+
+    @override
+    def measured_columns(self, table: ForceTable) -> list[MeasuredColumn]:
+        return pair_forces(table.input_force, table.output_force, 3 * table.run + table.stroke)
 
     @override
     def with_bench_error(self, table: ForceTable, error: BenchError) -> ForceTable:

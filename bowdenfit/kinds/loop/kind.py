@@ -16,6 +16,7 @@ from bowdenfit.files.headings import meanings
 from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.measured_columns import MeasuredColumn, pair_forces
 from bowdenfit.kinds.plausibility import HIGHEST, LOWEST, compare_without_runs, describe_copies
 from bowdenfit.kinds.rows import (
     ENDS,
@@ -40,7 +41,7 @@ from bowdenfit.kinds.rows import (
 from bowdenfit.kinds.strokes import read_strokes
 from bowdenfit.kinds.table_files import STROKE, InitQuestions, Source, TableFromFiles, WantedColumn
 from bowdenfit.kinds.tables import LoopTable, Measurements, PreloadTable, StretchTable
-from bowdenfit.types import Vector
+from bowdenfit.types import Labels, Matrix, Vector
 from bowdenfit.words import counted, shown
 
 _UNUSED = ("time", "position", "run")  # columns that such a table may have and that nothing reads
@@ -196,12 +197,15 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
 
     @override
     def copied_readings(self, table: LoopTable) -> list[str]:
-        settings = np.column_stack([table.route, table.own.angle, table.preload])
-        _, setting = np.unique(np.nan_to_num(settings, nan=-1.0), axis=0, return_inverse=True)
+        settings, setting = _number_settings(table)
         forces = np.column_stack([table.input_force, table.output_force])
         return describe_copies(
             compare_without_runs(table.origin, settings, forces, table.input_force, 3 * setting + table.stroke)
         )
+
+    @override
+    def measured_columns(self, table: LoopTable) -> list[MeasuredColumn]:
+        return pair_forces(table.input_force, table.output_force, 3 * _number_settings(table)[1] + table.stroke)
 
     @override
     def with_bench_error(self, table: LoopTable, error: BenchError) -> LoopTable:
@@ -275,3 +279,9 @@ def _check_loss(table: RawTable, made: LoopTable) -> None:
             f"{made.origin.row[worst]} (input {made.input_force[worst]:.4g} N, output {made.output_force[worst]:.4g} N); the "
             "usual cause is that input and output columns, or pull and return, were swapped."
         )
+
+
+def _number_settings(table: LoopTable) -> tuple[Matrix, Labels]:
+    """Return under what each row was read, but for the forces, and the number of its setting."""
+    settings = np.column_stack([table.route, table.own.angle, table.preload])
+    return settings, np.unique(np.nan_to_num(settings, nan=-1.0), axis=0, return_inverse=True)[1].ravel()

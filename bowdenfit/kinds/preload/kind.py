@@ -10,6 +10,7 @@ from bowdenfit.description.values import Frozen
 from bowdenfit.files.columns import Quantity, require_column
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import is_within_factor
 from bowdenfit.kinds.rows import (
     FileRows,
@@ -120,6 +121,10 @@ class PreloadKind(RopeKind[PreloadTable], PlannedKind[PreloadTable]):
                 "stiffness, bedding-in and lengthening by themselves will rest on their priors."
             )
         return warnings
+
+    @override
+    def measured_columns(self, table: PreloadTable) -> list[MeasuredColumn]:
+        return [MeasuredColumn("preload", "N", table.preload, table.wrap_angle)]
 
     @override
     def with_bench_error(self, table: PreloadTable, error: BenchError) -> PreloadTable:

@@ -12,6 +12,7 @@ from bowdenfit.frames import Frame
 from bowdenfit.kinds import iterate_tables
 from bowdenfit.kinds.descriptions import order_groups
 from bowdenfit.kinds.kind import FrictionKind
+from bowdenfit.kinds.measured_columns import describe_cut_off
 from bowdenfit.kinds.tables import Measurements, StretchTable
 from bowdenfit.questions import check as room
 from bowdenfit.reading import Reading, read
@@ -117,7 +118,7 @@ def _groups_note(dataset: Dataset, coefficient: str) -> str:
 def collect_warnings(dataset: Dataset) -> list[str]:
     """Return warnings about what the measurements cannot determine, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = list(describe_copied_readings(dataset))
+    warnings = [*describe_copied_readings(dataset), *describe_cut_off_readings(dataset)]
     free = [
         n
         for n in description.coefficients
@@ -152,6 +153,22 @@ def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
         "that was pasted or exported twice, or a run that was copied and not measured. Copies count as measurements, so that "
         "intervals are too narrow: leave them out, or put in what was measured."
         for sentence in copies
+    )
+
+
+def describe_cut_off_readings(dataset: Dataset) -> tuple[str, ...]:
+    """Describe readings that are equal because a range ended there, with a remedy; recordings leave such samples out."""
+    cut_off = [
+        sentence
+        for kind, table in iterate_tables(dataset.measurements)
+        for column in kind.measured_columns(table)
+        if (sentence := describe_cut_off(column, table.origin))
+    ]
+    return tuple(
+        f"{sentence}. The usual cause is the end of an instrument's range, or a limit in a spreadsheet, at which readings were "
+        "cut off; taken as they are, they bias the fit. Leave these readings out, or repeat them with an "
+        "instrument that reaches further; if they really are equal, record one more digit."
+        for sentence in cut_off
     )
 
 

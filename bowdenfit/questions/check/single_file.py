@@ -35,6 +35,7 @@ from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.questions.check.data_set_words import (
     check_data_set,
     describe_copied_readings,
+    describe_cut_off_readings,
     describe_first_and_last_rows,
     describe_row_account,
 )
@@ -253,7 +254,8 @@ def describe_table_file(
     lines += ["", *describe_row_account(account)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
-        lines += [filled(f"Warning: {sentence}") for sentence in describe_copied_readings(data)]
+        faults = (*describe_copied_readings(data), *describe_cut_off_readings(data))
+        lines += [filled(f"Warning: {sentence}") for sentence in faults]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
     return "\n".join([*lines, "", *describe_commands(commands, usable)]) + "\n"

@@ -32,6 +32,7 @@ from bowdenfit.questions.summary.verdict import (
     COARSE,
     CONTRADICTORY,
     COPIED,
+    CUT_OFF,
     IMPOSSIBLE,
     NOT_CONVERGED,
     NOT_DESCRIBED,
@@ -109,6 +110,7 @@ def _problem_headline(fit_verdict: Verdict) -> str:
         CONTRADICTORY: "CONTRADICTORY MEASUREMENTS",
         IMPOSSIBLE: "IMPOSSIBLE READINGS",
         COPIED: "COPIED READINGS",
+        CUT_OFF: "READINGS CUT OFF",
         COARSE: "READINGS TOO COARSE",
         NOT_DESCRIBED: "THE MODEL DOES NOT DESCRIBE THESE READINGS",
     }

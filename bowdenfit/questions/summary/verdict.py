@@ -9,7 +9,7 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import check_readings
-from bowdenfit.questions.check.data_set_words import describe_copied_readings
+from bowdenfit.questions.check.data_set_words import describe_copied_readings, describe_cut_off_readings
 from bowdenfit.questions.check.implausible_readings import (
     describe_coarse_readings,
     describe_implausible_friction,
@@ -28,6 +28,7 @@ from bowdenfit.words import decimals, few, filled, listed
 NOT_CONVERGED, CONTRADICTORY = "not converged", "contradictory"
 IMPOSSIBLE, NOT_DESCRIBED = "made of impossible readings", "not a description of its readings"
 COPIED, COARSE = "made of copied readings", "finer than its readings"
+CUT_OFF = "made of cut-off readings"
 
 
 _PROBLEMS = {
@@ -35,6 +36,7 @@ _PROBLEMS = {
     CONTRADICTORY: "the measurements contradict each other",
     IMPOSSIBLE: "some of the readings are physically impossible",
     COPIED: "some of the readings are copies of others",
+    CUT_OFF: "some of the readings are cut off where a range ends",
     COARSE: "the readings are too coarse for such intervals",
     NOT_DESCRIBED: "the model does not describe these readings",
     NOT_IDENTIFIABLE: "the measurements do not determine every coefficient",
@@ -67,7 +69,7 @@ class Verdict(Display):
 
     Args:
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
-            `NOT_DESCRIBED`, `COPIED`, `COARSE`; each with sentences.
+            `NOT_DESCRIBED`, `COPIED`, `CUT_OFF`, `COARSE`; each with sentences.
         sampled: Whether there are draws.
         doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
@@ -100,6 +102,7 @@ def assess_fit(fit: Record) -> Verdict:
         CONTRADICTORY: _sentences(describe_contradiction(fit)),
         IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
         COPIED: copies,
+        CUT_OFF: describe_cut_off_readings(fit.dataset),
         COARSE: describe_coarse_readings(fit),
         NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
     }

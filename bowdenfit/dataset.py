@@ -27,6 +27,7 @@ from bowdenfit.kinds.descriptions import (
     parse_description,
 )
 from bowdenfit.kinds.fit_command import WRAP_ANGLE, has_own_angles, require_one_kind, require_recordings
+from bowdenfit.kinds.measured_columns import refuse_far_forces
 from bowdenfit.kinds.table_files import Source
 from bowdenfit.kinds.tables import Measurements
 from bowdenfit.recordings.named_channels import parse_channels
@@ -231,6 +232,8 @@ def read_dataset(
         order_groups(description, measurements)
     for kind, table in iterate_tables(measurements):
         with faults.collect():
+            if columns := kind.measured_columns(table):
+                refuse_far_forces(columns, table.origin)
             kind.check(table, description, measurements)
     faults.refuse()
     return Dataset(description, measurements, checksums, accounts)

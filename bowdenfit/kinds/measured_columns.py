@@ -1,4 +1,4 @@
-"""Columns of measured numbers: values cut off at the end of a range.
+"""Columns of measured numbers: values cut off at the end of a range, and forces that lie orders of magnitude from all others.
 
 A reading beyond the end of a range is written as that end, so that several readings are equal where those around them are
 not. Set points, coarse displays, readings of nothing and the flat top of a bell give equal values too. Equal values are
@@ -7,11 +7,13 @@ around them say that they would lie beyond it: along a length or bend, neighbors
 drop off at once; of forces, the other end of the rope shows that the load went on rising.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import erf, gcd
 
 import numpy as np
 
+from bowdenfit.errors import DatasetError, combine_errors
 from bowdenfit.kinds.plausibility import find_display_step, find_last_digit
 from bowdenfit.kinds.rows import RowOrigin
 from bowdenfit.types import Flags, Labels, Positions, Vector
@@ -27,6 +29,10 @@ _CONVERTER, _FEWEST_STEPS = 6.0, 8  # last digits of a step, and values, from wh
 _NEAREST, _STEP_DOWN = 2.5, 5.0  # last digits that the reading beside equal ones lies off them, and the mean of the nearest two
 _SDS = 3.0  # standard deviations by which a force is expected beyond its equal values
 _BEYOND = 0.05  # least logarithm of the same, since friction may change with the load
+# Judgements about forces that are far from all others.
+_ONE_SIDED = 100.0  # factor on the ratio of the two ends of other rows; no rope that loses 99 % is measured
+_ALONE = 5000.0  # factor from the next smaller force; of loads between 1 N and 10 kN others lie between
+_FEWEST_FORCES = 4  # of a column, from which one may be far
 
 
 @dataclass(frozen=True)
@@ -150,3 +156,42 @@ def _cut_off_forces(values: Vector, other: Vector, groups: Labels, tied: Flags, 
     scatter = float(np.sqrt(np.mean((log_ratio - expected)[free] ** 2))) if free.any() else np.inf
     beyond = held & (sign * (expected - log_ratio) > max(_SDS * scatter, _BEYOND))
     return np.flatnonzero(tied) if beyond.sum() >= max(_FEWEST, tied.sum() / 2) else np.zeros(0, dtype=int)
+
+
+def refuse_far_forces(columns: Sequence[MeasuredColumn], origin: RowOrigin) -> None:
+    """Refuse a force that lies orders of magnitude above the others of its column.
+
+    Where both ends were read, by the ratio of the two, which no load changes as much; where all of a row is too large, and of
+    forces that were read alone, by the next smaller force.
+
+    Raises:
+        DatasetError: Names its row, column and value, the usual cause and what to do.
+    """
+    faults = list[DatasetError]()
+    for column in columns:
+        for row in np.flatnonzero(_is_far(column)).tolist():
+            value, typical = column.values[row], float(np.median(column.values[column.values > 0]))
+            usual = "the usual cause is a missing decimal point or a wrong unit; correct the cell, or leave the row out."
+            fault = DatasetError(
+                f"{origin.describe_row(row)}, column {column.name!r}: {value:.6g} {column.unit} is far from the other forces, "
+                f"half of which are at most {typical:.3g} {column.unit}; {usual}"
+            )
+            fault.fault_key, fault.row = (origin.files[origin.file[row]], column.name, usual), int(origin.row[row])
+            faults.append(fault)
+    if faults:
+        raise combine_errors(faults)
+
+
+def _is_far(column: MeasuredColumn) -> Flags:
+    """Flag forces that are far above the others; see `refuse_far_forces`."""
+    values = np.where(column.values > 0, column.values, np.nan)
+    far = np.zeros(len(values), dtype=bool)
+    if column.along is not None or np.isfinite(values).sum() < _FEWEST_FORCES:
+        return far
+    below, largest = np.sort(values[np.isfinite(values)])[-2:]
+    far |= (values == largest) & (largest > _ALONE * below)
+    if column.other_end is not None:
+        ratio = values / np.where(column.other_end > 0, column.other_end, np.nan)
+        lost = np.nanmedian(np.maximum(ratio, 1 / ratio))
+        far |= (ratio > _ONE_SIDED * lost) & (values > _ONE_SIDED * np.nanmedian(values))
+    return far

@@ -15,6 +15,7 @@ from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.displacement.reader import find_early_rows, read_displacement
 from bowdenfit.kinds.displacement.table import DisplacementSettings, DisplacementTable, follow_motor
 from bowdenfit.kinds.kind import Design, FrictionTableKind, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor
 from bowdenfit.kinds.rows import (
     FileRows,
@@ -138,6 +139,10 @@ class DisplacementKind(
     @override
     def warnings(self, table: DisplacementTable, description: Description, measurements: Measurements) -> list[str]:
         return list(_warnings(table, description))
+
+    @override
+    def measured_columns(self, table: DisplacementTable) -> list[MeasuredColumn]:
+        return [MeasuredColumn("force", "N", table.force)]
 
     @override
     def copied_readings(self, table: DisplacementTable) -> list[str]:

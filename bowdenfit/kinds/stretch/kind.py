@@ -14,6 +14,7 @@ from bowdenfit.files.columns import Column, Quantity, require_column
 from bowdenfit.files.tables import RawTable
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.kind import Design, PlannedKind, Readings, RopeKind
+from bowdenfit.kinds.measured_columns import MeasuredColumn
 from bowdenfit.kinds.plausibility import ComparedReadings, describe_copies, is_within_factor, split_by_group
 from bowdenfit.kinds.rows import (
     FileRows,
@@ -258,6 +259,10 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
         return describe_copies(
             ComparedReadings(listed(table.origin.files), table.cycle, names, settings, read, table.load, curve, table.origin)
         )
+
+    @override
+    def measured_columns(self, table: StretchTable) -> list[MeasuredColumn]:
+        return [MeasuredColumn("load", "N", table.load)]
 
     @override
     def with_bench_error(self, table: StretchTable, error: BenchError) -> StretchTable:

@@ -1,8 +1,10 @@
 """A data set that is being brought: its files, what they say, what is asked, and what `check` says of all that."""
 
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 
 from bowdenfit.app.brought_folder import lay_flat, put_in_place
@@ -144,7 +146,8 @@ class Draft:
     def proposed_name(self) -> str:
         """What its folder may be called: after its cable, or after its first file."""
         name = self.cable if self.is_described else Path(self.files[0].name).stem
-        return "-".join(name.split()) or "my-cable"
+        name = "-".join(name.split()) or "my-cable"
+        return f"{name}-cable" if is_module_name(name) else name
 
     def new_file(self, name: str) -> Path:
         """Return where a file of a name is to be written.
@@ -272,6 +275,11 @@ def refuse_file_name(name: str) -> None:
 def is_reserved(name: str) -> bool:
     """Whether Windows keeps a name for a device, whatever its extension."""
     return name.partition(".")[0].strip().lower() in _RESERVED
+
+
+def is_module_name(name: str) -> bool:
+    """Whether Python has a module of this name."""
+    return name.isidentifier() and (name in sys.stdlib_module_names or find_spec(name) is not None)
 
 
 def list_refusals(error: BowdenfitError) -> tuple[Refusal, ...]:

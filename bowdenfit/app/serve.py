@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import os
 import socket
 import threading
 import webbrowser
@@ -79,8 +78,8 @@ def open_browser(address: str, scratch: Path) -> None:
         scratch: Folder that only this user can read.
     """
     page = scratch / "open.html"
-    with open(os.open(page, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
-        file.write(entry_page(address))
+    page.touch(0o600, exist_ok=False)
+    page.write_text(entry_page(address), encoding="utf-8")
     threading.Thread(target=webbrowser.open, args=(page.as_uri(),), daemon=True).start()  # some browsers do not return
 
 

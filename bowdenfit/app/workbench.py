@@ -5,11 +5,9 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import re
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
@@ -17,7 +15,7 @@ from threading import Event
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import bowdenfit as bf
-from bowdenfit.app.draft import Draft, is_reserved
+from bowdenfit.app.draft import Draft, is_module_name, is_reserved
 from bowdenfit.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
@@ -258,7 +256,7 @@ def refuse_module_name(name: str) -> None:
     Raises:
         UsageError: It is the name of a module.
     """
-    if name.isidentifier() and (name in sys.stdlib_module_names or find_spec(name) is not None):
+    if is_module_name(name):
         raise UsageError(
             f"{shown(name)} is also the name of a Python module, and a program started next to the folder could load it "
             f"instead; use another name, such as {name}-cable."

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from app_in_browser import served, visiting
+from half_turn import describe_half_turn
 from reading_room import browser
 
 import bowdenfit as bf
@@ -84,7 +85,7 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
         page.get_by_text("4 runs").wait_for()
         page.goto(visit.root + "/")
         page.get_by_role("button", name="New data set").click()
-        page.set_input_files("input[type=file]", sorted((DATASETS / "on-body-exoskeleton").iterdir()))
+        page.set_input_files("input[type=file]", sorted((DATASETS / "on-body-exoskeleton").glob("*.[ct]*")))
         page.get_by_label("Name of the folder").fill("brought")
         page.get_by_role("button", name="Write the data set").click()
         page.get_by_role("heading", name="brought").wait_for()
@@ -92,6 +93,36 @@ def test_files_become_a_data_set_that_the_command_line_takes(chromium, bench):
     assert not (folder / "fits" / "bench-1").exists()
     assert bf.check(folder / "bench-1").description.name == "bench 1"
     assert (folder / "bench-1" / "bench 1.csv").read_text() == f"{TABLE}20,15.1,4\n40,30.5,4\n"
+
+
+@pytest.mark.extended
+def test_what_a_stranger_hides_among_measured_files_neither_arrives_nor_runs(chromium, tmp_path):
+    trap = tmp_path / "TRAP"
+    stranger = {
+        "cable.toml": describe_half_turn(name="scipy"), "forces.csv": TABLE, "__init__.py": f"open({str(trap)!r}, 'w')",
+        "notes.csv": "PK\3\4",
+    }  # fmt: skip
+    files = [{"name": name, "mimeType": "text/plain", "buffer": content.encode()} for name, content in stranger.items()]
+    (tmp_path / "bench").mkdir()
+    with served(tmp_path / "bench", cwd=tmp_path / "bench") as app, visiting(chromium, app) as visit:
+        page = visit.page
+        page.get_by_role("button", name="New data set").click()
+        page.set_input_files("input[type=file]", files)
+        page.get_by_text("'__init__.py' is left out").wait_for()
+        page.get_by_text("extension says: 'notes.csv'").wait_for()
+        assert page.input_value("#folder") == "scipy-cable"
+        page.get_by_label("Name of the folder").fill("scipy")
+        page.get_by_role("button", name="Write the data set").click()
+        page.get_by_text("'scipy' is also the name of a Python module").wait_for()
+        page.get_by_label("Name of the folder").fill("scipy-cable")
+        page.get_by_role("button", name="Write the data set").click()
+        page.get_by_role("button", name="Fit", exact=True).click()
+        page.locator(".stage .clock").wait_for()
+        page.get_by_role("button", name="Cancel").click()
+        page.get_by_text("It was cancelled").wait_for()
+        visit.console = [line for line in visit.console if "status of 422" not in line]  # of what was refused
+    assert sorted(path.name for path in (tmp_path / "bench" / "scipy-cable").iterdir()) == ["cable.toml", "forces.csv"]
+    assert not trap.exists()
 
 
 @pytest.mark.extended

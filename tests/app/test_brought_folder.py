@@ -34,7 +34,7 @@ def test_a_shipped_data_set_that_is_chosen_file_by_file_is_written_as_it_is(draf
     source = DATASETS / "on-body-exoskeleton"
     for path in [path for path in source.iterdir() if path.suffix != ".md"]:
         shutil.copyfile(path, draft.new_file(path.name))
-    with pytest.raises(UsageError, match="'README.md' is left out, because its extension"):
+    with pytest.raises(UsageError, match=r"'README\.md' is left out, because its extension"):
         draft.new_file("README.md")
     understanding = draft.understand()
     assert understanding.refusals == ()

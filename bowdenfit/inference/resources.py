@@ -82,7 +82,7 @@ def refuse_shortage(size: int = COMPILATION_BYTES, addresses: bool = False) -> N
     Raises:
         MemoryShortageError: The system refuses it.
     """
-    kind = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
+    kind: dict[str, Any] = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
     if addresses and hasattr(mmap, "PROT_READ"):
         kind["prot"] = mmap.PROT_READ
     try:

@@ -113,7 +113,7 @@ class ForcesData:
         load = np.concatenate([here.input_force for here in self.places])
         bends = [float(here.bend.mean()) for here in self.places if len(here.bend)]
         one = bool(load.max() < _ONE_LOAD * load.min())
-        return one and len(bends) == len(self.places) and np.ptp(bends) > ONE_BEND
+        return one and len(bends) == len(self.places) and bool(np.ptp(bends) > ONE_BEND)
 
 
 def data(fit: Record) -> ForcesData | None:

@@ -2,9 +2,11 @@
 
 import os
 import secrets
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from bowdenfit.errors import StoreError
@@ -12,6 +14,10 @@ from bowdenfit.words import shown
 
 PARTIAL = ".partial"  # ends the names of what is being written
 _LONGEST = 40  # characters of a file's name in its temporary name; a judgement
+_PATIENCE = 0.2  # s that the end of the process waits for a disk that does not answer; a judgement
+
+_unfinished: set[Path] = set()  # temporary files and folders of this process that are being written
+_creating = Lock()
 
 
 @contextmanager
@@ -28,11 +34,48 @@ def replace_atomically(path: Path) -> Iterator[Path]:
         raise StoreError(f"{path} is not a file and stays as it is; name a new file, or one that may be replaced.")
     temporary = path.with_name(f".{path.name[:_LONGEST]}.{secrets.token_hex(8)}{PARTIAL}")
     try:
-        temporary.touch(exist_ok=False)
+        create_unfinished(lambda: _touch(temporary))
         yield temporary
         os.replace(temporary, path)  # noqa: PTH105  (Path.replace says the same; this is the usual word for it)
     finally:
         temporary.unlink(missing_ok=True)
+        forget_unfinished(temporary)
+
+
+def _touch(path: Path) -> Path:
+    """Create an empty file where nothing is; return its path."""
+    path.touch(exist_ok=False)
+    return path
+
+
+def create_unfinished(create: Callable[[], Path]) -> Path:
+    """Create a temporary file or folder that `remove_unfinished` removes; return its path.
+
+    Args:
+        create: Makes it, under a name that nothing else has, and returns its path.
+    """
+    with _creating:
+        temporary = create()
+        _unfinished.add(temporary)
+    return temporary
+
+
+def forget_unfinished(temporary: Path) -> None:
+    """Forget a temporary file or folder that has become what it was written for, or is removed."""
+    _unfinished.discard(temporary)
+
+
+def remove_unfinished() -> None:
+    """Remove every temporary file and folder of this process, which ends right afterwards; no further one can be created.
+
+    Other threads may still be writing them; nothing that another process writes is touched.
+    """
+    _creating.acquire(timeout=_PATIENCE)  # for good
+    for temporary in tuple(_unfinished):
+        if temporary.is_dir() and not temporary.is_symlink():
+            shutil.rmtree(temporary, ignore_errors=True)
+        else:
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

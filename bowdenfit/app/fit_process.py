@@ -10,6 +10,7 @@ import logging
 import os
 import sys
 import threading
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -18,6 +19,7 @@ from tqdm import tqdm
 import bowdenfit as bf
 from bowdenfit.child_process import ignore_local_settings
 from bowdenfit.errors import BowdenfitError, describe_unforeseen, system_error
+from bowdenfit.outputs import remove_unfinished
 from bowdenfit.run.verb import WATCH
 from bowdenfit.stages import LOGGER
 
@@ -63,6 +65,8 @@ def main() -> None:
 def _end_with_reader() -> None:
     """End this process when nobody waits for it any more."""
     sys.stdin.read()
+    with suppress(OSError):
+        remove_unfinished()
     os._exit(_INTERRUPTED)
 
 

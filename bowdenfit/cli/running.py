@@ -3,14 +3,14 @@
 Signals are handled between two steps of Python in the main thread, and compiled code may take seconds for one step. So a
 command runs in a thread of its own while the main thread waits. A signal sets a flag; loops that keep what they have done (see
 `watch_verb`) look at it and end. Whatever has not ended soon after is ended with the process: files are written whole under
-their names or not at all, and a checkpoint only grows.
+their names or not at all, temporary ones are removed, and a checkpoint only grows.
 """
 
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from bowdenfit.cli.stage_line import show_stages
 from bowdenfit.cli.terminal import say_interrupted
 from bowdenfit.errors import DiskError, MemoryShortageError, system_error
 from bowdenfit.inference.resources import refuse_low_memory
+from bowdenfit.outputs import remove_unfinished
 from bowdenfit.stage_bar import Report, Watch
 
 INTERRUPTED = 130  # exit code, as shells have it
@@ -108,6 +109,8 @@ def _end_process() -> None:
     try:
         say_interrupted(next(filter(None, (how_to_go_on() for how_to_go_on in _how_to_go_on)), ""))
     finally:  # whether or not anybody reads it
+        with suppress(OSError):
+            remove_unfinished()
         os._exit(INTERRUPTED)
 
 

@@ -18,7 +18,14 @@ from filelock import FileLock, Timeout
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.errors import StoreError, disk_error
 from bowdenfit.inputs import is_deeper, refuse_special
-from bowdenfit.outputs import PARTIAL, refuse_link, refuse_links_inside, replace_atomically
+from bowdenfit.outputs import (
+    PARTIAL,
+    create_unfinished,
+    forget_unfinished,
+    refuse_link,
+    refuse_links_inside,
+    replace_atomically,
+)
 
 FIT, SUMMARY = "fit.json", "summary.json"
 SUMMARY_TEXT, DETAILS_TEXT = "summary.txt", "details.txt"  # one page, and everything
@@ -50,7 +57,8 @@ def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         name = f".{folder.resolve().name[:40]}."
-        temporary = Path(tempfile.mkdtemp(prefix=name, suffix=PARTIAL, dir=folder if exists else folder.parent))
+        place = folder if exists else folder.parent
+        temporary = create_unfinished(lambda: Path(tempfile.mkdtemp(prefix=name, suffix=PARTIAL, dir=place)))
         temporary.chmod(0o700)  # whatever the umask is, it can be filled and removed
     except OSError as error:
         _remove_empty(missing)
@@ -69,6 +77,7 @@ def fill_folder_atomically(folder: Path, last: str = "") -> Iterator[Path]:
         raise disk_error(folder, error) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+        forget_unfinished(temporary)
 
 
 def is_empty(folder: Path) -> bool:

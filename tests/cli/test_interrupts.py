@@ -161,3 +161,56 @@ def test_what_python_frees_after_helpers_that_were_ended_is_no_warning_below_our
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     assert "semaphore" not in done.stderr and "UserWarning: x" in done.stderr
+
+
+INTERRUPT_WHILE_WRITING = """
+import os, signal, sys, time
+from pathlib import Path
+from bowdenfit.cli.running import run_interruptibly
+from bowdenfit.outputs import replace_atomically
+from bowdenfit.results.folder import fill_folder_atomically
+signal.signal(signal.SIGINT, signal.default_int_handler)
+folder = Path(sys.argv[1])
+def write():
+    with {opened} as temporary:
+        {begin}
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(30)  # as inside compiled code, where nothing asks whether to stop
+run_interruptibly(write)
+"""
+
+
+@pytest.mark.parametrize(
+    ("opened", "begin"),
+    [
+        ("replace_atomically(folder / 'posterior.nc')", "temporary.write_text('half')"),
+        ("fill_folder_atomically(folder / 'figures')", "(temporary / 'a.png').write_text('half')"),
+        ("fill_folder_atomically(folder)", "(temporary / 'a.png').write_text('half')"),
+    ],
+    ids=["a file", "a new folder", "files of a folder"],
+)
+def test_an_interrupt_while_something_is_written_leaves_nothing_unfinished(tmp_path, opened, begin):
+    target = tmp_path / "elsewhere"
+    target.write_text("of somebody")
+    written_by_another = tmp_path / ".posterior.nc.0123456789abcdef.partial"
+    written_by_another.symlink_to(target)
+    before = sorted(tmp_path.iterdir())
+    program = INTERRUPT_WHILE_WRITING.format(opened=opened, begin=begin)
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (130, "Interrupted.\n")
+    assert sorted(tmp_path.iterdir()) == before
+    assert target.read_text() == "of somebody"
+
+
+def test_once_what_is_unfinished_was_removed_no_thread_begins_another_file(tmp_path):
+    program = """
+import sys, threading, time
+from pathlib import Path
+from bowdenfit.outputs import remove_unfinished, write_text
+remove_unfinished()
+threading.Thread(target=write_text, args=(Path(sys.argv[1]) / "a", "late"), daemon=True).start()
+time.sleep(0.5)
+"""
+    subprocess.run([sys.executable, "-c", program, str(tmp_path)], check=True, timeout=60)
+    assert not list(tmp_path.iterdir())

@@ -1,6 +1,7 @@
 """How soon is a mounting in the answer of `bowdenfit watch`, and does its advice to stop come where `next` by hand says it?
 
     python scripts/watch_bench.py [--dataset DATASET] [--until UNCERTAINTY] [--every SECONDS] [--by-hand]
+    python scripts/watch_bench.py [--dataset DATASET] --memory FITS
 
 A simulated bench: one sheath bent by 180 deg and twelve mountings, or a copy of a data set with a table of forces. Two of the
 mountings are there at the beginning; once these are fitted the others are written, one every so many seconds, each row by
@@ -8,9 +9,13 @@ itself as a bench does. Prints for each mounting how long after its last row an 
 enough is known. With `--by-hand` the first mountings are also
 fitted by `bowdenfit fit` and asked by `bowdenfit next`, and both are set side by side. Ends with exit code 1 where an answer
 took longer than 3 s, or where the two differ on whether to stop.
+
+With `--memory` the bench writes one row after each verdict, for so many fits, and the memory of this process after each tenth
+verdict is printed (Linux). Ends with exit code 1 where the last half of the fits added more than 30 MiB to it.
 """
 
 import argparse
+import mmap
 import shutil
 import sys
 import threading
@@ -29,6 +34,9 @@ from bowdenfit.questions.next.ranking import is_good_enough
 from bowdenfit.questions.watch import WatchedAnswer, watch_answers
 from bowdenfit.questions.watch.watching import read_until
 
+# MiB that the last half of 200 fits may add. The 17th mounting has programs compiled for twice as many, and the memory reached
+# meanwhile stays with the process: 16 to 25 MiB, once. Programs that were kept made it 61 MiB.
+ALLOWED_GROWTH = 30.0
 ALLOWED = 3.0  # s from the last row of a mounting to an answer that holds it
 _FIRST = 2  # mountings that are there from the start
 _PATIENCE = 60.0  # s after the last row
@@ -62,13 +70,13 @@ class Bench:
     mountings: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def simulate(cls, folder: Path, seed: int = 0) -> "Bench":
+    def simulate(cls, folder: Path, seed: int = 0, mountings: int = 12) -> "Bench":
         """Return a bench of one sheath, mu = 0.12, whose mountings differ by 6 % in friction."""
         random = np.random.default_rng(seed)
         folder.mkdir()
         (folder / "cable.toml").write_text(_DESCRIPTION)
         lines = ["run,stroke,input_force_N,output_force_N\n"]
-        for mounting in range(1, 13):
+        for mounting in range(1, mountings + 1):
             exponent = 0.12 * np.pi * (1 + 0.06 * random.standard_normal())
             for force in (20, 40, 60, 80, 100):
                 for stroke, sign in (("pull", 1), ("return", -1)):
@@ -134,6 +142,28 @@ def watch_bench(bench: Bench, until: Length | None, every: float) -> tuple[list[
     return [seen[count] - written[count] for count in sorted(written)], answers
 
 
+def measure_memory(bench: Bench, fits: int) -> list[float]:
+    """Return the memory after each of some verdicts [MiB], between which the bench writes one row."""
+    rows = [line for lines in bench.mountings[_FIRST:] for line in lines]
+    missing, memory = iter(rows * (fits // len(rows) + 1)), []
+    for answer in watch_answers(bench.folder):
+        if isinstance(answer, WatchedAnswer) and answer.trusted is not None:
+            memory.append(resident_memory())
+            if len(memory) % 10 == 1 or len(memory) == fits:
+                print(f"{len(memory):5} fits, {answer.readings:4} readings  {memory[-1]:7.1f} MiB", flush=True)
+            if len(memory) == fits:
+                break
+            with (bench.folder / "forces.csv").open("a") as file:
+                file.write(next(missing))
+    return memory
+
+
+def resident_memory() -> float:
+    """Return the memory of this process that is not swapped out [MiB]; Linux."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * mmap.PAGESIZE / 2**20
+
+
 def by_hand(bench: Bench, count: int, until: Length | None) -> tuple[float, bool]:
     """Return how well the answer is known by `fit` and `next` from the first mountings, and whether it is enough."""
     bench.write(count)
@@ -149,12 +179,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--until")
     parser.add_argument("--every", type=float, default=1.0)
     parser.add_argument("--by-hand", action="store_true")
+    parser.add_argument("--memory", type=int, metavar="FITS")
     options = parser.parse_args(arguments)
     until = read_lengths([options.until], "--until")[0] if options.until else None
     with TemporaryDirectory() as folder:
         place = Path(folder) / "bench"
         if options.dataset:
             shutil.copytree(options.dataset, place)
+        if options.memory:
+            long = Bench.cut(place) if options.dataset else Bench.simulate(place, mountings=_FIRST + options.memory // 10 + 1)
+            memory = measure_memory(long, options.memory)
+            growth = memory[-1] - memory[len(memory) // 2]
+            print(f"the last half added {growth:.1f} MiB, allowed {ALLOWED_GROWTH:g} MiB")
+            return int(growth > ALLOWED_GROWTH)
         bench = Bench.cut(place) if options.dataset else Bench.simulate(place)
         delays, answers = watch_bench(bench, until, options.every)
         print("mounting  delay [s]")

@@ -13,7 +13,7 @@ References:
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -31,6 +31,7 @@ _UNCOMPUTABLE = 1e100  # replaces a residual that cannot be computed, so that no
 _BISECTIONS = 40  # of the damping, on a logarithmic scale
 _LONGER = 1.1  # factor by which an undamped step may exceed the radius
 _ACCEPTED = 1e-4  # part of the predicted decrease of the sum of squares that a step must reach
+_MOST_SHAPES = 8  # numbers of rows and columns whose programs are kept: one fit needs two or three; a judgement
 _SUCCESS: Any = optx.RESULTS.successful
 
 
@@ -153,7 +154,7 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
         return ~state.first_step & (smooth | flat | still), state.result
 
 
-@cache
+@lru_cache(_MOST_SHAPES)
 def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
     """Compile the step of a solve; return it and the initial state.
 
@@ -170,7 +171,7 @@ def compile_stepper(rows: int, columns: int) -> tuple[Callable[..., Any], list[n
     return step, state
 
 
-@cache
+@lru_cache(_MOST_SHAPES)
 def _compile_step(rows: int, columns: int) -> tuple[Callable[..., Any], list[np.ndarray]]:
     """Compile the step for a padded number of rows."""
     number, *arrays = (jax.ShapeDtypeStruct(shape, jnp.float64) for shape in ((), (columns,), (rows,), (rows, columns)))

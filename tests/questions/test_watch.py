@@ -1,6 +1,8 @@
 """A bench that is watched: one line a mounting, wrong rows refused in a sentence, and the advice to stop."""
 
 import json
+import os
+import subprocess
 import sys
 import threading
 from dataclasses import replace
@@ -124,6 +126,33 @@ def test_a_growing_table_is_fitted_by_programs_compiled_once(bench):
     assert record.parameter("mu").median == pytest.approx(by_hand.parameter("mu").median, abs=0.0005)
     assert record.parameter("mu").sd == pytest.approx(by_hand.parameter("mu").sd, rel=0.1)
     assert assess_fit(fits.complete(record)).troubles == by_hand.verdict().troubles
+
+
+FIT_A_GROWING_BENCH = """
+import gc, sys, tempfile
+from pathlib import Path
+import jax
+import bowdenfit as bf
+from bowdenfit.questions.watch.fitting import GrowingFit
+from watch_bench import Bench
+with tempfile.TemporaryDirectory() as folder:
+    bench, fits = Bench.simulate(Path(folder) / "bench", mountings=18), GrowingFit(0)
+    for count in range(4, 19):
+        bench.write(count)
+        record = fits.draw(bf.read(bench.folder))
+        fits.complete(record)
+        fits.release_programs(record)
+gc.collect()
+print(len(jax.devices()[0].client.live_executables()))
+"""
+
+
+@pytest.mark.extended
+def test_programs_of_earlier_mountings_are_not_kept_in_memory():
+    surroundings = os.environ | {"PYTHONPATH": str(ROOT / "scripts")}
+    command = [sys.executable, "-c", FIT_A_GROWING_BENCH]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=200, env=surroundings)
+    assert int(done.stdout) <= 12  # 8 steps of least squares, and a few of the last mounting; all of them were 17
 
 
 @pytest.mark.extended

@@ -58,17 +58,19 @@ class ShapePrograms:
 
 @dataclass(frozen=True)
 class GrowingFit:
-    """Fits of one data set as it grows, with programs that are kept from one fit to the next.
+    """Fits of one data set as it grows, with programs that are kept from one fit to the next of the same shape.
 
     Args:
         seed: Of everything random.
-        samplers: What draws, by shape.
-        programs: What draws imply, by shape and by what of the measurements enters it.
+        samplers: What draws, by the last shape.
+        programs: What draws imply, by the last shape and what of the measurements enters it.
+        completed: Shapes of the data that were completed last; empty before.
     """
 
     seed: int
     samplers: dict[str, BatchPrograms] = field(default_factory=dict)
     programs: dict[str, ShapePrograms] = field(default_factory=dict)
+    completed: list[str] = field(default_factory=list)
 
     def draw(self, dataset: Dataset) -> Record:
         """Return the draws of a data set as a fit without least squares, which answers what follows from parameters.
@@ -78,7 +80,10 @@ class GrowingFit:
         """
         with jax.enable_x64(True):
             shaped, model = shape_dataset(dataset, spare=True), build_model(dataset)
-            sampler = self.samplers.setdefault(shaped.key, BatchPrograms(shaped.posterior, SETTINGS))
+            if shaped.key not in self.samplers:
+                self.samplers.clear()
+                self.samplers[shaped.key] = BatchPrograms(shaped.posterior, SETTINGS)
+            sampler = self.samplers[shaped.key]
             programs, data = self._programs(shaped, model), shaped.data
             (fit,) = fit_batch(sampler.posterior, [data], [self.seed], programs=sampler)
             if not len(fit.z):
@@ -99,6 +104,7 @@ class GrowingFit:
         conditions = friction.conditions if friction.options else ""  # capstan friction is the same at any load and speed
         key = f"{shaped.key} {dict(model.cable.nominal)} {conditions}"
         if key not in self.programs:
+            self.programs.clear()
             self.programs[key] = _compile_shape(shaped.posterior, model)
         return self.programs[key]
 
@@ -112,6 +118,20 @@ class GrowingFit:
             draws = replace(fit.draws(), **imply_groups(fit.model, fit.draws().z, implied, self.seed), units={})
             programs = fit.programs and replace(fit.programs, quantities=implied)
         return replace(fit, least_squares=squares, sampled=draws, programs=programs)
+
+    def release_programs(self, fit: Record) -> None:
+        """Release what JAX keeps of the programs of `complete` once data of another shape were completed.
+
+        A new mounting needs each of them for another shape, and JAX would keep 6 to 8 MiB of the earlier ones for ever
+        (`scripts/watch_bench.py --memory 200`). Whatever else the process runs by `jax.jit` is compiled again at its next call.
+
+        Args:
+            fit: The fit that was completed last.
+        """
+        shapes = str([jax.tree.map(np.shape, term.data) for term in fit.model.terms])
+        if [shapes] != self.completed:
+            self.completed[:] = [shapes]
+            jax.clear_caches()
 
 
 def _chains(rows: np.ndarray) -> np.ndarray:

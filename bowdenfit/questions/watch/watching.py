@@ -94,14 +94,15 @@ class _Bench:
         self.target_name, self.until, self.keep = target_name, until, keep
         self.assessing, self.history, self.refused = assessing, History(), ""
         self.latest: tuple[WatchedAnswer, Record] | None = None
-        self.job: Future[tuple[WatchedAnswer, WatchedAnswer]] | None = None
+        self.job: Future[tuple[WatchedAnswer, Record, WatchedAnswer]] | None = None
         self.is_assessed = True
 
     def look(self) -> Iterator[WatchedAnswer | UnreadableFiles]:
         """Look at the files once; yield what has become known."""
         if self.job is not None and self.job.done():
-            before, answer = self.job.result()
+            before, fit, answer = self.job.result()
             self.job, self.history = None, self.history.add(answer)
+            self.fits.release_programs(fit)
             if self.latest is not None and before is self.latest[0]:
                 self.is_assessed = True
                 yield answer
@@ -169,12 +170,12 @@ class _Bench:
         known = f"{target.words} is known to ± {significant(target.sd, 2)}{unit}"
         return True, f"You may stop: {known}, and ± {wanted:g}{unit} was asked for."
 
-    def _assess(self, answer: WatchedAnswer, fit: Record, history: History) -> tuple[WatchedAnswer, WatchedAnswer]:
-        """Return an answer as it was, and with the verdict on its fit."""
+    def _assess(self, answer: WatchedAnswer, fit: Record, history: History) -> tuple[WatchedAnswer, Record, WatchedAnswer]:
+        """Return an answer as it was, its fit, and the answer with the verdict on that."""
         verdict = assess_fit(self.fits.complete(fit))
         assessed = replace(answer, troubles=dict(verdict.troubles), warning=distrust_warning(verdict), doubts=verdict.doubts)
         self.keep(history.add(assessed))
-        return answer, assessed
+        return answer, fit, assessed
 
 
 def count_mountings(fit: Record) -> int:

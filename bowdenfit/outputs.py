@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import mkdtemp
 from threading import Lock
 from typing import Any
 
@@ -63,6 +64,17 @@ def create_unfinished(create: Callable[[], Path]) -> Path:
 def forget_unfinished(temporary: Path) -> None:
     """Forget a temporary file or folder that has become what it was written for, or is removed."""
     _unfinished.discard(temporary)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield an empty folder among the system's temporary ones, which is removed at the end, also by `remove_unfinished`."""
+    folder = create_unfinished(lambda: Path(mkdtemp(prefix="bowdenfit-")))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        forget_unfinished(folder)
 
 
 def remove_unfinished() -> None:

@@ -23,7 +23,7 @@ from bowdenfit.outputs import remove_unfinished
 from bowdenfit.stage_bar import Report, Watch
 
 INTERRUPTED = 130  # exit code, as shells have it
-_PATIENCE = 1.0  # s, in which a command may end by itself; a judgement
+_PATIENCE = 0.5  # s, in which a command may end by itself, so that all of it takes less than one; a judgement
 _LOOK = 0.2  # s between two looks at the thread; a judgement, as some systems do not wake the main thread for a signal
 
 requested = threading.Event()

@@ -167,7 +167,7 @@ INTERRUPT_WHILE_WRITING = """
 import os, signal, sys, time
 from pathlib import Path
 from bowdenfit.cli.running import run_interruptibly
-from bowdenfit.outputs import replace_atomically
+from bowdenfit.outputs import replace_atomically, temporary_folder
 from bowdenfit.results.folder import fill_folder_atomically
 signal.signal(signal.SIGINT, signal.default_int_handler)
 folder = Path(sys.argv[1])
@@ -186,8 +186,9 @@ run_interruptibly(write)
         ("replace_atomically(folder / 'posterior.nc')", "temporary.write_text('half')"),
         ("fill_folder_atomically(folder / 'figures')", "(temporary / 'a.png').write_text('half')"),
         ("fill_folder_atomically(folder)", "(temporary / 'a.png').write_text('half')"),
+        ("temporary_folder()", "(temporary / 'a.csv').write_text('half')"),
     ],
-    ids=["a file", "a new folder", "files of a folder"],
+    ids=["a file", "a new folder", "files of a folder", "a copy of a bench"],
 )
 def test_an_interrupt_while_something_is_written_leaves_nothing_unfinished(tmp_path, opened, begin):
     target = tmp_path / "elsewhere"
@@ -197,7 +198,8 @@ def test_an_interrupt_while_something_is_written_leaves_nothing_unfinished(tmp_p
     before = sorted(tmp_path.iterdir())
     program = INTERRUPT_WHILE_WRITING.format(opened=opened, begin=begin)
     command = [sys.executable, "-c", program, str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    surroundings = os.environ | {"TMPDIR": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=surroundings)
     assert (done.returncode, done.stderr) == (130, "Interrupted.\n")
     assert sorted(tmp_path.iterdir()) == before
     assert target.read_text() == "of somebody"

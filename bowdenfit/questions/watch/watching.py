@@ -6,7 +6,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from bowdenfit.arguments import Length
@@ -16,6 +15,7 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.resources import keep_compiled_programs
 from bowdenfit.kinds import find_readings
 from bowdenfit.kinds.terms import find_term_kind
+from bowdenfit.outputs import temporary_folder
 from bowdenfit.questions.next.answer import TargetQuantity, choose_target
 from bowdenfit.questions.next.candidates import rests_on_one_mounting
 from bowdenfit.questions.next.ranking import is_good_enough, stopping_advice
@@ -66,8 +66,8 @@ def watch_answers(
         raise DescriptionError(f"{path} does not exist; check the spelling and the folder.")
     keep_compiled_programs()
     join = (reading or {}).get("join")
-    with TemporaryDirectory(prefix="bowdenfit-") as copies, ThreadPoolExecutor(1) as assessing:
-        files = BenchFiles(path, Path(copies), None if join is None else Path(join))
+    with temporary_folder() as copies, ThreadPoolExecutor(1) as assessing:
+        files = BenchFiles(path, copies, None if join is None else Path(join))
         bench = _Bench(files, GrowingFit(seed), target_name, until, reading or {}, assessing, keep)
         while not is_stopped():
             for answer in bench.look():

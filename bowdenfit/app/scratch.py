@@ -10,6 +10,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from bowdenfit.outputs import create_unfinished, forget_unfinished
+
 _PREFIX, _LOCK = "bowdenfit-app-", ".lock"
 _YOUNG = 60.0  # s, in which a folder may be without the lock of an app that is starting; a judgement
 
@@ -18,7 +20,7 @@ _YOUNG = 60.0  # s, in which a folder may be without the lock of an app that is 
 def scratch_folder() -> Iterator[Path]:
     """Make the folder in which everything temporary goes during a `with` block, after clearing those of killed apps."""
     _clear_abandoned(Path(tempfile.gettempdir()))
-    folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
+    folder = create_unfinished(lambda: Path(tempfile.mkdtemp(prefix=_PREFIX)))
     before, variable = tempfile.tempdir, os.environ.get("TMPDIR")
     with FileLock(folder / _LOCK, timeout=0):
         tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
@@ -29,6 +31,7 @@ def scratch_folder() -> Iterator[Path]:
             os.environ.pop("TMPDIR")
             os.environ |= {"TMPDIR": variable} if variable is not None else {}
     shutil.rmtree(folder, ignore_errors=True)
+    forget_unfinished(folder)
 
 
 def _clear_abandoned(place: Path) -> None:

@@ -52,7 +52,7 @@ class Reading(TypedDict, total=False):
         undetected: How angles too small to detect enter.
         wrap_angle: Wrap angle of a single table without cable.toml, such as 180deg.
         join: File of a second logger with the output force, where the file of the data set has the input force alone.
-        reading_limit: So many times the memory and time that are usual for a binary file of its size may be taken to read it.
+        reading_limit: Multiple of the usual memory and time allowed for reading a binary file of its size.
     """
 
     settings: Annotated[Sequence[str], Parameter("--set", metavar="KEY=VALUE"), TEXTS]

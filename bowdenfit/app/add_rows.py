@@ -78,7 +78,7 @@ class AddRowsPage:
                 with block("div", "row"):
                     button(f"Add {counted(checked.count, 'row')}", lambda: attempt(self._save), "primary", key="add-rows")
                 if checked.report:
-                    with section("As it is understood with them", "understood"):
+                    with section("How it was read with them", "understood"):
                         text(checked.report, "pre", tabindex="0")
 
     async def _save(self) -> None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bowdenfit.finished_fit import Fit
 
 _THROTTLE = 0.1  # s between two positions of a dial that is moved; a judgement
-_WAYS = (("in", "at the motor: what arrives"), ("out", "wanted at the load: what it takes"))
+_WAYS = (("in", "at the motor; find the load force"), ("out", "at the load; find the motor force"))
 _STROKES = (("pull", "pulling"), ("return", "returning"))
 
 
@@ -150,7 +150,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
                 show_table_links(workbench, data_set)
                 link("Live: fit again after each mounting", address("live", data_set), "button")
         else:
-            text("The data set of this fit does not lie here as it was fitted; open it at the start to add what was measured.")
+            text("The data set of this fit is missing or has changed; open it at the start to add what was measured.")
 
 
 def show_files(name: str) -> None:

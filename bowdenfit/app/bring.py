@@ -20,7 +20,7 @@ from bowdenfit.words import counted, listed, shown
 
 _BENCH = (Path(__file__).parent / "bench.svg").read_text(encoding="utf-8")
 _BENCH_WORDS = (
-    "A run is one mounting of the cable: taken off and put on again, it is the next one. The stroke is pull while the motor "
+    "A run is one mounting of the cable: removing and remounting it starts a new run. The stroke is pull while the motor "
     "pulls, and return while the load pulls back."
 )
 Again: TypeAlias = Callable[[], Awaitable[None]]
@@ -31,7 +31,7 @@ def show_start(workbench: Workbench) -> None:
     """Show what lies in the folder, and what can be brought."""
     with frame(NAME):
         text(f"Friction of a Bowden cable from what was measured on its bench. Everything stays in {workbench.folder}.")
-        with section("Bring measurements", "bring"):
+        with section("Add measurements", "bring"):
             with block("div", "row"):
                 button("New data set", lambda: ui.navigate.to(address("new", workbench.new_draft().key)), "primary")
             _show_examples(workbench)
@@ -168,7 +168,7 @@ def _show_understanding(workbench: Workbench, draft: Draft, understanding: Under
         names = listed([shown(name) for name in understanding.left_out])
         text(f"Left out, because the contents are not what the extension says: {names}.", classes="hint")
     if understanding.report:
-        with section("As it is understood", "understood"):
+        with section("How it was read", "understood"):
             text(understanding.report, "pre", tabindex="0")
         _show_writing(workbench, draft)
 

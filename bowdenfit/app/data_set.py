@@ -49,7 +49,7 @@ class DataSetPage:
             with section("Add what was measured", "add"), block("div", "row"):
                 show_table_links(workbench, name)
                 link("Live: fit again after each mounting", address("live", name), "button")
-            with section("As it is understood", "understood"):
+            with section("How it was read", "understood"):
                 self._place = block("div", aria_live="polite")
         with self._place:
             text("Reading ...")
@@ -70,8 +70,8 @@ class DataSetPage:
     def _show_seed(self, fault: str = "") -> None:
         """Show the field of the seed, with why what is typed cannot be taken."""
         self._seed_place.clear()
-        hint = "A whole number; random, and recorded, where it is empty."
-        with self._seed_place, field("Seed of everything random", "seed", hint, fault):
+        hint = "A whole number; if empty, chosen at random and recorded."
+        with self._seed_place, field("Random seed", "seed", hint, fault):
             line = text_input("seed", self._seed, self._state_seed)
             line.props["aria-describedby"] = "seed-fault seed-hint" if fault else "seed-hint"
             line.props["aria-invalid"] = str(bool(fault)).lower()

@@ -83,5 +83,5 @@ class Form:
         if question.words.endswith(_YES_OR_NO):
             options = (("y", "yes"), ("n", "no"))
         hint = question.why or (f"such as {question.example}" if question.example and not options else "")
-        is_list = words.endswith("Write their numbers with blanks between.")
+        is_list = words.endswith("Write their numbers separated by spaces.")
         self.entries.append(FormEntry(key, words, typed, hint, () if is_list else options, fault))

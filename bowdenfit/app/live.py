@@ -18,7 +18,7 @@ from bowdenfit.questions.watch.verb import watch
 
 _TICK = 0.5  # s between two looks at what is known; a judgement
 _MOST_LINES = 2000  # of what is printed, that a page keeps; a judgement
-_HEADING = "How the answer became known"
+_HEADING = "How the answer narrowed"
 
 
 class WatchedBench:
@@ -97,7 +97,7 @@ class LivePage:
                     text("Watching.", classes="state good")
                     button("Stop watching", self._stop)
                 return
-            with field("Known well enough at a standard deviation of", "until", "such as 10mm; empty for what next says"):
+            with field("Stop at a standard deviation of", "until", "such as 10mm; empty: as `next` advises"):
                 text_input("until", self._until, self._state_until)
             with block("div", "row"):
                 button("Watch the bench", lambda: attempt(self._start), "primary")

@@ -44,7 +44,7 @@ def register_pages(workbench: Workbench, application: FastAPI) -> None:
         if key in workbench.drafts:
             await show_draft(workbench, workbench.drafts[key])
         else:
-            _show_refusal("New data set", "These files are gone, because the app was started anew since; bring them again.")
+            _show_refusal("New data set", "These files are gone because the app was restarted; add them again.")
 
     @ui.page("/data/{name}")
     def data_set(name: str) -> None:
@@ -107,7 +107,7 @@ def _register_files(workbench: Workbench, application: FastAPI) -> None:
         try:
             await _write_upload(workbench.drafts[key].new_file(name), request)
         except KeyError:
-            return PlainTextResponse("The app was started anew since this page was opened; load it again.", _MISSING)
+            return PlainTextResponse("The app was restarted since this page was opened; load it again.", _MISSING)
         except BowdenfitError as error:
             return PlainTextResponse(str(error), _REFUSED)
         return PlainTextResponse("taken")

@@ -92,7 +92,7 @@ class FitPage:
         """Show how an interrupted fit goes on."""
         names, job = self._workbench.data_sets(), self._workbench.jobs.get(self._name)
         if not names:
-            text("The data set that it is of does not lie in this folder any more.")
+            text("Its data set is no longer in this folder.")
             return
         before = next((one for one in names if job is not None and self._workbench.data_set(one) == job.request.dataset), None)
         fitting = [one for one in names if self._name.startswith(self._workbench.title_of(one))]

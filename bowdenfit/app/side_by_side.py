@@ -24,7 +24,7 @@ class TwoFitsPage:
         self._names = [name if name in known else others.pop(0) if others else "" for name in names]
         with frame("Two cables side by side"):
             if len(known) < 2:
-                text("There is one fit, or none; fit another cable first.")
+                text("Fewer than two fits; fit another cable first.")
                 return
             with block("div", "row"):
                 for number, label in enumerate(("One cable", "The other")):

@@ -311,7 +311,7 @@ def _init_dialog() -> ModuleType:
     return init_dialog
 
 
-APP_HELP = """Open the bench in the browser: bring, fit, see, and what to measure next.
+APP_HELP = """Open the app in the browser: add data, fit, view, plan what to measure.
 
 The page is served to this machine alone, and asks no other for anything. Data
 sets and fits lie in FOLDER as the other commands write them: data sets beside

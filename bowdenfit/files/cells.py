@@ -172,7 +172,7 @@ class Cell:
         if written is None:
             raise self.refuse(
                 f"{self.shown} is not a number; write a plain number there "
-                "(remarks go into a line that starts with #, or below the table behind a blank row)."
+                "(put comments in a line that starts with #, or below the table after an empty row)."
             )
         if not math.isfinite(float(written)):
             raise self.refuse(f"{self.shown} is too large for a number; correct the value.")

@@ -59,7 +59,7 @@ class SamplingRequest:
         posterior: The posterior to sample.
         start: Center and covariance of the start.
         settings: Ensembles or chains, maximum steps, and targets.
-        seed: Seed of everything random here.
+        seed: Random seed.
         quantities: Derived quantities at many z; they must converge too.
         checkpoint: File to which every stored state is written; see `bowdenfit.inference.checkpoint`.
         resume: Whether to continue from the states in `checkpoint`.

@@ -77,8 +77,8 @@ def read_strokes_by_loss(columns: Mapping[str, Column], loss: Vector) -> tuple[L
         written = {_plain_word(cell): cell.shown for cell in column.cells}
         pull, back = (written[word] for word in (one, other)[::stroke])
         remark = [
-            f"{column.cells[0].file}: the stroke {pull} is taken for pull and {back} for return, because less of "
-            "the force arrives at the output in it."
+            f"{column.cells[0].file}: the stroke {pull} is taken for pull and {back} for return, because "
+            f"{pull} transmits less of the force."
         ]
     strokes = {**_STROKES, one: stroke, other: -stroke}
     return np.array(column.read_cells(lambda cell: read_stroke(cell, _HELD, strokes), 1)), remark

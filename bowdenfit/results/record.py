@@ -107,7 +107,7 @@ class Provenance(Display):
     """Seed, versions and times of a fit.
 
     Args:
-        seed: Seed of everything random.
+        seed: Random seed.
         versions: Of bowdenfit, Python and the libraries that computed.
         stage_times: Seconds by stage.
         created: Date and time, UTC.

@@ -47,10 +47,10 @@ def fit(
     Args:
         dataset: See `bowdenfit.read`; its keywords are taken too.
         output: Results folder.
-        mcmc: Sample the posterior; without it there are no intervals.
+        mcmc: Sample the posterior; without it, least squares and its intervals only.
         sampler: Ensembles of walkers, NUTS for many parameters or narrow posteriors, or both, one to check the other.
         figures: Draw the figures.
-        seed: Seed of everything random.
+        seed: Random seed.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
         progress: Called while sampling; a notebook shows one line with stage, clock and progress if omitted.
@@ -106,7 +106,7 @@ VERB = Verb(
     results folder. DATASET is a folder with cable.toml and tables, or one table or
     recording with --wrap-angle.
     """,
-    json="Print summary.json instead of the summary for people.",
+    json="Print summary.json instead of the text summary.",
     results="fits",
     watch=WATCH,
 )

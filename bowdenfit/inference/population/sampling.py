@@ -75,7 +75,7 @@ def draw_population(
 
     Args:
         inspected: The inspections.
-        seed: Seed of everything random here.
+        seed: Random seed.
         without: Numbers of cables whose inspections are left out.
         coefficient_names: Names of the coefficients, for messages.
         readings: Inspections whose readings themselves enter, in place of their summaries.
@@ -227,7 +227,7 @@ def draw_unpooled(
         population: Population of the other cables, for what the cable's inspections do not identify; as many draws are
             returned.
         cable: Number of the cable.
-        seed: Seed of everything random here.
+        seed: Random seed.
     """
     generator, rows = np.random.default_rng([seed, 19, cable]), np.flatnonzero(inspected.cable == cable)
     freedom, counts = inspected.summaries.freedom[rows], inspected.known[rows].sum(axis=1)

@@ -312,8 +312,8 @@ def _refuse_gains(table: ForceTable, gains: ForceGains) -> NoReturn:
     cause = _describe_cause_of_table(gains) if gains.wide else _describe_cause_of_row(table, gains, row)
     raise DatasetError(
         f"{table.origin.describe_row(row)}: output_force {force_out:.4g} N at input_force {force_in:.4g} N, "
-        f"{percent(force_out / force_in, 0)} while {how}; friction never lets {what} out than in, and noise hardly shows it. "
-        f"So it is in {many} rows: the usual cause is {cause}."
+        f"{percent(force_out / force_in, 0)} while {how}; friction never lets {what} out than in, and noise rarely looks "
+        f"like it. {many} rows show it: the usual cause is {cause}."
     )
 
 

@@ -102,8 +102,8 @@ def _read_steady_angle(file: ChannelFile, column: str, source: ColumnSource | No
         raise _make_change_error(file, column, float(np.rad2deg(low)), float(np.rad2deg(high)), "deg")
     if value < 0:
         raise DatasetError(
-            f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so turn that of the "
-            "channel round with a negative gain."
+            f"{file.path.name}: {column} is {np.rad2deg(value):.4g} deg; wrap angles add up without sign, so invert the "
+            "channel with a negative gain."
         )
     return value
 

@@ -151,8 +151,8 @@ def _check_swings(table: RawTable, name: str, made: RingDownTable, run: int) -> 
     seen_half_swings, half = made.measure_half_swings(run)
     if seen_half_swings < _FEWEST_HALF_SWINGS:
         raise DatasetError(
-            f"{called}: the joint turns round {seen_half_swings} times before it stands still, and fewer than "
-            f"{_FEWEST_HALF_SWINGS} do not separate damping from friction; pull it further before the release, or add inertia "
+            f"{called}: the joint reverses {seen_half_swings} times before it stops; separating damping from "
+            f"friction takes at least {_FEWEST_HALF_SWINGS}; pull it further before the release, or add inertia "
             "to it (column added_inertia)."
         )
     step = float(np.median(np.diff(made.time[made.run == run])))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "Which preload is enough"
+HEADING = "Preload window"
 COARSE, FINE = 25, 401  # preloads: friction against them is smooth, the probability of slack is not
 ENOUGH = 0.95  # probability of staying taut from which on a preload is within the window, as `preload_window.TAUT`
 

@@ -62,7 +62,7 @@ def calibrate(
         assume: Fit with this setting changed, while simulating without: what a wrong assumption costs; may be repeated.
         truth: True values that do not come from the priors: a TOML file with a number or a range for each parameter, such as
             mu1 = 0.1 and tau = [0.002, 0.3]. Ranges of positive numbers are drawn log-uniformly, others uniformly.
-        seed: Seed of everything random.
+        seed: Random seed.
         resume: Go on with an interrupted calibration, or add replications.
         force: Replace an earlier calibration in the results folder.
         progress: Called after every replication with how many are done, and of how many; notebooks show a bar if omitted.
@@ -137,7 +137,7 @@ VERB = Verb(
     A replication takes a fraction of a second, with recordings some seconds.
     Exit code 3: not calibrated.
     """,
-    json="Print calibration.json instead of the summary for people.",
+    json="Print calibration.json instead of the text summary.",
     csv="Print the quantities as CSV, one a row.",
     results="fits/calibration",
     watch=WATCH,

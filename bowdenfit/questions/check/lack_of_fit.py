@@ -86,7 +86,7 @@ def _far_reading_sentence(names: Sequence[str]) -> str:
     """Return the sentence about readings far outside what chance does."""
     was, stands, them = ("it was", "it stands", "it") if len(names) == 1 else ("they were", "they stand", "them")
     return (
-        f"The model does not describe {few(names, _MAX_NAMED)}: a deviation as large happens by chance in less than one "
+        f"The model does not describe {few(names, _MAX_NAMED)}: chance alone deviates as much in fewer than one "
         f"healthy fit in {1 / FALSE_ALARM:.0f}. Check how {was} measured and written down; if {stands}, fit with --noise "
         f"student, or leave {them} out and say so."
     )
@@ -132,7 +132,7 @@ def _percent_excess(excess: float) -> str:
 def _odds(p_value: float) -> str:
     """Return such as 'one healthy fit in 5,000'."""
     if p_value < 1e-6:
-        return "less than one healthy fit in a million"
+        return "fewer than one healthy fit in a million"
     return f"one healthy fit in {float(f'{1 / p_value:.1g}'):,.0f}"
 
 

@@ -38,7 +38,7 @@ def describe(
     prior_predictive: Annotated[Path | None, Parameter(metavar="FOLDER"), PATH] = None,
     **reading: Unpack[Reading],
 ) -> Reply:
-    """Say what was understood of a data set; of a single file, what it is and the command that fits it.
+    """Report how a data set was read; of a single file, what it is and the command that fits it.
 
     Args:
         dataset: Folder, description or file.
@@ -61,7 +61,7 @@ def describe(
 VERB = Verb(
     describe,
     lambda reply, _: reply,
-    """Say what was understood of a data set, and what is wrong.
+    """Report how a data set was read, and what is wrong.
 
     Nothing is fitted. DATASET is a folder with cable.toml and tables, or one table
     or recording with --wrap-angle. For a single file the answer says whether it is a

@@ -78,7 +78,7 @@ def _describe_coverage(checks: Checks) -> str:
     start = f"The 90 % intervals of these predictions contain {held} of {counted(n, 'reading')}.{few}"
     if not misfits:
         return start
-    return f"{start} But {listed(misfits)}, more than happens by chance in one fit of a hundred."
+    return f"{start} But {listed(misfits)}, more than happens by chance in one fit in a hundred."
 
 
 def _describe_outliers(checks: Checks) -> str:

@@ -42,7 +42,7 @@ def compensate(
         schedule: Simulate what is fed forward by bend, not one value for all bends.
         simulate: Simulate 400 devices through time: what is felt, and how many move by themselves.
         risk: Probability that is accepted.
-        seed: Seed of everything random.
+        seed: Random seed.
         output: Folder for compensation.json, the text and the figures.
 
     Raises:

@@ -69,7 +69,7 @@ class Fleet(Display):
         broken: Those that could not be.
         units: Of the quantities.
         shapes: For each model what is fitted with it, in words.
-        seed: Seed of everything random.
+        seed: Random seed.
         versions: Of what computed.
     """
 

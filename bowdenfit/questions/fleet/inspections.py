@@ -233,7 +233,7 @@ class Case:
         """Return the seed of this case, which depends on what was measured and not on its order.
 
         Args:
-            fleet_seed: Seed of everything random.
+            fleet_seed: Random seed.
         """
         digest = hashlib.sha256(f"{fleet_seed} {self.hash}".encode()).digest()
         return int.from_bytes(digest[:8], "big") % LARGEST_SEED

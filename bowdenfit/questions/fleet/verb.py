@@ -47,7 +47,7 @@ def fleet(
         output: Results folder.
         engine: local (this machine), dask://HOST:PORT or slurm; or any `concurrent.futures.Executor`.
         workers: Processes here, each of which loads and compiles all over again, or jobs at a time.
-        seed: Seed of everything random.
+        seed: Random seed.
         resume: Go on with an interrupted fleet, or add cables and inspections.
         force: Replace an earlier fleet in the results folder.
         progress: Called after every piece of work with inspections done, of how many, and seconds so far.
@@ -96,7 +96,7 @@ VERB = Verb(
     added too. Broken inspections are named, and the others are fitted. Exit code 3:
     some could not be fitted, or must not be trusted.
     """,
-    json="Print fleet.json instead of the summary for people.",
+    json="Print fleet.json instead of the text summary.",
     csv="Print medians and intervals of all inspections as CSV, one a row.",
     results="fits",
     watch=WATCH,

@@ -29,8 +29,8 @@ def caption(identifiability: Identifiability) -> str:
     """Describe what is drawn, in plain words."""
     n = sum(len(group.parameters) for group in identifiability.groups.values())
     text = (
-        "Left: of what was open about each parameter beforehand (the variance of its prior), the share that the measurements "
-        "settle. Right: independent weighted sums of the parameters, the best known first, with the weight of each in units of "
+        "Left: share of each parameter's prior variance that the measurements remove. "
+        "Right: independent weighted sums of the parameters, the best known first, with the weight of each in units of "
         "its prior's standard deviation; below each how much of the sum's prior variance is left."
     )
     if identifiability.profiles:

@@ -209,7 +209,7 @@ def t_from_p(p: float, persons: float) -> float:
 
 
 def half_width(error: float, persons: int, level: float = 1 - LEVEL) -> float:
-    """Return half the width of the interval that holds the true difference in so many studies of all.
+    """Return the half-width of the difference's confidence interval at a level.
 
     Args:
         error: Standard error.

@@ -246,7 +246,7 @@ class NextMeasurement(Display):
     """Candidates from the most to the least worth measuring.
 
     Args:
-        answer: What is to be known better.
+        answer: The answer to narrow.
         ranked: The candidates.
         repeats: What several readings of the best would do; None where no candidate does anything.
         plan: The best, then what is best beside it, and so on.

@@ -38,7 +38,7 @@ def next_measurement(
 
     Args:
         fit: The fit, or its results folder.
-        answer: What is to be known better: optimal-length, optimal-efficiency, efficiency@470, or a parameter such as mu1.
+        answer: Answer to narrow: optimal-length, optimal-efficiency, efficiency@470, or a parameter such as mu1.
         candidates: A measurement that you could make, such as angle@450, force@470, efficiency@470, stretch@90deg,50N,
             preload@90deg or loop@90deg,30N; may be repeated.
         costs: What a measurement of a kind costs, in any unit; then candidates are ranked by what they do for their cost;
@@ -68,8 +68,8 @@ VERB = Verb(
     _reply,
     """Rank what to measure next.
 
-    Candidates are ranked by how far each would narrow the answer, averaged over the
-    readings that it may give.
+    Candidates are ranked by how much each would narrow the answer, averaged over
+    its possible readings.
 
       KIND        a reading of
       angle       the wrap angles of all curved contacts at a length

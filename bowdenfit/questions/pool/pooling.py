@@ -77,7 +77,7 @@ def pool_results(
         wrap_angles: Options such as mu_sheath=180deg, one for each coefficient.
         cycles: Number of cycles before which the probability of failure is wanted.
         measurements: Folder of the fleet's measurements.
-        seed: Seed of everything random; that of the fleet if None.
+        seed: Random seed; that of the fleet if None.
     """
     announce_stage(f"reading {results.name}")
     draws = read_fleet_draws(results)

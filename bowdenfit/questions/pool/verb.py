@@ -50,7 +50,7 @@ def pool(
         cycles: Before so many cycles the probability of falling below it is said.
         measurements: Folder that `bowdenfit fleet` fitted; the readings of inspections of which single fits tell too little
             are looked at again.
-        seed: Seed of everything random.
+        seed: Random seed.
         output: Folder for pool.html, pool.json, pool.txt and the figures; nothing is written without one.
         force: Replace an earlier answer in --output.
 

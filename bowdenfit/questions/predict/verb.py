@@ -81,10 +81,10 @@ def predict(
         wrap_angles: Predict at this wrap angle instead of a length, such as 90deg; or give a contact this one, such as
             "bracket edge=45deg"; may be repeated.
         preload: Preload the cable with this instead of its own, such as 20N.
-        friction_limit: What may be felt in free motion, for the preload window: 50N*mm (or 5N without a pulley radius).
+        friction_limit: Free-motion friction allowed, for the preload window: 50N*mm (or 5N without a pulley radius).
         spring: Stiffness of springs in series, one with each rope, for the stiffness: 5N/mm.
-        contact: Contact that the wrap angles are those of, while the others keep theirs, as a knee bends one of them: the mean
-            over these wrap angles is predicted.
+        contact: Contact that the wrap angles belong to, such as the one a knee bends; the others keep theirs. Predicts the mean
+            over these angles.
         gait: Table with those wrap angles in a column, a row each, such as those of a stride at equal times.
         gait_column: Its heading, where it is not one that means a wrap angle.
         table: Table with a row for each prediction: length, wrap angles of contacts, input_force or output_force, stroke.
@@ -235,7 +235,7 @@ VERB = Verb(
       output-force    force at the load side, of --input-force
       input-force     force at the motor that gives --output-force
       preload         tension at rest, and slack where there is none
-      friction        what moving the unloaded cable takes
+      friction        force that moves the unloaded cable
       slack-load      input force at which a loop's return side goes slack
       position        error and lost motion at the load side, by stretch, slack and
                       backlash
@@ -251,7 +251,7 @@ VERB = Verb(
     --wrap-angle NAME=ANGLE gives a contact this wrap angle, one for each contact; the
     others keep theirs.
 
-    --table FILE predicts a row each for many: columns with a length, the wrap angle
+    --table FILE predicts one row for each of many: columns with a length, the wrap angle
     of any contact, input_force or output_force, and stroke; what a row leaves blank
     is as fitted, and a column that is none of these is refused.
 
@@ -262,8 +262,8 @@ VERB = Verb(
     The 90 % interval is that of the cable's mean (q05 to q95 with --csv and
     --json); that of any one mounting also holds the scatter from one mounting of
     the cable to the next. A note marks what lies outside the lengths, wrap angles
-    and loads measured, and where nothing of the force is left: a rope pulls or is
-    slack, at 0 N.
+    and loads measured, and where no force is left (0 N: the rope is
+    slack).
     """,
     csv="Print as CSV, with mean, sd and quantiles.",
     warns=True,

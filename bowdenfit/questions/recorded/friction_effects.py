@@ -31,13 +31,13 @@ Points = tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]  # x, efficiencies
 
 @dataclass(frozen=True)
 class RateEffect:
-    """Efficiency at the highest speed less that at the lowest.
+    """Efficiency at the highest speed minus that at the lowest.
 
     Args:
         slow, fast: The speeds, in `unit`.
         unit: "r/min" or "mm/s".
         place: Route value in words; empty without a route.
-        difference: Efficiency at `fast` less that at `slow` [1].
+        difference: Efficiency at `fast` minus that at `slow` [1].
         probability_lower: Probability that efficiency is lower at `fast`.
     """
 
@@ -61,7 +61,7 @@ class RateEffect:
         )
         where = f" {self.place}" if self.place else ""
         return (
-            f"Efficiency{where} at {significant(self.fast)} {self.unit} less that at {significant(self.slow)} {self.unit}: "
+            f"Efficiency{where} at {significant(self.fast)} {self.unit} minus that at {significant(self.slow)} {self.unit}: "
             f"{100 * self.difference.median:+.2f} points (90 % interval {low:+.2f} to {high:+.2f}), {verdict}."
         )
 
@@ -100,7 +100,7 @@ def choose_recorded_length(fit: Record) -> tuple[float, str]:
 
 
 def _efficiency_differences(fit: Record, at: float, slow: float, fast: float) -> np.ndarray:
-    """Return draws of the efficiency at the fast speed less that at the slow one."""
+    """Return draws of the efficiency at the fast speed minus that at the slow one."""
     model, friction = fit.model, fit.model.cable.friction
 
     def difference(values: Mapping[str, jax.Array]) -> jax.Array:

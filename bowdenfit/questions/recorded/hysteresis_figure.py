@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Axes, Figure
     from bowdenfit.results.record import Record
 
-HEADING = "Output against input force of the recordings"
+HEADING = "Hysteresis loops of the recordings"
 MOST_COLUMNS = 4  # panels in a row
 WITHOUT_INTERVAL = 0.05  # uncertainty that sets the digits of an exponent without interval
 # stroke, name, marker, size [pt] and color

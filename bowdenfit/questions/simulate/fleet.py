@@ -132,7 +132,7 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
 
     Args:
         plan: What to simulate.
-        seed: Seed of everything random; a cable is the same whatever others there are.
+        seed: Random seed; a cable is the same whatever others there are.
         noise: Whether readings scatter.
     """
     bench, fleet = plan.bench, plan.fleet
@@ -195,7 +195,7 @@ def make_fleet(path: Path, output: Path | None, seed: int, noise: bool) -> Datas
     Args:
         path: The plan.
         output: Folder of the fleet; nothing is written without one.
-        seed: Seed of everything random.
+        seed: Random seed.
         noise: Whether readings scatter.
 
     Raises:

@@ -69,7 +69,7 @@ def make_recorded_data_set(path: Path, output: Path, seed: int, noise: bool) -> 
     Args:
         path: The plan.
         output: Folder of the data set.
-        seed: Seed of everything random.
+        seed: Random seed.
         noise: Whether readings, angles and mountings scatter.
 
     Raises:
@@ -89,7 +89,7 @@ def make_recordings(plan: RecordingsPlan, seed: int, noise: bool = True) -> Reco
 
     Args:
         plan: The plan.
-        seed: Seed of everything random.
+        seed: Random seed.
         noise: Whether readings, angles and mountings scatter, and spikes and gaps occur; the other faults stay.
 
     Raises:

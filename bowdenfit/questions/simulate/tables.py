@@ -53,7 +53,7 @@ def make_data_set(path: Path, output: Path | None, seed: int, noise: bool) -> Da
     Args:
         path: The plan.
         output: Folder of the data set; nothing is written without one.
-        seed: Seed of everything random.
+        seed: Random seed.
         noise: Whether readings scatter.
 
     Raises:

@@ -32,7 +32,7 @@ def simulate(
     Args:
         bench: A cable.toml with [truth] and [design], or with [truth] and [recordings].
         output: Folder for the tables, the truth and the seed; must not exist.
-        seed: Seed of everything random.
+        seed: Random seed.
         noise: Readings that scatter, or exactly as the model expects them.
         recordings: Recordings, sample by sample, as a bench gives them; BENCH has [recordings].
         fleet: Many cables that wear, inspected again and again; BENCH has [fleet]. Answers with the first inspection.

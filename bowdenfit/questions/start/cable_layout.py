@@ -197,12 +197,12 @@ def _several_columns_question(words: str, columns: Sequence[FileColumn], file: s
         if not numbers_typed or not all(
             number.isdecimal() and 1 <= int(number) <= len(columns) for number in numbers_typed
         ):
-            raise UsageError(f"{shown(typed)} are none of them; write their numbers with blanks between, such as 1 2.")
+            raise UsageError(f"{shown(typed)} are none of them; write their numbers separated by spaces, such as 1 2.")
         return [columns[i - 1] for i in sorted({int(number) for number in numbers_typed})]
 
     why = f"{file} does not say which of its columns are wrap angles; write their unit into their headings."
     options = tuple(column.words for column in columns)
-    return Question(f"{words} Write their numbers with blanks between.", read, None, why, "1", options)
+    return Question(f"{words} Write their numbers separated by spaces.", read, None, why, "1", options)
 
 
 def _assign_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:

@@ -229,11 +229,11 @@ def numbers_question(
             values = tuple(float(part.replace(",", ".")) for part in typed.replace(";", " ").split())
         except ValueError:
             raise UsageError(
-                f"{shown(typed)} are not numbers; write them with blanks between, such as 430 530."
+                f"{shown(typed)} are not numbers; separate them by spaces, such as 430 530."
             ) from None
         if len(values) < least or (exactly is not None and len(values) != exactly):
             raise UsageError(
-                f"{shown(typed)}: {exactly or least} numbers are needed, with blanks between, such as 430 530."
+                f"{shown(typed)}: {exactly or least} numbers are needed, separated by spaces, such as 430 530."
             )
         if not all(-1e9 < number < 1e9 for number in values) or list(values) != sorted(set(values)):
             raise UsageError(f"{shown(typed)} are not in rising order; write the smallest first, such as 430 530.")

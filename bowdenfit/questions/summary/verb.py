@@ -88,7 +88,7 @@ SUMMARY_VERB = Verb(
 
     The summary is one page: the answer, whether to trust it, and what to do next.
     """,
-    json="Print summary.json instead of the summary for people.",
+    json="Print summary.json instead of the text summary.",
 )
 PLOT_VERB = Verb(
     plot,

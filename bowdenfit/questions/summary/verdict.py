@@ -71,7 +71,7 @@ class Verdict(Display):
         troubles: What is wrong, by kind: `NOT_CONVERGED`, `NOT_IDENTIFIABLE`, `CONTRADICTORY`, `IMPOSSIBLE`,
             `NOT_DESCRIBED`, `COPIED`, `CUT_OFF`, `COARSE`; each with sentences.
         sampled: Whether there are draws.
-        doubts: What chance does in one fit of a hundred or less, and is not enough to distrust it; clauses without a stop.
+        doubts: What chance does in one fit in a hundred or less, and is not enough to distrust it; clauses without a stop.
     """
 
     troubles: dict[str, tuple[str, ...]]

@@ -34,7 +34,7 @@ def teleoperate(
         fit: The fit.
         device: A device.toml that describes master, slave, hand, wall, and what is sent between them.
         wrap_angle: Range of wrap angles that the cable is bent to.
-        seed: Seed of everything random.
+        seed: Random seed.
         output: Folder for teleoperation.json, the text and the figure.
 
     Raises:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bowdenfit.plots.layout import Figure
     from bowdenfit.questions.watch.answer import History
 
-HEADING = "How the answer became known"
+HEADING = "How the answer narrowed"
 WIDTH = 5.6  # in
 _WHOLE_STEPS = 15  # mountings up to which each has its own mark on the axis
 

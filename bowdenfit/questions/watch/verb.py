@@ -40,7 +40,7 @@ def watch(
         until: Standard deviation to which it is to be known, such as 10mm; watching ends once it is and the fit may be
             trusted.
         output: Folder for the history as text, figure and JSON, which are written again after every verdict.
-        seed: Seed of everything random.
+        seed: Random seed.
         is_stopped: Asked between two looks at the files; watching ends where it returns True.
         reading: Keywords of `bowdenfit.read`.
 

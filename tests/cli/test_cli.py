@@ -379,7 +379,7 @@ def test_a_whole_fit_in_a_process_of_its_own_and_an_interrupt(on_body, tmp_path)
     command = [
         sys.executable,
         "-m",
-        "bowdenfit.cli",
+        "bowdenfit",
         "fit",
         str(on_body),
         "--output",

@@ -250,7 +250,7 @@ def test_what_a_killed_reader_was_writing_is_removed(tmp_path, monkeypatch):
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     (tmp_path / "reader_that_hangs.py").write_text(LEAVES_A_FILE)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(scratch))
     with apart._request_lock:
         if os.getpid() in apart._readers:

@@ -265,5 +265,5 @@ def test_a_slipped_angle_stands_out_of_least_squares_and_healthy_ones_do_not(tmp
     (folder / "angles.csv").write_text("\n".join(rows) + "\n")
     slipped = bf.fit(folder, mcmc=False)
     assert [each.label for each in slipped.least_squares.far_readings] == [f"sheath_angle at {length} mm"]
-    assert f"sheath_angle at {length} mm: a deviation as large" in " ".join(slipped.verdict().reasons)
+    assert f"sheath_angle at {length} mm: chance alone deviates as much" in " ".join(slipped.verdict().reasons)
     assert bf.fit(folder, mcmc=False, noise="student").verdict().trusted

@@ -155,7 +155,7 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     assert abs(effect.difference.median) < 0.01  # the truth is 0, mountings differ by 1 %
     page = json.loads((folder / "summary.json").read_text())
     assert page["rate_effect"]["difference"]["median"] == pytest.approx(effect.difference.median)
-    assert "Efficiency at 470 mm at 60 r/min minus that at 20 r/min" in " ".join(details_text(fit).split())
+    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(details_text(fit).split())
     (dependence,) = dependence_figure.data(fit)
     assert (dependence.what, dependence.label) == ("speed", "Speed (r/min)")
     assert len(dependence.points_x) == 4

@@ -19,7 +19,7 @@ _changing = RLock()
 
 
 def python_command(function: str, *arguments: str) -> list[str]:
-    """Command of a child process that calls one of our functions; it needs `safe_environment()`.
+    """Command of a child process that calls one of our functions; it needs `safe_environment()`, too.
 
     Folders that this process imports from, and Python does not know by itself, come last there.
 
@@ -29,12 +29,12 @@ def python_command(function: str, *arguments: str) -> list[str]:
     """
     module, _, name = function.partition(":")
     program = f"import sys; sys.path += [folder for folder in {_import_folders()!r} if folder not in sys.path]; "
-    return [sys.executable, "-c", f"{program}from {module} import {name}; {name}(*sys.argv[1:])", *arguments]
+    return [sys.executable, "-P", "-c", f"{program}from {module} import {name}; {name}(*sys.argv[1:])", *arguments]
 
 
 def safe_environment() -> dict[str, str]:
-    """Environment of a Python child process: its own child processes do not import from the working folder either."""
-    return {name: value for name, value in os.environ.items() if name != _VARIABLE} | {_SAFE: "1"}
+    """Environment of a Python child process, without PYTHONPATH."""
+    return {name: value for name, value in os.environ.items() if name != _VARIABLE}
 
 
 def _import_folders() -> list[str]:
@@ -44,8 +44,8 @@ def _import_folders() -> list[str]:
 
 def _without_working_folder(folders: Iterable[str]) -> list[str]:
     """Absolute folders other than the working folder."""
-    here = os.path.realpath(Path.cwd())
-    return [folder for folder in folders if Path(folder).is_absolute() and os.path.realpath(folder) != here]
+    working_folder = os.path.realpath(Path.cwd())
+    return [folder for folder in folders if Path(folder).is_absolute() and os.path.realpath(folder) != working_folder]
 
 
 @contextmanager
@@ -56,15 +56,15 @@ def starting_safely(keep_paths: bool = False) -> Iterator[None]:
         keep_paths: Whether PYTHONPATH stays, without the working folder: on a cluster, it may lead to the libraries.
     """
     with _changing:
-        before = {name: os.environ.get(name) for name in (_VARIABLE, _SAFE)}
+        saved = {name: os.environ.get(name) for name in (_VARIABLE, _SAFE)}
         folders = _without_working_folder(os.environ.pop(_VARIABLE, "").split(os.pathsep)) if keep_paths else []
         os.environ |= {_SAFE: "1", **({_VARIABLE: os.pathsep.join(folders)} if folders else {})}
         try:
             yield
         finally:
-            for name in before:
+            for name in saved:
                 os.environ.pop(name, None)
-            os.environ |= {name: value for name, value in before.items() if value is not None}
+            os.environ |= {name: value for name, value in saved.items() if value is not None}
 
 
 def ignore_local_settings() -> None:

@@ -162,10 +162,10 @@ def disk_error(path: Path, error: OSError) -> StoreError:
     return StoreError(f"{path} cannot be written ({why}); name another folder with --output.")
 
 
-def describe_unforeseen(error: Exception) -> str:
-    """Describe an error that is a fault of ours."""
+def describe_unforeseen(error: Exception, remedy: str = "This is our fault: please report it.") -> str:
+    """Describe an error that is a fault of ours, and what to do about it."""
     description = f"{type(error).__name__}: {error}".removesuffix(": ")
-    return f"something went wrong inside bowdenfit ({description}). This is our fault: please report it."
+    return f"something went wrong inside bowdenfit ({description}). {remedy}"
 
 
 def system_error(error: BaseException) -> BowdenfitError | None:

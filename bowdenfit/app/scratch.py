@@ -21,15 +21,15 @@ def scratch_folder() -> Iterator[Path]:
     """Make the folder in which everything temporary goes during a `with` block, after clearing those of killed apps."""
     _clear_abandoned(Path(tempfile.gettempdir()))
     folder = create_unfinished(lambda: Path(tempfile.mkdtemp(prefix=_PREFIX)))
-    before, variable = tempfile.tempdir, os.environ.get("TMPDIR")
+    saved_folder, saved_variable = tempfile.tempdir, os.environ.get("TMPDIR")
     with FileLock(folder / _LOCK, timeout=0):
         tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
         try:
             yield folder
         finally:
-            tempfile.tempdir = before
+            tempfile.tempdir = saved_folder
             os.environ.pop("TMPDIR")
-            os.environ |= {"TMPDIR": variable} if variable is not None else {}
+            os.environ |= {"TMPDIR": saved_variable} if saved_variable is not None else {}
     shutil.rmtree(folder, ignore_errors=True)
     forget_unfinished(folder)
 

@@ -14,7 +14,7 @@ from bowdenfit.child_process import ignore_local_settings
 from bowdenfit.cli.commands import bowdenfit, describe_error
 from bowdenfit.cli.running import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
-from bowdenfit.errors import BowdenfitError, UsageError, system_error
+from bowdenfit.errors import BowdenfitError, UsageError, describe_unforeseen, system_error
 from bowdenfit.words import few
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
@@ -71,10 +71,8 @@ def main() -> None:
         if os.environ.get("BOWDENFIT_DEBUG"):
             raise
         error.__traceback__ = None  # what they hold may be all the memory there is
-        description = f"{type(error).__name__}: {error}".removesuffix(": ")
-        unforeseen = f"something went wrong inside bowdenfit ({description}). {_suggest_remedy()}"
         refused = system_error(error)
-        _print_error(f"Error: {refused or unforeseen}")
+        _print_error(f"Error: {refused or describe_unforeseen(error, _suggest_remedy())}")
         sys.exit(refused.exit_code if refused else 1)
 
 

@@ -160,8 +160,8 @@ class Draft:
             return self.folder / name
         refuse_file_name(name)
         if Path(name).suffix.lower() not in FORMATS:
-            known = ", ".join(FORMATS)
-            raise UsageError(f"{shown(name)} is left out, because its extension is not one of measured files: {known}.")
+            extensions = ", ".join(FORMATS)
+            raise UsageError(f"{shown(name)} is left out, because its extension is not one of measured files: {extensions}.")
         if len(self.files) >= _MOST_FILES:
             raise UsageError(f"{shown(name)} is one file more than the {_MOST_FILES} that are taken; leave some out first.")
         return self.folder / name

@@ -346,8 +346,8 @@ def _report_error(error: Exception) -> None:
     """Print what went wrong in a page, while the app goes on."""
     if os.environ.get("BOWDENFIT_DEBUG"):
         traceback.print_exception(error)
-    known = error if isinstance(error, BowdenfitError) else system_error(error)
-    say(f"Error: {known or describe_unforeseen(error)}", err=True)
+    refusal = error if isinstance(error, BowdenfitError) else system_error(error)
+    say(f"Error: {refusal or describe_unforeseen(error)}", err=True)
 
 
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.

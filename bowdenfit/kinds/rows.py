@@ -204,17 +204,17 @@ def read_labels(cells: Sequence[Cell], if_blank: str) -> list[str]:
         DatasetError: Two labels may be the same.
     """
     places = [f"row {cell.row}" for cell in cells]
-    where = f"{cells[0].file}, column {shown(cells[0].column)}" if cells else ""
-    return unify_labels([cell.text.strip() or if_blank for cell in cells], places, where)
+    column = f"{cells[0].file}, column {shown(cells[0].column)}" if cells else ""
+    return unify_labels([cell.text.strip() or if_blank for cell in cells], places, column)
 
 
-def unify_labels(labels: Sequence[str], places: Sequence[str], where: str) -> list[str]:
+def unify_labels(labels: Sequence[str], places: Sequence[str], column: str) -> list[str]:
     """Return labels with whole numbers that are written differently, such as 7, 7.0 and +7, as they are written first.
 
     Args:
         labels: What stands in each place.
         places: Each in words.
-        where: Where all of them are.
+        column: File and column that all of them are in.
 
     Raises:
         DatasetError: A label is another one behind a sign, as #11 is 11.
@@ -226,7 +226,7 @@ def unify_labels(labels: Sequence[str], places: Sequence[str], where: str) -> li
         other = first.get(label_key(key[sign.end() :])) if sign else None
         if other is not None:
             raise DatasetError(
-                f"{where}: {shown(labels[i])} in {places[i]} and {shown(labels[other])} in {places[other]} are two labels that "
+                f"{column}: {shown(labels[i])} in {places[i]} and {shown(labels[other])} in {places[other]} are two labels that "
                 "may mean the same; the usual cause is that one of them was typed differently. Write them alike if they are "
                 "one mounting of the cable, or call one of them by another name."
             )

@@ -29,8 +29,8 @@ class Browser:
 
     def __init__(self, app, address=""):
         self.port = app.port
-        where = urlsplit(address or app.new_address())
-        answer, page = self.get(f"{where.path}?{where.query}", root="", headers={})
+        parts = urlsplit(address or app.new_address())
+        answer, page = self.get(f"{parts.path}?{parts.query}", root="", headers={})
         assert answer.status == 200, page
         cookie = answer.getheader("set-cookie").partition(";")[0]
         self.root, self.headers = re.search(r"url=(/[^/]+)/", page.decode())[1], {"cookie": cookie}

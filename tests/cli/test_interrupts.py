@@ -195,13 +195,13 @@ def test_an_interrupt_while_something_is_written_leaves_nothing_unfinished(tmp_p
     target.write_text("of somebody")
     written_by_another = tmp_path / ".posterior.nc.0123456789abcdef.partial"
     written_by_another.symlink_to(target)
-    before = sorted(tmp_path.iterdir())
+    contents = sorted(tmp_path.iterdir())
     program = INTERRUPT_WHILE_WRITING.format(opened=opened, begin=begin)
     command = [sys.executable, "-c", program, str(tmp_path)]
     surroundings = os.environ | {"TMPDIR": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=surroundings)
     assert (done.returncode, done.stderr) == (130, "Interrupted.\n")
-    assert sorted(tmp_path.iterdir()) == before
+    assert sorted(tmp_path.iterdir()) == contents
     assert target.read_text() == "of somebody"
 
 

@@ -32,13 +32,13 @@ def _with_protractor(folder, longest):
 def test_angles_cut_off_by_the_protractor_are_named_and_their_fit_is_not_trusted(tmp_path, run):
     """mu_sheath of the bench is 0.10; with six angles cut off it would be 0.157."""
     code, out, _ = run("check", _with_protractor(tmp_path / "cut", 49.4))
-    said = " ".join(out.split())
-    assert code == 0 and "1 warning, at the end" in said
+    printed = " ".join(out.split())
+    assert code == 0 and "1 warning, at the end" in printed
     assert (
         "angles.csv, rows 10, 11, 12, 13, 14 and 15, column 'lower_sheath_angle': the highest value, 49.4 deg, is there 6 times"
-        in said
+        in printed
     )
-    assert "record one more digit" in said
+    assert "record one more digit" in printed
     code, out, _ = run("fit", tmp_path / "cut", "--no-mcmc", "--no-figures", "-o", tmp_path / "fit")
     assert code == 3
     assert "some of the readings are cut off where a range ends" in " ".join(out.split())
@@ -112,12 +112,12 @@ def _route_and_angles(generator):
 @pytest.mark.extended
 def test_of_healthy_angles_at_most_one_in_a_thousand_is_named_and_most_that_are_cut_off():
     """Of 20,000 healthy columns none was; of 1483 cut off, with noise of five digits or more and five lengths beyond, 1153."""
-    generator, healthy, found = np.random.default_rng(11), 0, []
+    generator, healthy, detected = np.random.default_rng(11), 0, []
     for _ in range(2000):
         along, angle, digit, noise = _route_and_angles(generator)
         healthy += _named((angle / digit).round() * digit, along)
         limit = digit * round(generator.uniform(0.5, 0.8) * angle.max() / digit)
         if noise >= 5 * digit and 5 <= np.sum(angle > limit + noise) <= len(angle) - 6:
-            found.append(_named((np.minimum(angle, limit) / digit).round() * digit, along))
+            detected.append(_named((np.minimum(angle, limit) / digit).round() * digit, along))
     assert healthy <= 2
-    assert len(found) > 100 and np.mean(found) > 0.6, (len(found), np.mean(found))
+    assert len(detected) > 100 and np.mean(detected) > 0.6, (len(detected), np.mean(detected))

@@ -33,17 +33,17 @@ def _with_force(rows, end, row, force):
 @pytest.mark.parametrize("bench", [{"mountings": 8, "loads": (30.0,), "strokes": (1,)}, {"repeats": 2}, {"strokes": (-1,)}])
 def test_a_force_of_600000_among_30_is_named_by_check_with_row_column_and_value(tmp_path, refuse, bench, end):
     """With one reading of each mounting nothing else shows it before the fit."""
-    said = refuse("check", write(tmp_path / "far", _with_force(_bench(**bench), end, 4, 600000.0)))
+    printed = refuse("check", write(tmp_path / "far", _with_force(_bench(**bench), end, 4, 600000.0)))
     column = {"force_in": "input_force", "force_out": "output_force"}[end]
-    assert f"forces.csv, row 6, column '{column}': 600000 N is far from the other forces, half of which are at most" in said
-    assert "the usual cause is a missing decimal point or a wrong unit" in said
+    assert f"forces.csv, row 6, column '{column}': 600000 N is far from the other forces, half of which are at most" in printed
+    assert "the usual cause is a missing decimal point or a wrong unit" in printed
     bf.check(write(tmp_path / "twin", _bench(**bench)))
 
 
 def test_a_row_whose_forces_are_both_far_is_named_in_both_columns(tmp_path, refuse):
     rows = _with_force(_with_force(_bench(), "force_in", 4, 600000.0), "force_out", 4, 442000.0)
-    said = refuse("check", write(tmp_path, rows), faults=2)
-    assert "column 'input_force': 600000 N" in said and "column 'output_force': 442000 N" in said
+    printed = refuse("check", write(tmp_path, rows), faults=2)
+    assert "column 'input_force': 600000 N" in printed and "column 'output_force': 442000 N" in printed
 
 
 def test_a_load_of_a_table_of_stretch_that_is_far_from_the_others_is_named():
@@ -64,7 +64,7 @@ def _is_refused(force_in, force_out, group):
 
 def test_forces_from_1_n_to_10_kn_in_one_table_are_not_named_and_one_that_is_20000_times_too_large_is():
     """Loads of any size with drag, cells off by 0.3 N; none of 2,000 tables is refused, and all slips are found."""
-    generator, found = np.random.default_rng(3), []
+    generator, is_refused = np.random.default_rng(3), []
     for _ in range(2000):
         n = int(generator.integers(4, 40))
         loads = [np.exp(generator.uniform(0, np.log(1e4), n)), generator.choice([1.0, 10.0, 100.0, 1e3, 1e4], n)]
@@ -77,5 +77,5 @@ def test_forces_from_1_n_to_10_kn_in_one_table_are_not_named_and_one_that_is_200
         load = generator.uniform(10, 200, n)
         out = load * np.exp(-stroke * generator.uniform(0.01, 1.5))
         (load, out)[generator.integers(2)][generator.integers(n)] *= 20000
-        found.append(_is_refused(load, out, stroke))
-    assert np.mean(found) > 0.99, np.mean(found)
+        is_refused.append(_is_refused(load, out, stroke))
+    assert np.mean(is_refused) > 0.99, np.mean(is_refused)

@@ -44,8 +44,8 @@ def test_numbers_that_are_written_differently_are_one_mounting(tmp_path):
 
 
 def test_a_label_behind_a_sign_beside_the_label_itself_is_refused_with_both_rows(tmp_path, refuse):
-    said = refuse("check", _bench(tmp_path, ("7", "2", "#11")))
-    assert "forces.csv, column 'run': '#11' in row 27 and '11' in row 26 are two labels that may mean the same" in said
+    printed = refuse("check", _bench(tmp_path, ("7", "2", "#11")))
+    assert "forces.csv, column 'run': '#11' in row 27 and '11' in row 26 are two labels that may mean the same" in printed
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_a_label_that_several_files_have_is_said_to_be_a_mounting_of_its_own_in_
         (folder / f"{name}.csv").write_text("\n".join([heading, *lines]) + "\n")
     (folder / "forces.csv").unlink()
     (folder / "cable.toml").write_text(BENDS.replace('file = "forces.csv"', 'files = ["a.csv", "b.csv"]'))
-    said = " ".join(accept("check", folder).split())
-    assert "runs are counted file by file: 7 is in several of the 2 files of forces" in said
+    printed = " ".join(accept("check", folder).split())
+    assert "runs are counted file by file: 7 is in several of the 2 files of forces" in printed
     (folder / "b.csv").write_text((folder / "b.csv").read_text().replace(",7.0\n", ",8\n"))
     assert "file by file" not in accept("check", folder)
 

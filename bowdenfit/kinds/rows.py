@@ -226,9 +226,9 @@ def unify_labels(labels: Sequence[str], places: Sequence[str], column: str) -> l
         other = first.get(label_key(key[sign.end() :])) if sign else None
         if other is not None:
             raise DatasetError(
-                f"{column}: {shown(labels[i])} in {places[i]} and {shown(labels[other])} in {places[other]} are two labels that "
-                "may mean the same; the usual cause is that one of them was typed differently. Write them alike if they are "
-                "one mounting of the cable, or call one of them by another name."
+                f"{column}: {shown(labels[i])} in {places[i]} and {shown(labels[other])} in {places[other]} are two labels "
+                "that may mean the same; the usual cause is that one of them was typed differently. Write them alike if they "
+                "are one mounting of the cable, or call one of them by another name."
             )
     return [labels[first[key]] for key in keys]
 

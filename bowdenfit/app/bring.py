@@ -106,12 +106,16 @@ async def show_draft(workbench: Workbench, draft: Draft) -> None:
         place = block("div")
 
     async def look_again() -> None:
-        understanding = await workbench.compute(draft.understand)
+        understanding = Understanding() if draft.is_arriving else await workbench.compute(draft.understand)
         place.clear()
         with place:
+            if draft.is_arriving:
+                text("Files are on their way.")
+                return
             _show_understanding(workbench, draft, understanding, look_again)
         sheet.mark(understanding.refusals)
 
+    draft.is_arriving = False  # a page that was closed while it sent files never says that they all arrived
     sheet = TypedSheet(draft, look_again)
     with zone:
         _show_drop_zone(draft, look_again)
@@ -128,6 +132,7 @@ def _show_drop_zone(draft: Draft, look_again: Again) -> None:
     target = f"{session_root()}{address('upload', draft.key)}"
 
     async def taken(event: object) -> None:
+        draft.is_arriving = False
         for sentence in getattr(event, "args", ()) or ():
             notify(str(sentence))
         await look_again()

@@ -122,6 +122,7 @@ class Draft:
         understanding: What was understood when it was last looked at.
         is_described: Whether a cable.toml was brought with the files.
         cable: What that calls the cable.
+        is_arriving: Whether files are on their way into it, so that it is not read yet.
     """
 
     folder: Path
@@ -131,6 +132,7 @@ class Draft:
     understanding: Understanding = Understanding()
     is_described: bool = False
     cable: str = ""
+    is_arriving: bool = False
 
     @property
     def key(self) -> str:
@@ -239,6 +241,8 @@ class Draft:
         Raises:
             UsageError, StoreError: It exists, or cannot be written; or questions are open.
         """
+        if self.is_arriving:
+            raise UsageError("files are still on their way; write the data set when they are listed above.")
         if not self.understanding.description:
             raise UsageError("it cannot be read yet, or questions are still open; see above, and answer them first.")
         refuse_existing(folder)

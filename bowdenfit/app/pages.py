@@ -105,7 +105,9 @@ def _register_files(workbench: Workbench, application: FastAPI) -> None:
     @application.put("/upload/{key}")
     async def take_file(key: str, name: str, request: Request) -> Response:
         try:
-            await _write_upload(workbench.drafts[key].new_file(name), request)
+            draft = workbench.drafts[key]
+            draft.is_arriving = True
+            await _write_upload(draft.new_file(name), request)
         except KeyError:
             return PlainTextResponse("The app was restarted since this page was opened; load it again.", _MISSING)
         except BowdenfitError as error:

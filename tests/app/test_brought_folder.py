@@ -129,3 +129,11 @@ def test_a_data_set_may_not_have_the_name_of_a_module(name):
 @pytest.mark.parametrize("name", ["my-cable", "bench 1", "knee", "Seil_3"])
 def test_usual_names_of_data_sets_are_taken(name):
     refuse_module_name(name)
+
+
+def test_nothing_is_written_while_files_are_on_their_way(draft, tmp_path):
+    assert bring(draft, cable=describe_half_turn(), forces=TABLE).report
+    draft.is_arriving = True
+    with pytest.raises(UsageError, match="still on their way"):
+        draft.write(tmp_path / "written")
+    assert not (tmp_path / "written").exists()

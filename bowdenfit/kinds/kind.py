@@ -173,6 +173,10 @@ class Kind(ABC, Generic[AnyTable]):
         """Return which readings were copied from others, in sentences without a first capital or remedy."""
         return []
 
+    def misread_angles(self, table: AnyTable, description: Description) -> str:
+        """Describe wrap angles that must be wrong, because equal ones lose too differently; empty if there are none."""
+        return ""
+
     def coarse_readings(self, table: AnyTable) -> CoarseReadings | None:
         """Return what is known of a table whose repeated readings are equal to the last digit; None for any other."""
         return None

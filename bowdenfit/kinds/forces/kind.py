@@ -12,6 +12,7 @@ from bowdenfit.errors import suggest_name
 from bowdenfit.files.columns import Quantity
 from bowdenfit.kinds.bench_error import BenchError
 from bowdenfit.kinds.forces.impossible_forces import check_following, check_gains
+from bowdenfit.kinds.forces.misread_angles import describe_misread_angles
 from bowdenfit.kinds.forces.mountings import ForceSettings
 from bowdenfit.kinds.forces.stated_noise import describe_scatter, log_ratio_variance
 from bowdenfit.kinds.forces.table import ForceTable, count_loads, read_forces
@@ -187,6 +188,10 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
                 listed(table.origin.files), table.run, names, stroke, forces, table.input_force, curve, table.origin
             )
         )
+
+    @override
+    def misread_angles(self, table: ForceTable, description: Description) -> str:
+        return describe_misread_angles(table, description)
 
     @override
     def coarse_readings(self, table: ForceTable) -> CoarseReadings | None:

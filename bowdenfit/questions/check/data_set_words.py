@@ -118,7 +118,7 @@ def _groups_note(dataset: Dataset, coefficient: str) -> str:
 def collect_warnings(dataset: Dataset) -> list[str]:
     """Return warnings about what the measurements cannot determine, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [*describe_copied_readings(dataset), *describe_cut_off_readings(dataset)]
+    warnings = [*describe_copied_readings(dataset), *describe_cut_off_readings(dataset), *describe_wrong_angles(dataset)]
     free = [
         n
         for n in description.coefficients
@@ -154,6 +154,12 @@ def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:
         "intervals are too narrow: leave them out, or put in what was measured."
         for sentence in copies
     )
+
+
+def describe_wrong_angles(dataset: Dataset) -> tuple[str, ...]:
+    """Describe wrap angles that must be wrong, table by table; see `Kind.misread_angles`."""
+    sentences = (kind.misread_angles(table, dataset.description) for kind, table in iterate_tables(dataset.measurements))
+    return tuple(sentence for sentence in sentences if sentence)
 
 
 def describe_cut_off_readings(dataset: Dataset) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ from bowdenfit.questions.check.data_set_words import (
     check_data_set,
     describe_copied_readings,
     describe_cut_off_readings,
+    describe_wrong_angles,
     describe_first_and_last_rows,
     describe_row_account,
 )
@@ -254,7 +255,7 @@ def describe_table_file(
     lines += ["", *describe_row_account(account)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
-        faults = (*describe_copied_readings(data), *describe_cut_off_readings(data))
+        faults = (*describe_copied_readings(data), *describe_cut_off_readings(data), *describe_wrong_angles(data))
         lines += [filled(f"Warning: {sentence}") for sentence in faults]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]

@@ -9,7 +9,11 @@ from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
 from bowdenfit.kinds import describe_reading, find_readings
 from bowdenfit.questions.check.answer import check_readings
-from bowdenfit.questions.check.data_set_words import describe_copied_readings, describe_cut_off_readings
+from bowdenfit.questions.check.data_set_words import (
+    describe_copied_readings,
+    describe_cut_off_readings,
+    describe_wrong_angles,
+)
 from bowdenfit.questions.check.implausible_readings import (
     describe_coarse_readings,
     describe_implausible_friction,
@@ -99,7 +103,7 @@ def assess_fit(fit: Record) -> Verdict:
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
         NOT_IDENTIFIABLE: _sentences(describe_unidentified(fit)),
-        CONTRADICTORY: _sentences(describe_contradiction(fit)),
+        CONTRADICTORY: describe_wrong_angles(fit.dataset) + _sentences(describe_contradiction(fit)),
         IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
         COPIED: copies,
         CUT_OFF: describe_cut_off_readings(fit.dataset),

@@ -1,0 +1,139 @@
+"""Wrap angles that are off by half or whole turns: readings of one run at equal loads whose friction differs by a factor.
+
+450 deg is easily written as 90. Nothing that a mounting does explains rows of one run at one angle and equal loads that lose
+twice as much as others; the turns that would explain it are those with which all groups of rows have one friction coefficient.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bowdenfit.description import Description
+from bowdenfit.kinds.forces.table import ForceTable
+from bowdenfit.types import Labels, Vector
+from bowdenfit.words import listed, percent
+
+# Judgements, by which none of 4000 healthy benches is named (tests/kinds/test_misread_angles.py).
+_FACTOR = 2.0  # friction of one part of a run over that of the other, at equal loads
+_CLEAR = 10.0  # the gap between both parts over the scatter inside them
+_FEWEST = 2  # readings of each part, and loads at which both were read
+_EQUAL_LOADS = 0.1  # relative difference
+_ALIKE = 0.1  # relative difference of friction coefficients that turns have explained
+_MOST_TURNS = 4  # half turns that a note of an angle may lack
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Rows at one angle that lose alike.
+
+    Args:
+        rows: Their numbers in the table.
+        angle: Wrap angle as it was read [rad].
+        loss: Median friction exponent [1].
+        is_split: Whether other rows of the same run and angle lose otherwise.
+    """
+
+    rows: Labels
+    angle: float
+    loss: float
+    is_split: bool
+
+
+def describe_misread_angles(table: ForceTable, description: Description) -> str:
+    """Describe runs whose readings at one angle and equal loads differ by a factor of two; empty if there are none.
+
+    Only cables whose one contact has the angles of its rows are looked at.
+    """
+    if len(description.contact) != 1 or table.own.angle.shape[1] != 1 or not np.isfinite(table.own.angle).all():
+        return ""
+    groups = _group_rows(table)
+    split = [group for group in groups if group.is_split]
+    if not split:
+        return ""
+    low, high = (group for group in split if group.angle == split[0].angle)
+    seen = (
+        f"Of the readings at {np.rad2deg(split[0].angle):.4g} deg in {listed(table.origin.files)}, some transmit about "
+        f"{percent(np.exp(-low.loss), 0)} of the force, and others at equal loads in the same run "
+        f"{percent(np.exp(-high.loss), 0)}, which no mounting explains"
+    )
+    turns = _find_turns(groups)
+    if turns is None:
+        return (
+            f"{seen}. The usual causes are an angle noted wrongly, rows of several mountings without a column run, and a rope "
+            "that was changed or greased in between; correct the rows, or add that column."
+        )
+    wrong = [
+        f"{np.rad2deg(group.angle):.4g} deg in {_name_rows(table, group)}, where {np.rad2deg(group.angle) + 180 * n:.4g} deg fits"
+        for group, n in zip(groups, turns, strict=True)
+        if n
+    ]
+    return (
+        f"{seen}. All rows have one friction coefficient if these angles were noted wrongly by half or whole turns: "
+        f"{'; '.join(wrong)}. Correct them if that is how the cable was wrapped."
+    )
+
+
+def _name_rows(table: ForceTable, group: _Group) -> str:
+    """Name the rows of a group: the first ones, and how many more."""
+    rows = [str(table.origin.row[row]) for row in group.rows[:4]]
+    more = len(group.rows) - len(rows)
+    return f"{'rows' if len(group.rows) > 1 else 'row'} {listed([*rows, *([f'{more} more'] if more else [])])}"
+
+
+def _group_rows(table: ForceTable) -> list[_Group]:
+    """Group sliding rows by angle, and those of one angle by how much they lose if that differs inside a run."""
+    sliding = np.flatnonzero((table.stroke != 0) & (table.own.angle[:, 0] > 0))
+    log_ratio = np.log(table.input_force / table.output_force) * table.stroke
+    degrees = np.round(np.rad2deg(table.own.angle[:, 0]), 1)
+    labels = np.array(table.group) if table.group else np.zeros(len(table.run), dtype=int)
+    groups = list[_Group]()
+    for angle in np.unique(degrees[sliding]):
+        rows = sliding[degrees[sliding] == angle]
+        limit = max(
+            (
+                _split_loss(log_ratio[part], table.input_force[part])
+                for label in np.unique(labels[rows])
+                for run in np.unique(table.run[rows])
+                for part in [rows[(table.run[rows] == run) & (labels[rows] == label)]]
+            ),
+            default=float("nan"),
+            key=lambda loss: -np.inf if np.isnan(loss) else loss,
+        )
+        parts = [rows] if np.isnan(limit) else [rows[log_ratio[rows] < limit], rows[log_ratio[rows] >= limit]]
+        groups += [
+            _Group(part, float(np.deg2rad(angle)), float(np.median(log_ratio[part])), len(parts) > 1) for part in parts
+        ]
+    return groups
+
+
+def _split_loss(loss: Vector, load: Vector) -> float:
+    """Friction exponent between two parts of a run that differ by `_FACTOR` at equal loads; NaN if they do not."""
+    order = np.argsort(loss)
+    gaps = np.diff(loss[order])[_FEWEST - 1 : len(loss) - _FEWEST]
+    if len(gaps) == 0:
+        return float("nan")
+    cut = int(np.argmax(gaps)) + _FEWEST
+    low, high = order[:cut], order[cut:]
+    squares = sum(float(np.sum((loss[part] - loss[part].mean()) ** 2)) for part in (low, high))
+    scatter = np.sqrt(squares / max(len(loss) - 2, 1))
+    if loss[order[0]] <= 0 or loss[high].min() < _FACTOR * loss[low].max() or np.max(gaps) < _CLEAR * scatter:
+        return float("nan")
+    pairs = np.abs(np.log(load[low][:, None] / load[high])) < _EQUAL_LOADS
+    both = min(int(pairs.any(axis=1).sum()), int(pairs.any(axis=0).sum()))
+    return float(loss[high].min() + loss[low].max()) / 2 if both >= _FEWEST else float("nan")
+
+
+def _find_turns(groups: list[_Group]) -> list[int] | None:
+    """Half turns by which each group's angle is off, the fewest groups with which all have one coefficient; None without."""
+    angle, loss = np.array([group.angle for group in groups]), np.array([group.loss for group in groups])
+    best: list[int] | None = None
+    for coefficient in loss / angle:
+        turns = np.clip(np.round((loss / coefficient - angle) / np.pi), -_MOST_TURNS, _MOST_TURNS).astype(int)
+        fitted = coefficient * (angle + turns * np.pi)
+        right = turns == 0
+        explained = np.all(fitted > 0) and np.all(np.abs(loss / np.where(fitted > 0, fitted, 1.0) - 1) < _ALIKE)
+        if not explained or np.sum(right) < 2 or len(np.unique(angle[right])) < 2 or np.sum(~right) > np.sum(right):
+            continue
+        if best is None or np.sum(~right) < np.count_nonzero(best):
+            best = [int(n) for n in turns]
+    return best

@@ -1,7 +1,7 @@
 """The cable itself: its contacts in series, their wrap angles, and the friction exponent at any length."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import jax.numpy as jnp
@@ -42,10 +42,20 @@ class Cable:
         """The curve of each curved contact, by its column."""
         route = self.description.route
         return {
-            source.column: load_class(CURVES[source.curve].place)(source.column, route)
+            source.column: load_class(CURVES[source.curve].place)(source.column, route, source.departure == "smooth")
             for source in (c.wrap_angle for c in self.description.contact)
             if route is not None and source.column is not None and source.curve is not None
         }
+
+    def departing(self, columns: Collection[str]) -> "Cable":
+        """Return the cable with smooth departures of the angles in columns from their curves."""
+        contacts = []
+        for contact in self.description.contact:
+            if contact.wrap_angle.column in columns:
+                angle = contact.wrap_angle.model_copy(update={"departure": "smooth"})
+                contact = contact.model_copy(update={"wrap_angle": angle})
+            contacts.append(contact)
+        return replace(self, description=self.description.model_copy(update={"contact": tuple(contacts)}))
 
     @cached_property
     def elasticity(self) -> Elasticity:

@@ -13,6 +13,7 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
+from bowdenfit.cable.departure import N_FUNCTIONS, departure_functions, departure_variances
 from bowdenfit.description import PriorDefaults, Route
 from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
@@ -35,6 +36,7 @@ class Curve(ABC):
     Args:
         column: Column of its angles.
         route: Route variable and the range over which the curve holds.
+        departs: Whether the angle departs smoothly from the family's curve.
     """
 
     coefficients: ClassVar[tuple[str, ...]]
@@ -44,14 +46,52 @@ class Curve(ABC):
     not_limited: ClassVar[str] = ""
     """What it means that a derived quantity goes to infinity; empty where none can."""
 
-    def __init__(self, column: str, route: Route) -> None:
+    def __init__(self, column: str, route: Route, departs: bool = False) -> None:
         self.column, self.middle, self.half_width, self.unit = column, route.middle, route.half_width, route.unit
         self.what = column.replace("_", " ")
         self.names = tuple(f"{column}_{ending}" for ending in self.coefficients)
+        self.departs = departs
+        self.size_name = f"{column}_departure"
+        self.rms_name = f"{self.size_name}_rms"
+        self.weight_names = tuple(f"{self.size_name}_{number}" for number in range(1, N_FUNCTIONS + 1))
 
     @abstractmethod
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Return its parameters, with priors that may use the detected angles [rad]."""
+        """Parameters of the family's curve, with priors that may use the detected angles [rad]."""
+
+    def departure_parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
+        """Size of the departure [rad] and the weights of its functions [1]; none if it does not depart."""
+        if not self.departs:
+            return ()
+        prior, unit = HalfNormal(defaults.departure_share * _median(detected, defaults)), ("deg", 1 / _DEGREE)
+        words, meaning = prior.text(*unit, digits=3), f"scale of the departure of the {self.what} from its curve"
+        size = Parameter(self.size_name, self._symbol("s"), meaning, "noise", prior, *unit, prior_words=words)
+        weights = (
+            Parameter(
+                name, self._symbol(f"w{number}"), f"weight {number} of the departure of the {self.what}", "departure",
+                Normal(0.0, 1.0),
+            )
+            for number, name in enumerate(self.weight_names, 1)
+        )  # fmt: skip
+        return (size, *weights)
+
+    def departure(self, values: Mapping[str, Array], z: Float[Array, " rows"]) -> Float[Array, " rows"]:
+        """Departure from the family's curve [rad] at z."""
+        return values[self.size_name] * (departure_functions(z) @ self._weights(values))
+
+    def departure_rms(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Root mean square of the departure over the range [deg], by name; none if it does not depart."""
+        if not self.departs:
+            return {}
+        mean_square = jnp.sum(departure_variances() * self._weights(values) ** 2)
+        return {self.rms_name: jnp.rad2deg(values[self.size_name] * jnp.sqrt(mean_square))}
+
+    def departure_units(self) -> dict[str, tuple[str, str]]:
+        """Unit and symbol of what `departure_rms` gives."""
+        return {self.rms_name: ("deg", self._symbol("D"))} if self.departs else {}
+
+    def _weights(self, values: Mapping[str, Array]) -> Float[Array, " functions"]:
+        return jnp.stack([values[name] for name in self.weight_names])
 
     @abstractmethod
     def at(self, z: Float[Array, " rows"], *coefficients: Array) -> Float[Array, " rows"]:
@@ -67,8 +107,10 @@ class Curve(ABC):
         return {}
 
     def wrap_angle(self, values: Mapping[str, Array], route: Float[Array, " rows"]) -> Float[Array, " rows"]:
-        """Return the wrap angle [rad] at values of the route variable."""
-        return self.at((route - self.middle) / self.half_width, *(values[name] for name in self.names))
+        """Wrap angle [rad] at values of the route variable; 0 where a departure would make it negative."""
+        z = (route - self.middle) / self.half_width
+        angle = self.at(z, *(values[name] for name in self.names))
+        return jnp.maximum(angle + self.departure(values, z), 0.0) if self.departs else angle
 
     def _parameter(
         self, ending: str, letter: str, meaning: str, prior: Prior, unit: str = "1", scale: float = 1.0, words: str = ""

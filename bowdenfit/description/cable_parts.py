@@ -57,6 +57,7 @@ class WrapAngle(Frozen):
 
     curve: Choice | None = None
     column: Name | None = None
+    departure: Literal["smooth", "none"] = "none"
     published_range: tuple[Finite, Finite] | None = None
     nominal: QuantityValue | None = None
     value: NonNegative | None = None
@@ -75,6 +76,8 @@ class WrapAngle(Frozen):
             raise ValueError("unit and sd belong to a constant angle; a column carries its unit in its heading")
         if self.published_range is not None and self.curve is None:
             raise ValueError("published_range belongs to a curve")
+        if self.departure == "smooth" and self.curve is None:
+            raise ValueError('departure = "smooth" belongs to a curve: it is how an angle departs from that')
         if self.nominal is not None and self.curve is not None:
             raise ValueError("nominal belongs to an angle measured in each row, without a curve")
         return self

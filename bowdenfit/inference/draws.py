@@ -67,13 +67,14 @@ def shown_values(model: Model, values: Mapping[str, Array]) -> dict[str, Array]:
     """Return free parameters and derived curve coefficients by name, in shown units, from values in internal units."""
     shown = {p.name: values[p.name] * p.shown_scale for p in model.space.free}
     for curve in model.cable.curves.values():
-        shown |= curve.derived(values)
+        shown |= curve.derived(values) | curve.departure_rms(values)
     return shown
 
 
 def derived_units(model: Model) -> dict[str, tuple[str, str]]:
     """Return unit and symbol of every derived curve coefficient, by name."""
-    return {name: unit for curve in model.cable.curves.values() for name, unit in curve.derived_units().items()}
+    every = (curve.derived_units() | curve.departure_units() for curve in model.cable.curves.values())
+    return {name: unit for units in every for name, unit in units.items()}
 
 
 def compile_replicator(posterior: LogDensity, seed: int, beside: Executor | None = None) -> DrawFunction:

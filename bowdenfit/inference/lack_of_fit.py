@@ -14,14 +14,20 @@ References:
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from scipy.special import fdtrc, stdtr
 
+from bowdenfit.cable.departure import N_FUNCTIONS
+from bowdenfit.inference.compilation import compile_program
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.objective import Solution
 from bowdenfit.inference.profiles import Basin
-from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, group_residuals
+from bowdenfit.inference.residual_groups import ResidualGroup, ResidualGroups, explain_residuals, group_residuals
 from bowdenfit.inference.scalar_priors import clipped_z
 from bowdenfit.kinds.plausibility import MOST_LEVELS
 from bowdenfit.kinds.sliding_rows import ORDER, SPEED, STROKE, ZERO
@@ -108,8 +114,10 @@ def find_departures(
         reach: Half of the 90 % interval of each identified parameter, in its shown unit.
     """
     model = basin.problem.posterior.model
-    system = group_residuals(model, _reweigh_by_scatter(basin, model, scale))
+    reweighed = _reweigh_by_scatter(basin, model, scale)
+    system = group_residuals(model, reweighed)
     candidates = [departure for readings in system.readings for departure in _test_departures(system, readings)]
+    candidates += _test_curves(basin.problem.posterior, reweighed, system)
     corrected = (replace(departure, p_value=min(departure.p_value * len(candidates), 1.0)) for departure in candidates)
     assessed = (
         _assess_drift(basin, reach, system, departure) if departure.against == ZERO else departure
@@ -206,6 +214,58 @@ def _test_departures(system: ResidualGroups, readings: ResidualGroup) -> Iterato
                         *tested,
                         *_compare_thirds(readings, x, selected),
                     )
+
+
+def _test_curves(posterior: LogDensity, solution: Solution, system: ResidualGroups) -> Iterator[Departure]:
+    """Test whether angles and forces together depart smoothly from the curve of each contact, and of all at once.
+
+    A curve that is slightly wrong shifts forces as well as angles, and each of the two may be too few to show it.
+    """
+    model = posterior.model
+    readings = next((r for r in system.readings if any(r.group) and set(r.group) <= set(model.cable.curves)), None)
+    tested = [column for column, curve in model.cable.curves.items() if not curve.departs]
+    if readings is None or not tested or len(model.terms) == 1:  # angles alone were tested against their position
+        return
+    columns = _derive_by_departures(posterior, solution, tested)
+    for group in [*([column] for column in tested), *([tested] if len(tested) > 1 else [])]:
+        explained = explain_residuals(model, solution, np.concatenate([columns[column] for column in group], axis=1))
+        if not explained.rank or explained.freedom < _LEAST_FREEDOM:
+            continue
+        p_value = float(fdtrc(explained.rank, explained.freedom, explained.squares / explained.rank))
+        moved, read = explained.by_table[readings.table]
+        parts = {column: np.array(readings.group) == column for column in group}
+        sizes = {
+            column: float(np.sqrt(np.mean(moved[part] ** 2) / np.mean(read[part] ** 2)))
+            for column, part in parts.items()
+            if np.any(read[part])
+        }
+        if sizes:
+            column = max(sizes, key=lambda column: sizes[column])
+            against, x = next(iter(readings.at.items()))
+            thirds = _compare_thirds(readings, x, readings.used & parts[column])
+            yield Departure(readings.table, column, against, False, p_value, sizes[column], *thirds)
+
+
+def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Sequence[str]) -> dict[str, np.ndarray]:
+    """Derivatives of all residuals by the functions of each curve's departure [1/rad], at none, by column of angles."""
+    model = posterior.model
+    cable = model.cable.departing(tested)
+    terms: list[Any] = [replace(cast("Any", term), cable=cable) for term in model.terms]
+    values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
+    values |= dict(zip((p.name for p in model.space.free), solution["values"], strict=True))
+    curves = [cable.curves[column] for column in tested]
+
+    def residuals(weights: Array, data: Any) -> Array:
+        departures = {
+            name: value
+            for curve, own in zip(curves, weights, strict=True)
+            for name, value in zip((curve.size_name, *curve.weight_names), (jnp.ones(()), *own), strict=True)
+        }
+        return jnp.concatenate([term.residuals(values | departures, d) for term, d in zip(terms, data, strict=True)])
+
+    none = np.zeros((len(curves), N_FUNCTIONS))
+    program = compile_program(jax.jacfwd(residuals), none, posterior.data, run_once=True)
+    return dict(zip(tested, np.moveaxis(np.asarray(program(none, posterior.data)), 1, 0), strict=True))
 
 
 def _departure_columns(

@@ -92,6 +92,57 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
         model: The model.
         solution: The minimum: residuals and expected readings by term, Jacobian, values.
     """
+    return _weigh_by_scatter(_collect_blocks(model, solution))
+
+
+@dataclass(frozen=True)
+class ExplainedSquares:
+    """What further parameters would explain of the residuals.
+
+    Args:
+        squares: Sum of squares that they explain, over the variance that remains.
+        rank: How many of them readings can tell from the parameters of the model.
+        freedom: Degrees of freedom of the variance (Satterthwaite), by what each table has of the sum.
+        by_table: The explained residuals in units of the reading, and the readings, by table; labelled readings alone.
+    """
+
+    squares: float
+    rank: int
+    freedom: float
+    by_table: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
+def explain_residuals(model: Model, solution: Mapping[str, Any], columns: np.ndarray) -> ExplainedSquares:
+    """What residuals of all tables together further parameters explain, with scatters as they are with these.
+
+    Args:
+        model: The model.
+        solution: As of `group_residuals`.
+        columns: Derivatives of the residuals by further parameters, in the order of the Jacobian.
+    """
+    n = solution["jacobian"].shape[1]
+    jacobian = np.zeros((len(solution["jacobian"]), n + columns.shape[1]))
+    jacobian[:, :n], jacobian[: len(columns), n:] = solution["jacobian"], columns
+    blocks = _collect_blocks(model, {**solution, "jacobian": jacobian})
+    _weigh_by_scatter(blocks)
+    residuals, followed = _project_out(blocks)
+    without, of_model = _project_out([replace(block, jacobian=block.jacobian[:, :n]) for block in blocks])
+    explained = without - residuals
+    shares = np.array([np.sum(explained[block.rows] ** 2) for block in blocks])
+    freedoms = np.array([max(block.count - float(np.sum(followed[block.rows] ** 2)), 0.0) for block in blocks])
+    counts = (shares > 0) & (freedoms > _LEAST_FREEDOM)
+    total, rank = float(shares.sum()), followed.shape[1] - of_model.shape[1]
+    freedom = total**2 / float(np.sum(shares[counts] ** 2 / freedoms[counts])) if counts.any() else 0.0
+    by_table = {
+        block.table: (explained[block.rows] * block.unit * block.scatter, block.reading)
+        for block in blocks
+        if not block.inside and block.at
+    }
+    return ExplainedSquares(total, rank, freedom, by_table)
+
+
+def _collect_blocks(model: Model, solution: Mapping[str, Any]) -> list[ResidualGroup]:
+    """Groups of residuals, not yet weighed by their scatter."""
     values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
     values |= dict(zip((p.name for p in model.space.free), solution["values"], strict=True))
     blocks, start, position = list[ResidualGroup](), 0, 0
@@ -105,7 +156,7 @@ def group_residuals(model: Model, solution: Mapping[str, Any]) -> ResidualGroups
             stop = start + len(block.residuals)
             blocks.append(replace(block, rows=slice(start, stop), unused=unused))
             start = stop
-    return _weigh_by_scatter(blocks)
+    return blocks
 
 
 def _weigh_by_scatter(blocks: list[ResidualGroup]) -> ResidualGroups:

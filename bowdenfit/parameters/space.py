@@ -14,7 +14,7 @@ from bowdenfit.errors import DescriptionError
 from bowdenfit.parameters.priors import Prior
 from bowdenfit.words import significant
 
-Role = Literal["friction", "friction_model", "curve", "angle", "noise", "sensor", "elastic"]
+Role = Literal["friction", "friction_model", "curve", "departure", "angle", "noise", "sensor", "elastic"]
 
 
 @dataclass(frozen=True)

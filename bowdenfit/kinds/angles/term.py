@@ -242,10 +242,11 @@ class AngleTerms(TermKind[AngleTable]):
         assert route is not None  # an angle table is read only with one
         inside = (table.route >= route.range[0]) & (table.route <= route.range[1])
         read = {column: table.column(column)[0] for column in at.cable.curves}
+        detected = {column: angle[np.isfinite(angle) & inside] for column, angle in read.items()}
+        by_column = at.cable.curves.items()
         curves = [
-            parameter
-            for column, curve in at.cable.curves.items()
-            for parameter in curve.parameters(read[column][np.isfinite(read[column]) & inside], at.defaults)
+            *(p for column, curve in by_column for p in curve.parameters(detected[column], at.defaults)),
+            *(p for column, curve in by_column for p in curve.departure_parameters(detected[column], at.defaults)),
         ]
         noise = Parameter(
             ANGLE_NOISE, r"$\sigma_\theta$", at.noise.meaning("standard deviation of an angle reading"), "noise",

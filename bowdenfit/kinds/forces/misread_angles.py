@@ -62,11 +62,11 @@ def describe_misread_angles(table: ForceTable, description: Description) -> str:
             f"{seen}. The usual causes are an angle noted wrongly, rows of several mountings without a column run, and a rope "
             "that was changed or greased in between; correct the rows, or add that column."
         )
-    wrong = [
-        f"{np.rad2deg(group.angle):.4g} deg in {_name_rows(table, group)}, where {np.rad2deg(group.angle) + 180 * n:.4g} deg fits"
-        for group, n in zip(groups, turns, strict=True)
-        if n
-    ]
+    wrong = []
+    for group, n in zip(groups, turns, strict=True):
+        if n:
+            degrees = float(np.rad2deg(group.angle))
+            wrong.append(f"{degrees:.4g} deg in {_name_rows(table, group)}, where {degrees + 180 * n:.4g} deg fits")
     return (
         f"{seen}. All rows have one friction coefficient if these angles were noted wrongly by half or whole turns: "
         f"{'; '.join(wrong)}. Correct them if that is how the cable was wrapped."

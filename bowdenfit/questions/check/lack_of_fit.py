@@ -225,16 +225,23 @@ def _suggest_curve(fit: Record, column: str) -> str:
     """Suggest the curve families that do fit the angles of a column."""
     contacts = fit.dataset.description.contact
     number, contact = next((i, c) for i, c in enumerate(contacts) if c.wrap_angle.column == column)
-    fitting = [
-        name for name in CURVES if name != contact.wrap_angle.curve and curve_family_fits(fit.dataset, number, name)
-    ]
+    family, smooth = contact.wrap_angle.curve, f"--set contact.{number}.wrap_angle.departure=smooth"
+    others = [name for name in CURVES if name != family]
+    fitting = [name for name in others if curve_family_fits(fit.dataset, number, name)]
+    if contact.wrap_angle.departure == "smooth":
+        return (
+            f"These angles depart from a {family} curve, and not smoothly either; narrow the range under [route] to where they "
+            "do, or measure the angle with each run."
+        )
     if fitting:
         flags = " or ".join(f"--set contact.{number}.wrap_angle.curve={name}" for name in fitting)
-        return f"A {contact.wrap_angle.curve} curve does not follow these angles; fit again with {flags}."
-    others = listed([name for name in CURVES if name != contact.wrap_angle.curve])
+        return (
+            f"A {family} curve does not follow these angles and forces; fit again with {flags}, or with {smooth} if the route "
+            "has no known curve."
+        )
     return (
-        f"Neither a {contact.wrap_angle.curve} curve nor any other family ({others}) follows these angles; narrow "
-        "the range under [route] to where one does, or measure the angle with each run."
+        f"Neither a {family} curve nor any other family ({listed(others)}) follows these angles; fit again with {smooth}, "
+        "narrow the range under [route], or measure the angle with each run."
     )
 
 

@@ -36,9 +36,9 @@ from bowdenfit.questions.check.data_set_words import (
     check_data_set,
     describe_copied_readings,
     describe_cut_off_readings,
-    describe_wrong_angles,
     describe_first_and_last_rows,
     describe_row_account,
+    describe_wrong_angles,
 )
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels

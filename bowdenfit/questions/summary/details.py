@@ -26,6 +26,7 @@ from bowdenfit.questions.recorded.friction_effects import (
     predict_stick_slip,
 )
 from bowdenfit.questions.recorded.presliding import estimate_presliding
+from bowdenfit.questions.summary.curve_departures import describe_departures
 from bowdenfit.questions.summary.methods import describe_fitted_data, sampler_sentences, sampler_text
 from bowdenfit.questions.summary.page import summarize
 from bowdenfit.questions.summary.verdict import (
@@ -61,8 +62,9 @@ def details_text(fit: Record) -> str:
         parameters_text(fit),
         groups_text(fit),
         _identified_sentence(fit),
-        _prior_driven_sentence(page),
+        _prior_driven_sentence(fit, page),
         _curve_block(fit, page),
+        *(filled(sentence) for sentence in describe_departures(fit)),
     ]
     blocks += [
         _residual_sentence(page),
@@ -125,12 +127,13 @@ def _identified_sentence(fit: Record) -> str:
     return filled(describe_identified(friction, measured=True)) if friction is not None else ""
 
 
-def _prior_driven_sentence(page: dict[str, Any]) -> str:
-    """Say which parameters rest on their prior almost alone; empty without any."""
+def _prior_driven_sentence(fit: Record, page: dict[str, Any]) -> str:
+    """Name the parameters that rest on their prior almost alone, but for weights of departures; empty without any."""
+    weights = {name for curve in fit.model.cable.curves.values() for name in curve.weight_names}
     names = [
         n
         for n, p in page["parameters"].items()
-        if p.get("contraction") is not None and p["contraction"] < _PRIOR_DRIVEN
+        if n not in weights and p.get("contraction") is not None and p["contraction"] < _PRIOR_DRIVEN
     ]
     if not names:
         return ""
@@ -277,13 +280,15 @@ def _origin_sentence(page: dict[str, Any]) -> str:
 def parameters_text(fit: Record) -> str:
     """Return every parameter in a table, and remarks on least squares."""
     estimates, intervals = fit.least_squares.estimates, posterior_intervals(fit)
-    rows = [_row(p, intervals.get(p.name), estimates.get(p.name), bool(intervals)) for p in fit.model.space.parameters]
+    listed_parameters = [p for p in fit.model.space.parameters if p.role != "departure"]
+    rows = [_row(p, intervals.get(p.name), estimates.get(p.name), bool(intervals)) for p in listed_parameters]
+    shown_names = {p.name for p in listed_parameters}
     keep = [i for i in range(len(_HEADS)) if i in _ALWAYS or any(row[i] for row in rows)]
     shown = table([_HEADS[i] for i in keep], [[row[i] for i in keep] for row in rows])
     notes = [
         filled(f"{name} is {_describe_problem(estimate)}: {estimate.remark}.")
         for name, estimate in estimates.items()
-        if not estimate.identified
+        if not estimate.identified and name in shown_names
     ]
     condition = fit.least_squares.condition_number
     number = f"{condition:.3g}" if isfinite(condition) else "infinite"

@@ -25,6 +25,7 @@ from bowdenfit.questions.check.words import describe_assumed_widths, describe_mi
 from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates, rests_on_one_mounting
+from bowdenfit.questions.summary.curve_departures import describe_refuted_families
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals, few, filled, listed
@@ -173,7 +174,8 @@ def reasons_to_trust(fit: Record) -> list[str]:
         return [_LEAST_SQUARES_ONLY.format(best)]
     checks, fit_verdict = check_readings(fit), assess_fit(fit)
     is_alone = checks is not None and len(checks.readings) == 1 and not fit_verdict.doubts
-    return [_TRUSTED_ALONE if is_alone else _trusted_sentence(fit_verdict)] + [
+    trusted = _TRUSTED_ALONE if is_alone else _trusted_sentence(fit_verdict)
+    return [trusted, *describe_refuted_families(fit)] + [
         sentence
         for sentence in (_prior_driven_sentence(fit), _correlation_sentence(fit), _prior_conflict_sentence(fit))
         if sentence

@@ -171,8 +171,8 @@ def single_file_dataset(
         angle: dict[str, Any] = {"column": WRAP_ANGLE.name}
     elif wrap_angle is None:
         raise DescriptionError(
-            f"{path.name} is a file without a description; say the angle that the cable was wrapped by, such as --wrap-angle "
-            "180deg, or write a cable.toml beside it with `bowdenfit init`; `bowdenfit check` prints the whole command."
+            f"{path.name} is a file without a description; give the angle that the cable was wrapped by, such as --wrap-angle "
+            "180deg, or write a cable.toml next to it with `bowdenfit init`; `bowdenfit check` prints the whole command."
         )
     else:
         angle = {"value": wrap_angle[0], "unit": wrap_angle[1]}

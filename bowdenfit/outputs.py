@@ -133,7 +133,7 @@ def refuse_link(path: Path) -> None:
     else:
         return
     raise StoreError(
-        f"{path} {leads_to}, and writing here would change what lies there. Put a copy in its place or remove it, or name "
+        f"{path} {leads_to}, and writing here would change what is there. Put a copy in its place or remove it, or name "
         "another folder with --output."
     )
 

@@ -104,7 +104,7 @@ class ChannelSource(ColumnSource):
         if self.gain != 1 and self.unit is None:
             raise ValueError(
                 f"gain = {self.gain:g} says what one count of {self.name} is worth, but not in which unit; write unit = \"N\" "
-                "(or the unit it is in) beside it"
+                "(or the unit it is in) next to it"
             )
         return self
 

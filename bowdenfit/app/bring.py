@@ -260,7 +260,7 @@ def _show_questions(draft: Draft, understanding: Understanding, look_again: Agai
         draft.answers[key] = typed
         await look_again()
 
-    with section("What the files do not say", "questions"):
+    with section("What the files do not state", "questions"):
         with block("figure", "bench-figure"):
             markup(_BENCH, "div")
             text(_BENCH_WORDS, "figcaption")

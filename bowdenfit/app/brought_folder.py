@@ -79,7 +79,7 @@ def _stated_place(name: str) -> PurePosixPath:
     is_odd = not name.isprintable() or not place.name or max(map(len, place.parts), default=0) > _LONGEST_PART
     if is_elsewhere or is_odd or len(place.parts) > _MOST_FOLDERS + 1:
         raise DescriptionError(
-            f"cable.toml names {shown(name)}, which does not lie in its own folder; put that file beside cable.toml, name it "
+            f"cable.toml names {shown(name)}, which is not in its own folder; put that file next to cable.toml, name it "
             "there without a folder, and bring both again."
         )
     folders = (_ANY_FOLDER if _PATTERN & set(part) else part for part in place.parts[:-1] if part != "**")

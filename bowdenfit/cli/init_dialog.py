@@ -46,7 +46,7 @@ class Terminal:
             say(filled(f"{i}  {option}", "  "))
         if question.default is None:
             such = "" if question.options else f"such as {question.example}; "
-            say(f"({such}no default, because the files do not say it)")
+            say(f"({such}no default, because the files do not state it)")
         shown = f"[{question.default}]" if question.default is not None else ""
         while True:
             typed = _read_line(f"{shown}> ") or question.default or ""
@@ -121,7 +121,7 @@ def start_data_set(
         _start_from_files(target, measured, ask)
         return
     write_template(target)
-    say(filled(f"Wrote a template to {target}: fill in what stands in capitals in its cable.toml, and the tables."))
+    say(filled(f"Wrote a template to {target}: fill in what is in capitals in its cable.toml, and the tables."))
     say(f"Next: bowdenfit check {shlex.quote(str(target))}")
 
 

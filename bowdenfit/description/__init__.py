@@ -185,7 +185,7 @@ class Description(Display, Frozen):
             )
         freedom = type(self).model_fields["student_degrees_of_freedom"].default
         if self.noise != "student" and self.student_degrees_of_freedom != freedom:
-            yield 'student_degrees_of_freedom belongs to noise = "student"; write that beside it, or leave it out'
+            yield 'student_degrees_of_freedom belongs to noise = "student"; write that as well, or leave it out'
         if self.by_group and self.stretch.friction is not None:
             yield (
                 "stretch.friction is a coefficient of which each group has its own, and the stretch belongs to no group; leave "

@@ -62,7 +62,7 @@ class Sensors(Frozen):
             raise ValueError("input_force_noise is a standard deviation without one of its own; write 0 or more, without sd")
         if of_input is not None and of_input.value > 0 and (of_output is None or not of_output.value > 0):
             raise ValueError(
-                "input_force_noise needs force_noise beside it, the noise of the output's cell, so that their ratio is known; "
+                "input_force_noise needs force_noise as well, the noise of the output's cell, so that their ratio is known; "
                 "write 0 for a hung weight, which has none"
             )
         return self

@@ -220,7 +220,7 @@ def _known(key: str, stated: QuantityValue) -> Known:
     if sd is None and of.is_measured:
         raise DescriptionError(
             f"device.toml, {key}: {stated.value:g} {stated.unit} has no sd, and the answer is a probability over what is known "
-            f"about it; write sd = ... beside it, as in {of.example}."
+            f"about it; write sd = ... next to it, as in {of.example}."
         )
     return Known(stated.to(of.dimension) * factor, 0.0 if sd is None else sd * factor)
 

@@ -28,7 +28,7 @@ PLACEHOLDERS = {
     "WHO MEASURED IT, WHEN, ON WHICH BENCH": "where the numbers come from, or delete the line",
     "SHORTEST": "the shortest length at which the angles were measured, a number",
     "LONGEST": "the longest length at which the angles were measured, a number",
-    "WRAP ANGLE": "the angle, a number in the unit beside it",
+    "WRAP ANGLE": "the angle, a number in the unit next to it",
 }
 """By what is to be written in their place."""
 

@@ -139,7 +139,7 @@ class Cell:
             code = self._number.strip()
             raise self.refuse(
                 f"{self.shown} is a code that programs write where a reading is missing; {remedy}, or state the code: "
-                f"--missing {code} (in cable.toml missing = [{code.replace(',', '.')}] beside the file)."
+                f"--missing {code} (in cable.toml missing = [{code.replace(',', '.')}] next to the file)."
             )
 
     def percentage(self) -> float | None:

@@ -165,7 +165,7 @@ def remark_on_errors_in_cells(table: RawTable, columns: Mapping[str, Column]) ->
     """Return a remark on what stands behind ± in cells, where a column of standard deviations was read from it."""
     with_errors = [column for name, column in columns.items() if f"{name}_sd" in columns and column.heading in table.errors]
     read = [shown(column.heading) for column in with_errors]
-    where = f"{table.file}: what stands behind ± in {listed(read)} is taken for one standard deviation."
+    where = f"{table.file}: what follows ± in {listed(read)} is taken for one standard deviation."
     return [where] if read else []
 
 
@@ -257,7 +257,7 @@ def _missing_column_error(table: RawTable, name: str, example: str, read: Collec
     others = [heading for heading in table.header if heading not in read]
     if values := find_pivot_headings(others):
         return DatasetError(
-            f"{table.file}: {few([shown(value) for value in values])} stand over columns, as in a pivot table with a column "
+            f"{table.file}: {few([shown(value) for value in values])} are above columns, as in a pivot table with a column "
             "for each angle or load. Such a table is read where these headings have their unit, as in 45° or 20 N, the other "
             "column says what it is, as in Input force (N) or Wrap angle (deg), and the cells are output forces; else write "
             "one row for each reading, in the columns wrap_angle_deg, input_force_N and output_force_N."
@@ -296,7 +296,7 @@ def _column(table: RawTable, heading: str, quantity: Quantity, unit: str | None)
     if unit is None:
         usual = quantity.to or _usual_unit(quantity.dimension)
         raise DatasetError(
-            f"{table.file}: the column {shown(heading)} does not say its unit; rename it to {quantity.name}_{usual} (or the "
+            f"{table.file}: the column {shown(heading)} does not state its unit; rename it to {quantity.name}_{usual} (or the "
             f"unit it is in), or give the unit, such as {option_naming(quantity.name, heading, usual.replace('_', '*'))}, in "
             f'cable.toml columns = {{ {quantity.name} = {{ name = "{heading}", unit = ... }} }}.'
         )
@@ -322,7 +322,7 @@ def _usual_unit(dimension: str) -> str:
 
 
 def _note_wrong_sources(table: RawTable, known: list[str], sources: Mapping[str, ColumnSource]) -> set[str]:
-    """Quantities whose column is none of the file's, serves another already, or cannot be; what is wrong is noted.
+    """Return quantities whose column is missing, used twice or impossible; note faults.
 
     One that is misspelled is wrong under the name that is meant.
     """

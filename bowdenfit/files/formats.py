@@ -54,7 +54,7 @@ class Content:
         return self.remedy or f"rename it to {self.endings[0]}"
 
     def suits(self, ending: str) -> bool:
-        """Return whether files with an ending may start so; those of which nobody knows how they start may start in any way."""
+        """Return whether files with an extension may start so; True without a known signature."""
         return ending in self.endings or not any(ending in content.endings for content in _CONTENTS)
 
 
@@ -67,7 +67,7 @@ _STARTS = {  # the longer start before the shorter one
     b"MATLAB 7": Content("a MATLAB 7.3 file", (".mat",)),
     _HDF: Content("an HDF5 file", (".h5", ".hdf5")),
     b"TDSm": Content("a TDMS file of National Instruments", (".tdms",)),
-    b"TDSh": Content("the index of a TDMS file", (), "give the .tdms file that lies next to it"),
+    b"TDSh": Content("the index of a TDMS file", (), "give the .tdms file next to it"),
     b"MDF     ": Content("an MDF measurement file", (".mf4", ".mdf")),
     b"UnFinMF ": Content("an MDF measurement file", (".mf4", ".mdf")),
     b"#ROSBAG": Content("a ROS 1 bag", (".bag",)),

@@ -69,7 +69,7 @@ def iterate_members(group: Any, left_out: UnreadNames, seen: set[int]) -> Iterat
             continue
         member = group[key]
         if isinstance(member, h5py.Dataset) and (member.external or member.is_virtual):
-            left_out.add(path, "their numbers lie in other files (write them into this one)")
+            left_out.add(path, "their numbers are in other files (write them into this one)")
             continue
         if isinstance(member, h5py.Group):
             place = h5py.h5o.get_info(member.id).addr

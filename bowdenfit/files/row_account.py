@@ -77,7 +77,7 @@ class RowAccount:
     def beside_in_words(self) -> str:
         """What stands beside the table."""
         texts = few([f"{shown(text)} in row {row}" for row, text in self.beside], _TEXTS)
-        return f"beside the table: {texts}"
+        return f"next to the table: {texts}"
 
     def without_rows(self, reasons: Mapping[int, str]) -> "RowAccount":
         """Return the account where some of the rows that are read are left out after all.

@@ -173,7 +173,7 @@ def _refuse_other_headings(sheet: SheetRows, row: int, words: Sequence[str]) -> 
     columns = sum(kind != "blank" for kind in sheet.layout.kinds)
     if len(words) >= columns > 1 and len({*words}) == len(words):
         raise DatasetError(
-            f"{sheet.place}, row {row}: words stand in every column ({shown(' '.join(words))}), as headings do, but not those "
+            f"{sheet.place}, row {row}: every column has words ({shown(' '.join(words))}), as headings do, but not those "
             "at the top; the usual cause is a second recording behind the first. Put what is below into a file of its own, or "
             "delete the row if its columns are the same."
         )
@@ -259,13 +259,13 @@ def _describe_left_out(
     if below:
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
         where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
-        sentences.append(f"{where} left out: they stand below the data, as statistics do.")
+        sentences.append(f"{where} left out: they are below the data, as statistics are.")
     if sheet.of_text:
         return sentences  # the account of the file names the rest
     between = [f"row {row} ({shown(text)})" for row, (why, text) in left_out.items() if why in (BETWEEN, AGAIN)]
-    sentences += [f"Left out because no numbers stand there: {few(between)}."] if between else []
+    sentences += [f"Left out because they have no numbers: {few(between)}."] if between else []
     texts = [f"{shown(text)} in row {row}" for row, text in beside]
-    return sentences + ([f"Remarks beside the columns were left out: {few(texts)}."] if texts else [])
+    return sentences + ([f"Notes next to the columns were left out: {few(texts)}."] if texts else [])
 
 
 def read_cells(sheet: SheetRows) -> SheetCells:

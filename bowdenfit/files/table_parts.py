@@ -154,12 +154,12 @@ def _check_above(above: Sequence[CsvRecord], columns: int, header: CsvRecord, fi
         words, numbers = count_words_and_numbers(row, _is_bare_number)
         if numbers >= max(columns, 2) and not words:
             raise DatasetError(
-                f"{file}, row {row.row}: numbers stand there ({shown(row.cells[0])}, ...) above the headings in row "
+                f"{file}, row {row.row}: it has numbers ({shown(row.cells[0])}, ...) above the headings in row "
                 f"{header.row}; put the headings over all rows of the table, or delete the rows above them."
             )
         if words + numbers == columns and numbers > 1 and any(is_words(other, columns) for other in above[:i]):
             raise DatasetError(
-                f"{file}, row {row.row}: a row of a table ({shown(' '.join(row.cells))}) stands above the headings in row "
+                f"{file}, row {row.row}: a row of a table ({shown(' '.join(row.cells))}) is above the headings in row "
                 f"{header.row}; put what is above these into a file of its own, or delete it, and row {header.row} too if its "
                 "columns are the same."
             )
@@ -228,7 +228,7 @@ def _refuse_other_headings(rows: Sequence[CsvRecord], header: CsvRecord, file: s
         words, numbers = count_words_and_numbers(row)
         if words >= width > numbers == 0 and len({*row.cells}) > 1 and not is_units(row) and not _is_same(row, header):
             raise DatasetError(
-                f"{file}, row {row.row}: words stand in every column ({shown(' '.join(row.cells))}) above further rows of "
+                f"{file}, row {row.row}: every column has words ({shown(' '.join(row.cells))}) above further rows of "
                 f"numbers, as headings do, but not those of row {header.row}; put what is below into a file of its own, or "
                 "delete the row if its columns are the same."
             )
@@ -254,7 +254,7 @@ def _find_next_table(rows: Sequence[CsvRecord], header: CsvRecord, file: str) ->
             below = sum(_agrees(above, numeric) and _filled(above, numeric) >= usual for above in rows[i + 1 :])
             if below >= max(_FEWEST_ALIKE, _SHARE_ALIKE * len(filled)):
                 raise DatasetError(
-                    f"{file}, row {row.row}: words stand there ({shown(' '.join(row.cells))}) behind a blank row, and {below} "
+                    f"{file}, row {row.row}: it has words ({shown(' '.join(row.cells))}) behind a blank row, and {below} "
                     "rows of numbers in the same columns below them; if these belong to the table, delete the words or begin "
                     "that row with #, and if they are another table, put it into a file of its own."
                 )

@@ -116,7 +116,7 @@ def name_force_columns(
         if always or unit or name not in sure:
             options.append(option_naming(name, ends[name].name, unit, option))
     if any(not _unit(column) for name, column in ends.items() if name not in multiples):
-        provided.append("the forces are in newtons, as the file does not say")
+        provided.append("the forces are in newtons, as the file does not state")
     return options, provided
 
 
@@ -197,10 +197,10 @@ def make_recording_command(
     options, provided = name_force_columns(columns, "--channel", stated, always, in_order=True)
     if not has_clock and "time" not in stated:
         options.append("--channel time=RATE")
-        provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not say")
+        provided.append("RATE is its sampling rate, such as 1000Hz, which the file does not state")
     elif doubtful_clock and "time" not in stated:
         options.append(option_naming("time", doubtful_clock, "ms", "--channel"))
-        provided.append(f"{shown(doubtful_clock)} is in milliseconds, as the file does not say")
+        provided.append(f"{shown(doubtful_clock)} is in milliseconds, as the file does not state")
     option, of_angle = _stated_angle_options(path, angle)
     return _make_command(path, [*option, *_column_options(stated, "--channel"), *options], [*of_angle, *provided])
 

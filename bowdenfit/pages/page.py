@@ -19,7 +19,7 @@ from bowdenfit.pages.section import HtmlPage, PageSection, Picture
 from bowdenfit.words import printable, unbroken
 
 MOST_BYTES = 1_450_000  # of a page, so that it can be mailed; a judgement
-TOO_LARGE = "<p>This figure would make the page too large; it lies in the folder of figures.</p>"
+TOO_LARGE = "<p>This figure would make the page too large; it is in the folder of figures.</p>"
 _PNG = b"\x89PNG\r\n\x1a\n"  # its first bytes; width and height follow in the first block
 _CSS_PIXELS = 0.6  # of a page for one of a figure: 96 in an inch for 160
 _COLUMN = 576  # px of a page, 6 in: wider figures take both columns of a printed page

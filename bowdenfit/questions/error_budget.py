@@ -43,7 +43,7 @@ from bowdenfit.words import counted, filled, listed, table
 _DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take longer
 _STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
-TITLE = "Error budget: what errors of the bench that no reading shows would add"
+TITLE = "Error budget: what bench errors that readings cannot reveal would add"
 KEY_ROLES = ("friction", "friction_model", "angle", "elastic")  # of coefficients that are answers, not means to them
 
 
@@ -110,9 +110,9 @@ class ErrorBudget(Display):
         notable = [row for row in self.rows if row.is_notable]
         known = listed([source.words for source in self.sources])
         if not notable:
-            return [f"Errors of the bench that no reading shows ({known}) would add less than half to each interval."]
+            return [f"Bench errors that readings cannot reveal ({known}) would add less than half to each interval."]
         return [
-            f"Errors of the bench that no reading shows ({known}) would add more than half to the interval of "
+            f"Bench errors that readings cannot reveal ({known}) would add more than half to the interval of "
             f"{listed([row.quantity for row in notable])}; state your own under [errors] in cable.toml."
         ]
 
@@ -270,7 +270,7 @@ def budget_section(fit: Record) -> PageSection | None:
 def widening_sentence(fit: Record) -> str:
     """Return what the errors of the bench make of the first answer that they more than half widen; empty if of none.
 
-    'With errors of the bench that no reading shows, mu is 0.166 to 0.186, most of it from wrap angles known to 3 deg or 3 %.'
+    'Including bench errors that readings cannot reveal, mu is 0.166 to 0.186, mainly from wrap angles known to 3 deg or 3 %.'
     """
     budget = error_budget(fit)
     notable = [row for row in budget.rows if row.is_notable] if budget else []
@@ -284,6 +284,6 @@ def widening_sentence(fit: Record) -> str:
     also = f" ({others} also widen{'s' if len(notable) == 2 else ''})" if len(notable) > 1 else ""
     interval = row.bench.range_text(row.readings.digits)
     return (
-        f"With errors of the bench that no reading shows, {name} is {interval}{unit}{also}, mostly by {source}; state "
+        f"Including bench errors that readings cannot reveal, {name} is {interval}{unit}{also}, mainly from {source}; state "
         "yours under [errors] in cable.toml."
     )

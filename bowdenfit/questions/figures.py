@@ -208,8 +208,8 @@ def parse_page_width(width: NumberWithUnit | None) -> float | None:
     inches = round(value * conversion_factor(unit, "length") / conversion_factor("in", "length"), 9)
     if not NARROWEST <= inches <= WIDEST:
         raise UsageError(
-            f"figures cannot be {value:g} {unit} wide; say a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for a "
-            "column of a paper."
+            f"figures cannot be {value:g} {unit} wide; give a width from {NARROWEST:g} in to {WIDEST:g} in, such as 3.5in for "
+            "a column of a paper."
         )
     return float(inches)
 

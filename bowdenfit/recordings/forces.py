@@ -355,6 +355,6 @@ def _refuse_clock_without_unit(file: ChannelFile, channel: Channel) -> None:
         return
     *options, option = (option_naming("time", clock.name, unit, "--channel") for unit in units)
     raise DatasetError(
-        f"{file.path.name}: the clock {shown(clock.name)} does not say its unit; in seconds the recording would last {last}. "
+        f"{file.path.name}: the clock {shown(clock.name)} does not state its unit; in seconds the recording would last {last}. "
         f"Say which it is: {', '.join(options)}, or {option}."
     )

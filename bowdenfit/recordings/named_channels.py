@@ -120,7 +120,7 @@ def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: Colu
         units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}
         example = units.get(quantity, "N")
         raise DatasetError(
-            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; give it, such as --channel "
+            f"{file.path.name}: the channel {shown(channel.name)} does not state its unit; give it, such as --channel "
             f"{quantity}={channel.name}:{example}."
         )
     text = stated.strip()
@@ -171,7 +171,7 @@ def steady_value(
     unit = (source.unit if source else None) or channel.unit or written
     if not unit:
         raise DatasetError(
-            f"{file.path.name}: the channel {shown(channel.name)} does not say its unit; write it beside the name of the "
+            f"{file.path.name}: the channel {shown(channel.name)} does not state its unit; write it next to the name of the "
             f'channel, {quantity.name} = {{ name = "{channel.name}", unit = ... }}.'
         )
     try:

@@ -70,7 +70,7 @@ class ClockShift:
         """
         known = np.isfinite(sd)
         value = self.value - delay - (0.0 if self.source == "forces" else date_shift(raw))
-        total = f"the output's clock was shifted by {value:+.4f} s" + (f", give or take {sd:.4f} s" if known else "")
+        total = f"the output's clock was shifted by {value:+.4f} s" + (f" ± {sd:.4f} s" if known else "")
         origin = {
             "forces": f"{total}, found from the forces",
             "dates": f"the clocks were paired by their dates{f', and {total}, found from the forces' if known else ''}",

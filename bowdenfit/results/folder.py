@@ -251,7 +251,7 @@ def refuse_unwritable(target: Path) -> None:
     try:
         while not existing.exists():
             if existing.is_symlink():
-                raise OSError(errno.ENOENT, "it is a link that leads nowhere")
+                raise OSError(errno.ENOENT, "it is a broken link")
             existing = existing.parent
         if existing != target and not existing.is_dir():
             raise OSError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))

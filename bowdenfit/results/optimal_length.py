@@ -175,7 +175,7 @@ class OptimalLength(Display):
         digits, of_force = length.digits, eta.digits
         sentences = [
             f"The best {self.what} is {length.median:z.{digits}f} {self.unit} (90 % interval {length.q05:z.{digits}f} to "
-            f"{length.q95:z.{digits}f} {self.unit}); {eta.median:z.{of_force}f} % of the force arrives there "
+            f"{length.q95:z.{digits}f} {self.unit}); {eta.median:z.{of_force}f} % of the force is transmitted "
             f"({eta.q05:z.{of_force}f} to {eta.q95:z.{of_force}f} %){at}."
         ]
         if self.at_edge > _WORTH_SAYING:

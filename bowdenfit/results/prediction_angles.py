@@ -72,7 +72,7 @@ def split_lengths(lengths: np.ndarray) -> list[np.ndarray]:
     if len(lengths) > MOST_LENGTHS:
         raise UsageError(
             f"{len(lengths):,} lengths are asked for, and at most {MOST_LENGTHS:,} are predicted at a time; ask for fewer, "
-            "because curves hardly change from one of so many to the next."
+            "because curves barely change over such small steps."
         )
     return [lengths[start : start + _AT_ONCE] for start in range(0, max(len(lengths), 1), _AT_ONCE)]
 

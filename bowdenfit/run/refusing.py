@@ -36,7 +36,7 @@ def refuse_undetermined(model: Model, find_start: Callable[[], MaximumPosterior]
     undetermined = sum(direction.share > UNINFORMED for direction in analysis.directions)
     if undetermined > _MOST_UNDETERMINED:
         raise DescriptionError(
-            f"The measurements cannot tell the friction coefficients apart: of {len(names)} that are free, {undetermined} "
+            f"The measurements cannot separate the friction coefficients: of {len(names)} that are free, {undetermined} "
             "combinations would rest on their priors alone. Give contacts of the same materials one coefficient, state "
             "coefficients that are known under [friction.NAME], or add readings at other wrap angles; `bowdenfit identify` "
             "says what is determined."

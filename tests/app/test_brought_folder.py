@@ -74,7 +74,7 @@ def test_a_file_goes_where_a_pattern_finds_it_and_comes_back_when_the_descriptio
 def test_what_a_description_names_elsewhere_is_refused_before_it_is_opened(draft, tmp_path, name):
     (tmp_path / "outside.csv").write_text(TABLE)
     (refusal,) = bring(draft, cable=describe_half_turn(f'files = "{name}"'), one=TABLE).refusals
-    assert "does not lie in its own folder; put that file beside cable.toml" in refusal.sentence
+    assert "is not in its own folder; put that file next to cable.toml" in refusal.sentence
     with pytest.raises(UsageError, match="cannot be read yet"):
         draft.write(tmp_path / "kept")
     assert not (tmp_path / "kept").exists()

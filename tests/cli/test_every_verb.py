@@ -18,7 +18,7 @@ COMMANDS = {  # what is typed behind each verb, and a word of what it prints
     "predict": (("FIT", "470"), "470"),
     "length": (("FIT",), "mm"),
     "identify": (("FIT",), "mu1"),
-    "next": (("FIT", "--top", "2"), "next, mounted anew"),
+    "next": (("FIT", "--top", "2"), "next, after remounting the cable"),
     "watch": (("DATASETS/on-body-exoskeleton", "--until", "100mm"), "4 mountings: the best cable length"),
     "compare": (("FIT", "OTHER"), "predict"),
     "compensate": (("LOOP", "--device", "DATASETS/haptic-teleoperation/device.toml"), "friction"),

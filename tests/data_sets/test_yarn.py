@@ -52,7 +52,7 @@ def test_the_summary_is_one_page_that_says_whether_a_trial_is_off(fit):
     """The first trial at 225 deg is at the border of it, by a short chain on this side or that."""
     page = summary_text(fit)
     assert faults(page) == []
-    assert ("None of 21 readings is an outlier." in page) == (not fit.checks.outliers)
+    assert ("None of the 21 readings is an outlier." in page) == (not fit.checks.outliers)
     assert ("Next: look at how run 225 deg trial 1 was measured" in page) == bool(fit.checks.outliers)
 
 

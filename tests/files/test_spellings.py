@@ -150,7 +150,7 @@ def test_two_columns_for_one_force_are_refused_with_the_option_that_settles_it(t
 
 def test_a_unit_that_no_heading_says_is_given_behind_a_colon_and_never_guessed(tmp_path):
     path = write(tmp_path, ("F_in", "F_out"))
-    with pytest.raises(DatasetError, match=r"'F_in' does not say its unit.*--column input_force=F_in:N"):
+    with pytest.raises(DatasetError, match=r"'F_in' does not state its unit.*--column input_force=F_in:N"):
         forces(path)
     found, _ = forces(path, columns=["input_force=F_in:kN", "output_force=F_out:kN"])
     np.testing.assert_array_equal(found, FORCE_IN * 1000)

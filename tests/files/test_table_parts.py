@@ -72,7 +72,7 @@ def test_what_is_not_used_is_said_with_its_rows_and_its_words(tmp_path):
     table = read(tmp_path, [HEADER, ROWS[0] + ";new cable", *ROWS[1:], "", "Operator: Weber", "Radius (mm);25"])
     assert table.account.remarks == [
         "table.csv, rows 7 to 8: below the table ('Operator: Weber', 'Radius (mm) 25'); not used.",
-        "table.csv, beside the table: 'new cable' in row 2; not used.",
+        "table.csv, next to the table: 'new cable' in row 2; not used.",
     ]
 
 
@@ -109,7 +109,7 @@ def test_the_first_row_of_a_block_with_a_bad_cell_does_not_end_the_table(tmp_pat
 
 
 def test_words_with_many_rows_of_the_table_below_them_are_refused_rather_than_these_rows_lost(tmp_path):
-    with pytest.raises(DatasetError, match=r"row 5: words stand there \('day 2 new oil'\) .*and 2 rows of numbers"):
+    with pytest.raises(DatasetError, match=r"row 5: it has words \('day 2 new oil'\) .*and 2 rows of numbers"):
         read(tmp_path, [*TABLE[:3], "", "day 2;new oil", *TABLE[3:]])
 
 
@@ -117,7 +117,7 @@ def test_a_smaller_table_below_with_headings_of_its_own_is_left_out_and_one_as_w
     rows = [f"{i};{row};0.{i}" for i, row in enumerate(ROWS * 5)]
     lines = [f"trial;{HEADER};mu", *rows, "", "Load;mean mu", *(f"{load};0.12" for load in range(8))]
     assert len(read(tmp_path, lines).rows) == 20
-    with pytest.raises(DatasetError, match="row 23: words stand there"):
+    with pytest.raises(DatasetError, match="row 23: it has words"):
         read(tmp_path, [*lines[:22], "day 2;new oil", *rows[:2]])
 
 
@@ -127,7 +127,7 @@ def test_groups_called_as_statistics_are_stay_readings(tmp_path):
 
 
 def test_rows_of_numbers_above_the_headings_are_refused(tmp_path):
-    with pytest.raises(DatasetError, match=r"row 1: numbers stand there .* above the headings in row 2"):
+    with pytest.raises(DatasetError, match=r"row 1: it has numbers .* above the headings in row 2"):
         read(tmp_path, [ROWS[0], HEADER, *ROWS[1:]])
 
 

@@ -137,7 +137,7 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
     fit = bf.fit(data, seed=1)  # so short that the ratio below is 6 to 12, by the seed
     (sentence,) = describe_products_with_preload(fit)
     assert sentence.startswith(
-        "The measurements hardly separate preload from mu; they determine the product preload x mu = 0.6"
+        "The measurements barely separate preload from mu; they determine the product preload x mu = 0.6"
     )
     product = fit.posterior.values["preload"] * fit.posterior.values["mu"]
     assert np.std(np.log(fit.posterior.values["preload"])) > 5 * np.std(np.log(product))

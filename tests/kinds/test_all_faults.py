@@ -61,7 +61,7 @@ def test_every_file_every_row_and_every_column_is_named_at_once(bench, refuse):
         "angles.csv, row 3, column 'sheath_angle_deg': '-20' is negative",
         "one.csv, row 2, column 'input_force_N': '-50' is not positive",
         "one.csv, row 3, column 'output_force_N': the cell is blank",
-        "two.csv: the column 'input_force' does not say its unit",
+        "two.csv: the column 'input_force' does not state its unit",
         "'output_force_lb'",
         "efficiencies.csv, row 2, column 'efficiency': an efficiency of '80' is above 1",
         "efficiencies.csv, row 3, column 'efficiency': the cell is blank",
@@ -132,7 +132,7 @@ def test_rows_outside_the_range_and_contacts_without_angles_are_all_named(bench,
 
 def test_readings_that_a_bad_table_needs_bring_no_faults_of_their_own(bench, refuse):
     (said,) = [refuse("check", bench(angles_csv=ANGLES.replace("sheath_angle_deg", "sheath_angle")))]
-    assert "does not say its unit" in said
+    assert "does not state its unit" in said
 
 
 def test_every_placeholder_of_the_template_is_refused_with_its_line(run, refuse, tmp_path):

@@ -47,7 +47,7 @@ def test_every_row_is_a_reading_or_said_to_be_unused(catheter):
 
 
 SPOILED = [
-    (CSV, "force_N", "force", ["'force'", "does not say its unit"]),
+    (CSV, "force_N", "force", ["'force'", "does not state its unit"]),
     (CSV, "displacement_mm", "displacement_N", ["'displacement_N'", "does not measure a length"]),
     (CSV, "displacement_mm", "angle_of_motor", ["no column displacement", "displacement_mm"]),
     (CSV, "180,2.", "180,x2.", ["row 2", "plain number"]),

@@ -24,12 +24,12 @@ FIRST = "0,load,1,-0.2569"
 S, P, L = "stretch.csv", "preload.csv", "loop.csv"
 TABLES = [
     # file, what is replaced, by what, what the sentence must name
-    (S, "load_N", "load", ["stretch.csv", "'load'", "does not say its unit", "load_N"]),
+    (S, "load_N", "load", ["stretch.csv", "'load'", "does not state its unit", "load_N"]),
     (S, "load_N", "load_kg", ["'load_kg'", "mass", "kgf"]),
-    (S, "stretch_mm", "stretch", ["'stretch'", "does not say its unit", "stretch_mm"]),
+    (S, "stretch_mm", "stretch", ["'stretch'", "does not state its unit", "stretch_mm"]),
     (S, "stretch_mm", "stretch_N", ["'stretch_N'", "does not measure a length", "mm"]),
     (S, "stretch_mm", "elongation_mm", ["no column stretch", "'elongation_mm'", "columns ="]),
-    (S, "wrap_angle_deg", "wrap_angle", ["'wrap_angle'", "does not say its unit", "wrap_angle_deg"]),
+    (S, "wrap_angle_deg", "wrap_angle", ["'wrap_angle'", "does not state its unit", "wrap_angle_deg"]),
     (S, "wrap_angle_deg", "wrap_angle_mm", ["row 1", "'wrap_angle_mm'", "does not measure an angle"]),
     (S, "branch", "brench", ["row 1", "'brench'", "did you mean branch?"]),
     (S, "branch", "cycles", ["row 1", "'cycles'", "did you mean cycle?"]),
@@ -49,7 +49,7 @@ TABLES = [
     (P, "30,2.236", "30,", ["row 4", "'preload_N'", "blank"]),
     (P, "30,2.236", ",2.236", ["row 4", "'wrap_angle_deg'", "blank"]),
     (P, "30,2.236", "30,<0.5", ["row 4", "'preload_N'", "'<0.5'", "bound", "0 for a slack rope"]),
-    (P, "preload_N", "preload", ["'preload'", "does not say its unit", "preload_N"]),
+    (P, "preload_N", "preload", ["'preload'", "does not state its unit", "preload_N"]),
     (P, "preload_N", "preload_mm", ["'preload_mm'", "does not measure a force"]),
     (P, "preload_N", "tension_N", ["no column preload", "'tension_N'"]),
     (L, "90,return,20,22", "90,hold,20,21", ["loop.csv", "row 3", "'stroke'", "held still", "leave the row out"]),
@@ -62,7 +62,7 @@ TABLES = [
     (L, "45,pull", ",pull", ["row 2", "'wrap_angle'", "blank", "housing"]),
     (L, "45,pull", "-45,pull", ["row 2", "'wrap_angle_deg'", "'-45'"]),
     (L, "wrap_angle_deg", "bend_deg", ["no column 'wrap_angle'", "housing", "wrap_angle_deg"]),
-    (L, "input_force_N", "input_force", ["'input_force'", "does not say its unit", "input_force_N"]),
+    (L, "input_force_N", "input_force", ["'input_force'", "does not state its unit", "input_force_N"]),
     (L, "input_force_N", "input_force_N_m", ["'input_force_N_m'", "does not measure a force"]),
     (L, "input_force_N", "input_torque_N", ["'input_torque_N'", "does not measure a torque"]),
     (L, "input_force_N", "cell_7_N", ["no column input_force", "input_torque_N_m", "columns ="]),
@@ -249,7 +249,7 @@ def test_a_rope_that_is_only_stretched_straight_is_said_to_tell_nothing_of_frict
     (haptic / S).write_text(f"{HEADS[S]}\n0,5,0.5\n0,20,0.6\n0,30,0.7\n0,40,0.8\n")
     code, out, _ = run("check", haptic)
     assert code == 0
-    assert "every row of stretch.csv is at a wrap angle of 0, so it says nothing about friction" in " ".join(out.split())
+    assert "every row of stretch.csv is at a wrap angle of 0, so it has no information on friction" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(("preloads", "said"), [((20, 10, 5), "falls with the wrap angle"), ((0, 0, 0), "reads 0")])

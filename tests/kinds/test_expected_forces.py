@@ -102,7 +102,7 @@ def test_a_hung_weight_has_no_noise_in_the_likelihood_nor_in_what_is_simulated(t
 def test_a_ratio_of_noises_needs_that_of_both_cells(tmp_path, accept, refuse):
     rows = pull(np.random.default_rng(3), [180.0], [0.3], (20.0, 40.0), noise=(0.1, 0.5))
     input_alone = '[sensors]\ninput_force_noise = { value = 0.1, unit = "N" }\n'
-    assert "force_noise beside it" in refuse("check", write(tmp_path / "alone", rows, more=input_alone))
+    assert "force_noise as well" in refuse("check", write(tmp_path / "alone", rows, more=input_alone))
     both = f'{input_alone}force_noise = {{ value = 500, unit = "mN" }}\n'
     accept("check", write(tmp_path / "both", rows, more=both))
     assert load_dataset(tmp_path / "both").description.sensors.noise_ratio == pytest.approx(0.2)

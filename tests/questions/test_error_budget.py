@@ -63,7 +63,7 @@ def test_a_constant_angle_has_its_error_too(tmp_path):
 def test_a_precise_bench_shows_both_intervals_on_the_first_page(tmp_path):
     fit = bf.fit(bench(tmp_path / "table.csv", noise=5e-4), seed=1)
     page = " ".join(str(fit).split())
-    assert "With errors of the bench that no reading shows, mu is" in page
+    assert "Including bench errors that readings cannot reveal, mu is" in page
     assert "state yours under [errors] in cable.toml." in page
     assert "with bench errors" in page
     assert budget_of(fit).row("mu").is_notable

@@ -103,7 +103,7 @@ def test_the_command_writes_a_file_and_does_not_replace_one(fit, of_load, tmp_pa
     assert "add --force" in refuse("export", "fits", "--to", "c")
     code, out, _ = run("export", "fits", "--to", "csv", "--points", 3, "--json", "-o", "new/table.csv")
     assert json.loads(out)["format"] == "csv" and (tmp_path / "new" / "table.csv").exists()
-    assert "draws; ask for so many at most" in refuse("export", "of few draws", "--to", "csv", "--draws", 9999)
+    assert "draws; ask for at most that many" in refuse("export", "of few draws", "--to", "csv", "--draws", 9999)
 
 
 @pytest.mark.slow

@@ -156,7 +156,7 @@ def test_pages_and_axes_that_no_figure_fits_are_refused_with_a_remedy(fit, optio
 @pytest.mark.parametrize(("least", "unit"), [(3, "in"), (76.2, "mm"), (7.62, "cm")])
 def test_figures_may_be_as_wide_as_is_said_and_no_narrower(least, unit):
     assert parse_page_width((least, unit)) == 3.0
-    with pytest.raises(bf.UsageError, match="say a width from 3 in to 20 in"):
+    with pytest.raises(bf.UsageError, match="give a width from 3 in to 20 in"):
         parse_page_width((0.999 * least, unit))
 
 

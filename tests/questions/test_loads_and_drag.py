@@ -65,7 +65,7 @@ def test_an_efficiency_that_depends_on_the_load_is_said_with_its_force(drag):
     rows = json.loads((drag[1] / "summary.json").read_text())["measured"]
     assert all(LOADS[0] < row["input_force_N"] <= 1.02 * LOADS[-1] for row in rows)
     said = " ".join((drag[1] / "details.txt").read_text().split())
-    assert "at input" in said and "measured efficiencies hold at the force that stands beside them" in said
+    assert "at input" in said and "measured efficiencies hold at the force given with them" in said
 
 
 def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag, accept):

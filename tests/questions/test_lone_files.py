@@ -261,7 +261,7 @@ def test_what_the_command_could_not_fit_ends_with_2_and_says_so(run, tmp_path):
     more_out_than_in = write(tmp_path, ("Fin (N)", "Fout (N)"), (load, output), "swapped.csv")
     without_unit = write(tmp_path, ("Fin (N)", "Fout"), (load, output), "both.csv")
     above_one = write(tmp_path, ("cable_length_mm", "efficiency_percent"), ((440, 470), (77, 177)), "above.csv")
-    both = ("does not say its unit", "are swapped")
+    both = ("does not state its unit", "are swapped")
     for path, said in ((more_out_than_in, ("are swapped",)), (without_unit, both), (above_one, ("is above 1",))):
         code, out, _ = run("check", path)
         assert code == 2 and "To fit it once that is corrected:" in out

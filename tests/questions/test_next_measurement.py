@@ -478,8 +478,8 @@ def test_the_advice_comes_first_and_in_one_sentence(for_length):
     first = " ".join(next_measurement_text(for_length, 4).split("\n\n", maxsplit=1)[0].split())
     best, answer = for_length.best, for_length.answer
     assert first.startswith(
-        f"Measure {best.words} next, mounted anew. Then the best cable length would be known to ± {best.sd:.1f} mm, now to ± "
-        f"{answer.sd:.1f} mm."
+        f"Measure {best.words} next, after remounting the cable. That would narrow the best cable length from ± "
+        f"{answer.sd:.1f} mm to ± {best.sd:.1f} mm."
     )
     assert "You may stop: any cable length from 4" in first
     assert "After it, " in first
@@ -625,9 +625,9 @@ def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
         assert second is not None
         assert second.low < second.width < second.high
         assert second.width < second.width_now
-        assert text.startswith("Mount the cable anew and measure a force run next: all readings come from one mounting")
+        assert text.startswith("Remount the cable and measure a force run next: all readings come from one mounting")
         assert "uncertainty lower by" not in text
-        assert "Next: mount the cable anew" in " ".join(str(fit).split())
+        assert "Next: remount the cable" in " ".join(str(fit).split())
     else:
         assert second is None
         assert "Mount the cable anew" not in text

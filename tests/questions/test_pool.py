@@ -342,8 +342,8 @@ def finished_fleet(folder, drawn):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--cycles", "1000"), "say until which efficiency"),
-        (("--until", "60%"), "none is said for mu_0"),
+        (("--cycles", "1000"), "state until which efficiency"),
+        (("--until", "60%"), "none is given for mu_0"),
         (("--until", "160%", "--wrap-angle", "mu_0=1rad"), "is not an efficiency"),
         (("--until", "60%", "--wrap-angle", "mu_0"), "write it as mu_sheath=180deg"),
         (("--until", "60%", "--wrap-angle", "mu_9=90deg"), "there is no coefficient 'mu_9'"),

@@ -155,7 +155,7 @@ def test_speed_is_answered_with_its_difference_and_interval(with_rate):
     assert abs(effect.difference.median) < 0.01  # the truth is 0, mountings differ by 1 %
     page = json.loads((folder / "summary.json").read_text())
     assert page["rate_effect"]["difference"]["median"] == pytest.approx(effect.difference.median)
-    assert "Efficiency at 470 mm at 60 r/min less that at 20 r/min" in " ".join(details_text(fit).split())
+    assert "Efficiency at 470 mm at 60 r/min minus that at 20 r/min" in " ".join(details_text(fit).split())
     (dependence,) = dependence_figure.data(fit)
     assert (dependence.what, dependence.label) == ("speed", "Speed (r/min)")
     assert len(dependence.points_x) == 4
@@ -251,7 +251,7 @@ def test_a_gain_error_and_a_constant_angle_are_said_to_be_confounded_with_what_i
     assert pair.mean == pytest.approx(truth, abs=4 * pair.sd)  # fails by chance for one seed in 10^4
     assert pair.sd < 0.4 * pair.first_sd
     text = " ".join(details_text(fit).split())
-    assert "hardly separate mu_edge from gain_error" in text
+    assert "barely separate mu_edge from gain_error" in text
     assert fit.summary()["confounded"][0]["combination"] == pair.combination
     assert not fit.least_squares.estimates["mu_edge"].identified
 

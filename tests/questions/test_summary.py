@@ -60,7 +60,7 @@ def test_what_a_coefficient_is_comes_before_that_no_reading_is_an_outlier(fit, m
     page = summary_text(fit)
     assert faults(page) == []
     assert re.findall(r"line\s+has\s+(\d)", page) == [str(i) for i in range(n)]
-    assert ("None of 26 readings is an outlier." in page) == (n == 1)
+    assert ("None of the 26 readings is an outlier." in page) == (n == 1)
 
 
 def test_nothing_is_below_zero_by_rounding_alone():

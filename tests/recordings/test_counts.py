@@ -97,7 +97,7 @@ REFUSED = {
     "another key": ({"input_force": '{ name = "ai3", scale = 2, unit = "N" }'}, ["unknown key", "scale"]),
     "a bend that is no channel": ({"more": 'wrap_angle = { name = "nix", unit = "deg" }'}, ["no channel 'nix'"]),
     "a bend in mm": ({"more": 'wrap_angle = { name = "ai3", unit = "mm" }'}, ["does not measure an angle"]),
-    "a bend without unit": ({"more": 'wrap_angle = { name = "ai3" }'}, ["does not say its unit"]),
+    "a bend without unit": ({"more": 'wrap_angle = { name = "ai3" }'}, ["does not state its unit"]),
     "a bend by a changing channel": (
         {"more": 'wrap_angle = { name = "ai3", unit = "deg" }'},
         ["changes from", "where ="],

@@ -198,7 +198,7 @@ def test_a_whole_recording_without_a_reversal_is_refused(columns, simulated, ref
 
 
 HEADINGS = [
-    ("input_force_N", "input_force", ["'input_force'", "does not say its unit", "--channel input_force=input_force:N"]),
+    ("input_force_N", "input_force", ["'input_force'", "does not state its unit", "--channel input_force=input_force:N"]),
     ("input_force_N", "input_force_mm", ["'input_force_mm'", "'mm'", "force", "lbf"]),
     ("input_force_N", "input_force_kg", ["'kg'", "kgf"]),
     ("input_force_N", "input_force [quux]", ["'quux'", "not known"]),

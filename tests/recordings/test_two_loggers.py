@@ -33,7 +33,7 @@ def test_two_clocks_and_rates_are_joined_by_the_forces(tmp_path):
     recording, account, sd = read_one(write_loggers(tmp_path, UNEVEN, 1, shift=5.3))
     assert abs(account.clock_shift - 5.3) < 3 * sd < 0.03
     assert abs(recording.strokes.exponent - UNEVEN.exponent) < 0.015
-    assert f"shifted by {account.clock_shift:+.4f} s, give or take {sd:.4f} s, found from the forces" in account.remarks[0]
+    assert f"shifted by {account.clock_shift:+.4f} s ± {sd:.4f} s, found from the forces" in account.remarks[0]
     assert {"i.csv", "o.csv"} <= {*bf.read(tmp_path).sha256}
 
 

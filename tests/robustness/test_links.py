@@ -16,7 +16,7 @@ from bowdenfit.questions.fleet.store import PIECES_FOLDER
 from bowdenfit.results.answer_cache import CAPTIONS, write_captions
 from bowdenfit.results.folder import CHAIN, FIGURES, REPLICATIONS, reserve_folder
 
-REFUSED = "would change what lies there"
+REFUSED = "would change what is there"
 YARN = "datasets/yarn-on-cylinder"
 
 

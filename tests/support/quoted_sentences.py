@@ -34,10 +34,10 @@ def sentences() -> Iterator[tuple[Path, str]]:
     yield STORY, f"profile interval for mu1, which takes that into account, is {profile(quoted['least_squares'], 'mu1')}"
     yield STORY, quoted["compared"].partition(" Prefer")[0]
     for target in ("length", "mu3"):
-        yield STORY, sentence(one_line(quoted[f"next_{target}"]), "Measure the efficiency", "now to ± ")
+        yield STORY, sentence(one_line(quoted[f"next_{target}"]), "Measure the efficiency", "from ± ")
     yield TRUST, f"{dashed(quoted['plain_mu3'])} to {dashed(quoted['mistaken_mu3'])} and ends with exit code 3"
     yield TRUST, f"with Student noise it is {dashed(quoted['mistaken_student_mu3'])}"
-    yield TRUST, re.findall(r"known to (± [\d.]+ mm, now to ± [\d.]+ mm)", one_line(quoted["next_length"]))[0]
+    yield TRUST, re.findall(r"from (± [\d.]+ mm to ± [\d.]+ mm)", one_line(quoted["next_length"]))[0]
 
 
 def missing() -> list[str]:

@@ -129,7 +129,7 @@ class DisplacementKind(
         if description.friction_model != "capstan":
             return 'the equations of the table displacement hold for friction_model = "capstan" only; leave it out'
         if settings.stop is not None and settings.end != "stop":
-            return 'tables.displacement says where a stop is, but not end = "stop"; write that beside it, or leave the stop out'
+            return 'tables.displacement says where a stop is, but not end = "stop"; write that as well, or leave the stop out'
         return ""
 
     @override
@@ -238,4 +238,4 @@ def _warnings(table: DisplacementTable, description: Description) -> Iterator[st
     if not (np.nansum(table.own.angle, axis=1) > 0).any() and not any(
         c.wrap_angle.constant is not None or c.wrap_angle.curve for c in description.contact
     ):
-        yield f"every row of {file} is at a wrap angle of 0, so it says nothing about friction; read at larger ones too."
+        yield f"every row of {file} is at a wrap angle of 0, so it has no information on friction; read at larger ones too."

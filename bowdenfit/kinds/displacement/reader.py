@@ -157,7 +157,7 @@ def _check_runs(table: DisplacementTable) -> None:
         which = few([f"{table.origin.describe_row(i)} ({table.run_names[table.run[i]]})" for i in single_rows])
         raise DatasetError(
             f"{which}: a run of one reading, which determines nothing, since where its displacement begins is fitted; the "
-            "usual causes are a slipped digit in its wrap angle, another label than the rows beside it, and angles that "
+            "usual causes are a slipped digit in its wrap angle, another label than the rows next to it, and angles that "
             "differ from row to row: write one angle and one label for all rows of a mounting, or leave the row out."
         )
 
@@ -209,21 +209,21 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
     if table.sliding:
         remarks.append(
             f"{file} has a stroke column: every row is taken as read while all of the rope slides. If rows were taken in order "
-            'through the turns of the motor, write rows = "in order" beside the file in cable.toml.'
+            'through the turns of the motor, write rows = "in order" next to the file in cable.toml.'
         )
     else:
         ignored = " Its stroke column is not needed." if has_strokes else ""
         unknown = find_early_rows(table)
         used &= ~unknown
         remarks.append(
-            f"{file}: rows are taken in the order in which they stand, and turns of the motor as the displacement shows them."
+            f"{file}: rows are taken in the order of the file, and turns of the motor as the displacement shows them."
             f"{ignored} {int(unknown.sum())} of {len(x)} rows, at the start of each run, are not used, because there the force "
             "depends on how the rope lay before, which is not known."
         )
     if "end" not in settings.model_fields_set:
         remarks.append(
             f"{file}: the far end is taken for a spring whose stiffness is fitted; if the rope pulls against a stop, write "
-            'end = "stop" beside the file in cable.toml, or --set tables.displacement.end=stop.'
+            'end = "stop" next to the file in cable.toml, or --set tables.displacement.end=stop.'
         )
     if settings.stop is not None:
         at = settings.stop.to("length")

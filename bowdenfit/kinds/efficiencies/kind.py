@@ -84,7 +84,7 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
     table = EfficiencyTable
     readings = (efficiency_readings("efficiency", "efficiencies", "efficiencies", "efficiency at {}"),)
     methods_sentence = (
-        "The logarithm of a measured efficiency was that of the model, give or take the scatter between mountings."
+        "The logarithm of a measured efficiency was that of the model, up to the scatter between mountings."
     )
     init_questions = InitQuestions(
         "efficiencies: output force over input force while pulling",
@@ -275,7 +275,7 @@ def _read_efficiency_sd(cell: Cell, column: Column, efficiency: Cell, efficiency
         )
     if _is_in_percent(efficiency, efficiency_column) and not _is_in_percent(cell, column):
         raise cell.refuse(
-            f"{cell.shown} does not say whether it is in percent as the efficiency beside it is; name the column "
+            f"{cell.shown} does not say whether it is in percent, as the efficiency next to it is; name the column "
             "efficiency_sd_percent, or write 1 % for 0.01."
         )
     return value

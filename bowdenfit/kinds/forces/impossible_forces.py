@@ -171,12 +171,12 @@ def check_following(table: ForceTable) -> None:
         if _does_not_follow(table, rows, stroke):
             force_in, force_out = table.input_force[rows], table.output_force[rows]
             opposed = np.ptp(force_out) > 0 and np.corrcoef(force_in, force_out)[0, 1] < OPPOSED
-            how_much = "falls where the input rises" if opposed else "hardly depends on it"
+            how_much = "falls where the input rises" if opposed else "barely depends on it"
             cause = "the two tensions of a pull-pull pair" if opposed else "a dead load cell"
             raise DatasetError(
                 f"{table.origin.describe_row(rows[0])} and on: while {how}, output_force does not follow input_force, "
                 f"which goes from {force_in.min():.4g} to {force_in.max():.4g} N while the output is "
-                f"{force_out.mean():.4g} N give or take {force_out.std():.2g} N, and {how_much}; a rope transmits more force "
+                f"{force_out.mean():.4g} N ± {force_out.std():.2g} N, and {how_much}; a rope transmits more force "
                 f"where more goes in. The usual causes are {cause}, a column that is no force (a position, a time), and rows "
                 "of one column that belong beside others of the other; map the right columns in cable.toml, or leave these "
                 "rows out."
@@ -266,7 +266,7 @@ def check_gains(table: ForceTable, description: Description) -> None:
         raise DatasetError(
             f"{table.origin.describe_row(row)}: output_force {table.output_force[row]:.4g} N at input_force "
             f"{table.input_force[row]:.4g} N is off the other readings of its run and stroke by a factor of more than two, "
-            f"which noise hardly does: the usual cause is {_TYPED}."
+            f"which noise rarely does: the usual cause is {_TYPED}."
         )
 
 

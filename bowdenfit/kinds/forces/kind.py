@@ -99,7 +99,7 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
             RUN,
             STROKE,
         ),
-        (YesNoQuestion("run", "Was the cable mounted anew for every row of {}?", "run", "each row"),),
+        (YesNoQuestion("run", "Was the cable remounted for every row of {}?", "run", "each row"),),
         has_own_angles=True,
         several=True,
     )
@@ -315,5 +315,5 @@ def _warn_of_single_mountings(table: ForceTable, description: Description) -> li
     return [
         f"{listed(once)}: measured in one mounting of the cable{' each' if len(once) > 1 else ''}, so the effect of that "
         "mounting cannot be separated from that of the group, and intervals rest on the scatter of other mountings, or on its "
-        "prior; mount the cable anew a few times in each group."
+        "prior; remount the cable a few times in each group."
     ]

@@ -89,17 +89,17 @@ def remark_on_reused_labels(
     return (
         f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back {where}, which is "
         f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while "
-        f'its {what} changed, write run = "across {what}s" beside the file in cable.toml.'
+        f'its {what} changed, write run = "across {what}s" next to the file in cable.toml.'
     )
 
 
 def remark_on_one_row_runs(n_rows: int, file: str) -> str:
     """Return a remark on what it means that every row is a run of its own."""
     return (
-        f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml says. So {n_rows} rows determine "
-        "a coefficient as precisely as that many mountings do, and the scatter from mounting to mounting cannot be separated "
-        "from the noise of the load cells unless that is stated. Where the cable in fact stayed mounted over several rows "
-        "these share the effect of its mounting, and intervals come out too narrow: give those rows one run."
+        f"{file}: each of its {n_rows} rows is taken as a mounting of its own, as cable.toml states. So {n_rows} rows "
+        "determine a coefficient as precisely as that many mountings do, and the scatter from mounting to mounting cannot be "
+        "separated from the noise of the load cells unless that is stated. If the cable in fact stayed mounted over several "
+        "rows, these share the effect of its mounting, and intervals come out too narrow: give those rows one run."
     )
 
 
@@ -185,7 +185,7 @@ def _explain_no_groups(column: Column, distinct: Sequence[str], may_be_numbers: 
     if named and not may_be_numbers and all(_is_number(cell) for cell in named):
         return (
             f"the column {heading} holds numbers ({values}), which may be a quantity rather than names of groups. If they are "
-            'names, write groups = "called by numbers" beside the file in cable.toml, or give the groups words; a quantity '
+            'names, write groups = "called by numbers" next to the file in cable.toml, or give the groups words; a quantity '
             "that friction depends on, such as a temperature, cannot be fitted."
         )
     if len(distinct) > _MOST_GROUPS:

@@ -269,7 +269,7 @@ def _assign_runs(
         return *number_names(keys), [
             f"{file} has no run column: all rows at one {limits.variable if limits else 'wrap angle'}"
             f"{' and of one group' if group else ''} are taken as one run (one mounting of the cable); if the cable was "
-            'remounted for each row, write run = "each row" beside the file in cable.toml.'
+            'remounted for each row, write run = "each row" next to the file in cable.toml.'
         ]  # fmt: skip
     labels = read_labels(column.cells, "(no run)")
     if how != "at one length":

@@ -189,7 +189,7 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         known = stated or np.isfinite(table.preload).any()
         if not known and np.median(np.abs(table.output_force)) < _FREE * np.median(np.abs(table.input_force)):
             warnings.append(
-                f"nearly all of {table.origin.files[0]} was read in free motion, with hardly any output force; that determines "
+                f"nearly all of {table.origin.files[0]} was read in free motion, with almost no output force; that determines "
                 "only the product of friction and preload: load the loop until its return side is slack, or measure the "
                 "preload."
             )

@@ -118,7 +118,7 @@ def _describe_delay(pages: list[dict[str, Any]]) -> list[str]:
             continue
         delay, sd = 1000 * page["delay"], 1000 * (page["delay_sd"] if page["delay_sd"] is not None else np.nan)
         if np.isfinite(sd):
-            texts[f"{delay:.1f} ms, give or take {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
+            texts[f"{delay:.1f} ms ± {sd:.1f} ms (from the reversals of all recordings)"] = page["name"]
         elif delay:
             texts[f"{delay:.1f} ms (as stated)"] = page["name"]
     return [f"The output channel was shifted back by a delay of {text}." for text in texts]
@@ -299,7 +299,7 @@ class RecordingKind(FrictionKind[Recordings]):
                     int(np.sum(r.strokes.used_sliding & (r.strokes.stroke == stroke))) for r in (one, other)
                 )
                 if after < min(before, _FEWEST_BLOCKS):
-                    return "a recording hardly slides"
+                    return "a recording barely slides"
             if other.strokes.noise > max(FACTOR * one.strokes.noise, SCATTER if not measured.loop else 0.0):
                 return "a recording is nothing but noise"
         exponents = np.array([r.strokes.exponent for r in simulated.items])

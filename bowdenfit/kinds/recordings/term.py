@@ -68,7 +68,7 @@ from bowdenfit.recordings.strokes import cable_of, find_strokes
 _MOSTLY = 0.9  # share of blocks under tension from which a refusal does not speak of tension; a judgement
 _NO_TENSION = (
     "while the rope slides no block has both forces above 0 inside the cells' ranges; the usual causes are a wrong tare, "
-    "swapped or inverted channels, or a pull that hardly moved: look at it with `bowdenfit check FILE`"
+    "swapped or inverted channels, or a pull that barely moved: look at it with `bowdenfit check FILE`"
 )
 _NO_SLIDING = (
     "nothing shows that the rope slides: the forces neither make a loop nor rise together at both ends, and no velocity says "

@@ -230,7 +230,7 @@ class RingDownKind(Kind[RingDownTable]):
 
     @override
     def why_implausible(self, measured: RingDownTable, simulated: RingDownTable) -> str:
-        return "" if np.ptp(simulated.reading) > np.ptp(measured.reading) / 5 else "the joint hardly swings"
+        return "" if np.ptp(simulated.reading) > np.ptp(measured.reading) / 5 else "the joint barely swings"
 
     @override
     def file_rows(self, table: RingDownTable, description: Description) -> FileRows:

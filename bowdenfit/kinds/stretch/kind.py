@@ -246,7 +246,7 @@ class StretchKind(RopeKind[StretchTable], PlannedKind[StretchTable]):
             )
         if not table.wrap_angle.any():
             warnings.append(
-                f"every row of {file} is at a wrap angle of 0, so it says nothing about friction; read at larger ones too."
+                f"every row of {file} is at a wrap angle of 0, so it has no information on friction; read at larger ones too."
             )
         return warnings + warn_of_single_angle(measurements)
 

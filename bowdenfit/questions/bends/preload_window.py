@@ -45,7 +45,7 @@ class PreloadWindow(Display):
         low, high = (f"{angle:.4g}" for angle in self.bends)
         return (
             f"Set the preload to {significant(self.best)} N{self._at}: of the preloads that keep the cable taut from {low} to "
-            f"{high} deg it is felt least."
+            f"{high} deg it adds the least friction."
         )
 
     @property

@@ -69,7 +69,7 @@ def data(fit: Record) -> PreloadWindowCurves | None:
 def caption(window: PreloadWindowCurves) -> str:
     """Describe what is drawn, in plain words."""
     return (
-        "What a preload costs and what it buys. Above: the friction that is felt in free motion at the bend where it is "
+        "What a preload costs and what it buys. Above: the friction in free motion at the bend where it is "
         f"largest. {describe_curve(len(window.friction) > 1)} Below: the probability that both sides of the loop stay taut "
         "over all bends. Green: preloads for which that is nearly sure; the vertical line is the lowest that keeps both "
         "sides taut. Nothing here is measured directly; it follows from the fit."

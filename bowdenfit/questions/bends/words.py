@@ -99,7 +99,7 @@ def describe_products_with_preload(fit: Record) -> list[str]:
             continue
         product = Interval.of(preload * friction)
         sentences.append(
-            f"The measurements hardly separate {PRELOAD} from {name}; they determine the product {PRELOAD} x {name} = "
+            f"The measurements barely separate {PRELOAD} from {name}; they determine the product {PRELOAD} x {name} = "
             f"{significant(product.median)} N (90 % interval {significant(product.q05)} to {significant(product.q95)} N)."
         )
     return sentences

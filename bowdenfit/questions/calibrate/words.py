@@ -53,7 +53,7 @@ def calibration_page(calibration: Calibration) -> HtmlPage:
         prose_section("The answer", [*others, describe_procedure(calibration)], headline=first),
         prose_section(
             "Quantity by quantity", [quantity_note(calibration)] if table else [], table,
-            folded=[("What the names stand for", names), ("What the verdict on each rests on", evidence)],
+            folded=[("What the names mean", names), ("What the verdict on each rests on", evidence)],
             pictures=_make_pictures(calibration),
         ),
         prose_section("What was left out", omission_sentences(calibration)),

@@ -102,8 +102,8 @@ def _describe_departure(fit: Record, departure: Departure) -> str:
     low, high = (_percent_excess(excess) for excess in (departure.at_low, departure.at_high))
     where = _where_low_and_high(departure, _levels(fit, departure))
     return (
-        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; as "
-        f"much happens by chance in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
+        f"The model does not describe {what}: {where[0]} {read} is {low} than the model says, and {where[1]} {high}; "
+        f"chance alone does this in {_odds(departure.p_value)}. {_suggest_remedy(fit, departure)}"
     )
 
 
@@ -113,8 +113,8 @@ def _describe_drift(departure: Departure) -> str:
     return (
         f"The model does not describe {find_readings(departure.table).words}: the zero of the output drifts, by about "
         f"{significant(abs(departure.high - departure.low), 2)} N from the start of a recording to its end (or that of the "
-        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; as "
-        f"much happens by chance in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; "
+        f"input, the other way), which moves a coefficient by {far} of the half width of its interval; "
+        f"chance alone does this in {_odds(departure.p_value)}. Let the load cells warm up and tare before each recording; "
         "leave out the part in which the zero moves."
     )
 

@@ -83,7 +83,7 @@ def caption(data: PriorPredictive) -> str:
     """Describe what is drawn, in plain words."""
     n = sum(len(table.reading) for table in data.tables)
     text = (
-        "Readings that the priors alone allow, before anything is fitted, beside the measured ones: thick lines contain "
+        "Readings that the priors alone allow, before anything is fitted, with the measured ones: thick lines contain "
         "90 %, thin ones 99 %. Readings outside these have a color of their own; the usual cause is a wrong unit."
     )
     if data.efficiency is not None:

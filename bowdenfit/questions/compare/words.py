@@ -60,7 +60,7 @@ def comparison_page(comparison: Comparison) -> HtmlPage:
             "What changes",
             speed_sentences(comparison),
             [PageTable(names, tuple(values), WHAT_CHANGES)],
-            folded=[("What the names stand for", make_meanings_table(meanings))],
+            folded=[("What the names mean", make_meanings_table(meanings))],
         ),
     )
     return HtmlPage(listed(list(comparison.differences)), "Comparison by bowdenfit", sections)

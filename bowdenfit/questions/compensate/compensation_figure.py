@@ -22,12 +22,12 @@ _TORQUE = "Torque (N m)"
 def caption(answer: Compensation) -> str:
     """Say what is drawn, in plain words."""
     fed = (
-        " Dashed and dotted: what a controller may feed forward without the device moving by itself."
+        " Dashed and dotted: what a controller may feed forward without the device moving on its own."
         if answer.fixed
         else ""
     )
     return (
-        f"Left: friction of the loop by wrap angle, median and 90 % interval.{fed} Right: torque that is felt in free motion, "
+        f"Left: friction of the loop by wrap angle, median and 90 % interval.{fed} Right: torque in free motion, "
         "and torque from which on the rope goes slack, by preload, median and 90 % interval. "
         f"n = {counted(len(answer.by_bend), 'bend')} and {counted(len(answer.preloads), 'preload')}."
     )
@@ -73,7 +73,7 @@ def _draw_friction(axes: Axes, answer: Compensation) -> None:
 def _draw_preload(axes: Axes, answer: Compensation) -> None:
     preloads = np.array([row.preload for row in answer.preloads])
     for name, color, line, label in (
-        ("friction", BLUE, SERIES_LINES[0], "Felt in free motion"),
+        ("friction", BLUE, SERIES_LINES[0], "Friction in free motion"),
         ("slack_from", VERMILLION, SERIES_LINES[3], "Slack from this torque on"),
     ):
         intervals = [getattr(row, name) for row in answer.preloads]

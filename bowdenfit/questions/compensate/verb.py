@@ -32,7 +32,7 @@ def compensate(
     seed: Annotated[Seed, Parameter(show_default="that of the fit")] = None,
     output: Output = None,
 ) -> "Compensation":
-    """How much of a loop's friction a controller may compensate before the device moves by itself, and what a hand still feels.
+    """How much of a loop's friction a controller may compensate before the device moves on its own, and what a hand feels.
 
     Args:
         fit: The fit.
@@ -82,7 +82,7 @@ VERB = Verb(
     _reply,
     """Say how much friction a controller may compensate.
 
-    With more than that, the device moves by itself. The answer covers the
+    With more than that, the device moves on its own. The answer covers the
     uncertainty of the fit and the scatter between mountings, and says how much
     friction a hand still feels.
 

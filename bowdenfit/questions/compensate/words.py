@@ -56,7 +56,7 @@ def _feed_forward_sentences(answer: Compensation) -> Iterator[str]:
     if fixed is None or scheduled is None:
         return
     friction, left = format_torque(most.friction.median), format_torque(fixed.left)
-    risk = f"with at most {percent(answer.risk, 0)} probability the device then moves by itself"
+    risk = f"with at most {percent(answer.risk, 0)} probability the device then moves on its own"
     bends = _describe_bends(answer)
     if answer.bends[0] == answer.bends[1]:
         yield (
@@ -83,9 +83,9 @@ def _mounting_sentence(answer: Compensation, scheduled: FeedForward) -> str:
     """Say what the scatter from mounting to mounting costs."""
     source = "measured" if answer.scatter_from_fit else "stated, not measured"
     if answer.scatter == 0:
-        seem = "so this holds for this mounting alone, and the next one may move by itself"
+        seem = "so this holds for this mounting alone, and the next one may move on its own"
     elif scheduled.share >= answer.share_without_scatter:
-        seem = "that hardly matters here"
+        seem = "that matters little here"
     else:
         seem = f"neglecting it, {answer.share_without_scatter:.2f} would seem safe, and is not"
     return f"The relative scatter of the friction exponent between mountings (tau) is {answer.scatter:.2g} ({source}); {seem}."
@@ -208,7 +208,7 @@ def _simulation_sentences(answer: Compensation) -> Iterator[str]:
     runaways = (
         ""
         if simulation.runaway_share is None
-        else f" Pushed and let go, {percent(simulation.runaway_share, 1)} keep moving by themselves."
+        else f" Pushed and let go, {percent(simulation.runaway_share, 1)} keep moving on their own."
     )
     yield (
         f"In {simulation.draws} simulated devices, moved at up to {simulation.speed:.2g} rad/s at "

@@ -205,7 +205,7 @@ def tabulate_transmission(fit: Record, points: int = 101, draws: int = 0, distru
     cable, conditions = fit.model.cable, fit.model.cable.friction.conditions
     available = len(fit.draws().flat_z)
     if draws > available:
-        raise UsageError(f"--draws {draws}: this fit has {available} draws; ask for so many at most.")
+        raise UsageError(f"--draws {draws}: this fit has {available} draws; ask for at most that many.")
     table_points, bent = _choose_points(fit, points)
     middle, refined = _median_load_law(fit), _add_midpoints(table_points.values)
     mean_tables = _tabulate_draws(fit, refined, bent, middle, np.zeros(available))

@@ -63,7 +63,7 @@ class Identifiability(Display):
         friction, elastic = (self.groups.get(group) for group in ("friction", "elastic"))
         sentences = [describe_identified(friction, self.measured)] if friction else []
         if elastic is not None:
-            sentences.append(describe_identified(elastic, self.measured, "Of how the cable gives they determine"))
+            sentences.append(describe_identified(elastic, self.measured, "For the cable's compliance, they determine"))
         if friction is not None and (friction.undetermined or friction.determined):
             sentences.append(_REMEDY)
         return sentences

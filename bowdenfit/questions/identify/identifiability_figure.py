@@ -93,7 +93,7 @@ def _draw_shares(axes: Axes, name: str, group: CovarianceAnalysis) -> None:
     axes.set_xlim(0, 100)
     axes.grid(visible=False)
     axes.set_title(name[0].upper() + name[1:], loc="left")
-    axes.set_xlabel("Told by the measurements, not the prior (%)")
+    axes.set_xlabel("Determined by the measurements, not the prior (%)")
 
 
 def _draw_combinations(axes: Axes, group: CovarianceAnalysis) -> None:

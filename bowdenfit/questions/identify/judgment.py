@@ -221,7 +221,7 @@ class ConfoundedPair:
         """Return the pair and its combination in a sentence."""
         digits = int(np.clip(1 - np.floor(np.log10(max(self.sd, 1e-12))), 0, 8))
         return (
-            f"The measurements hardly separate {self.first} from {self.second} (correlation {self.correlation:+.2f}); "
+            f"The measurements barely separate {self.first} from {self.second} (correlation {self.correlation:+.2f}); "
             f"what they do determine is {self.combination} = {self.mean:z.{digits}f} ± {self.sd:z.{digits}f}, while "
             f"{self.first} alone is known to ± {significant(self.first_sd, 2)}."
         )

@@ -73,8 +73,8 @@ VERB = Verb(
 
       KIND        a reading of
       angle       the wrap angles of all curved contacts at a length
-      force       forces at both ends, a run like those made so far, mounted anew
-      efficiency  the efficiency at a length, mounted anew
+      force       forces at both ends, a run like those made so far, after remounting
+      efficiency  the efficiency at a length, after remounting
       stretch     the rope's stretch at a wrap angle and load
       preload     the preload at a wrap angle
       loop        the output force of a loop at a wrap angle and input force

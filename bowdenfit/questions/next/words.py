@@ -67,7 +67,7 @@ def _second_mounting_sentences(ranking: NextMeasurement, second: SecondMounting)
     answer = ranking.answer
     unit = f" {answer.unit}" if answer.unit else ""
     return [
-        f"Mount the cable anew and measure {second.words} next: all readings come from one mounting, which cannot show how "
+        f"Remount the cable and measure {second.words} next: all readings come from one mounting, which cannot show how "
         "far mountings differ.",
         f"Then the 90 % interval of {answer.words} would be about {format_width(second.width)}{unit} wide, now "
         f"{format_width(second.width_now)}{unit}. How the second mounting turns out decides: 90 % of the outcomes leave "
@@ -106,8 +106,8 @@ def _advice_sentences(ranking: NextMeasurement) -> list[str]:
         ]
     per_cost = " for its cost" if best.cost is not None else ""
     lines = [
-        f"Measure {best.words} next{per_cost}{_mounting_and_loads(ranking, best)}. Then {answer.words} would be known to "
-        f"{_format_sd(ranking, best.sd)}, now to {_format_sd(ranking, answer.sd)}."
+        f"Measure {best.words} next{per_cost}{_mounting_and_loads(ranking, best)}. That would narrow {answer.words} from "
+        f"{_format_sd(ranking, answer.sd)} to {_format_sd(ranking, best.sd)}."
     ]
     equally_good = [r for r in ranking.ranked if r.as_good and r is not best]
     if equally_good:
@@ -121,9 +121,10 @@ def _mounting_and_loads(ranking: NextMeasurement, best: RankedCandidate) -> str:
     if not candidate_kinds()[best.candidate.kind].mounted_anew:
         return ""
     if ranking.loads is None or math.isfinite(best.candidate.load):
-        return ", mounted anew"
+        return ", after remounting the cable"
     low, high = map(significant, ranking.loads)
-    return f", mounted anew, at {low} N" if low == high else f", mounted anew, at {low} to {high} N as so far"
+    loads = f"{low} N" if low == high else f"{low} to {high} N as so far"
+    return f", after remounting the cable, at {loads}"
 
 
 def _load_and_stroke_sentences(ranking: NextMeasurement) -> list[str]:

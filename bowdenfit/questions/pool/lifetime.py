@@ -43,7 +43,7 @@ def parse_service_limit(
     if until is None:
         if wrap_angles or cycles is not None:
             raise UsageError(
-                "--wrap-angle and --cycles ask how long cables last; say until which efficiency, as --until 60%."
+                "--wrap-angle and --cycles ask how long cables last; state until which efficiency, as --until 60%."
             )
         return None
     value, unit = until
@@ -54,7 +54,7 @@ def parse_service_limit(
     wrong = [name for name in angles if name not in coefficients]
     missing = [name for name in coefficients if name not in angles]
     if wrong or missing:
-        what = f"there is no coefficient {wrong[0]!r}" if wrong else f"none is said for {missing[0]}"
+        what = f"there is no coefficient {wrong[0]!r}" if wrong else f"none is given for {missing[0]}"
         example = " ".join(f"--wrap-angle {name}=90deg" for name in coefficients)
         raise UsageError(f"how long a cable lasts depends on its wrap angles, and {what}; write {example}, with yours.")
     return ServiceLimit(

@@ -181,7 +181,7 @@ def _select_usable(
     kept = trusted & has & (dated if some else np.ones(len(has), dtype=bool))
     if left:
         named = few([inspection.inspection for inspection in left])
-        notes.append(f"{counted(len(left), 'inspection')} could not be pooled ({named}); why stands in the JSON.")
+        notes.append(f"{counted(len(left), 'inspection')} could not be pooled ({named}); the reason is in the JSON.")
     return kept, tuple(left)
 
 
@@ -211,7 +211,7 @@ def _select_covariates(fleet: FleetDraws, kept: np.ndarray, notes: list[str]) ->
             covariates[name] = column
         elif not missing and column[0] != 0:
             at = "lubricated" if name == "lubrication" else f"at {fleet.temperature[kept][0]:g} °C"
-            notes.append(f"Every inspection was made {at}, so all that is said holds {at}.")
+            notes.append(f"Every inspection was made {at}, so all answers hold {at}.")
     return covariates
 
 

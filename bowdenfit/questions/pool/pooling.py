@@ -190,14 +190,14 @@ def _find_too_few_draws(data: PoolingData, result: _PooledDraws) -> list[str]:
     contradictory = [data.cables[cable_numbers[j]] for j in low if cable_numbers[j] in result.departures]
     if pulled:
         reasons.append(
-            f"what was drawn from the inspections of {few(list(dict.fromkeys(pulled)))} by themselves hardly reaches where the "
-            "other cables put them, so that what is said of them may be off by half its uncertainty; name the folder of the "
+            f"what was drawn from the inspections of {few(list(dict.fromkeys(pulled)))} alone barely reaches where the "
+            "other cables put them, so that their answers may be off by half their uncertainty; name the folder of the "
             "fleet's measurements with --measurements, and their readings are looked at again"
         )
     if contradictory:
         reasons.append(
             f"inspections of {few(list(dict.fromkeys(contradictory)))} contradict each other, so that the estimate lies "
-            "where hardly any of them puts it; look for a wrong reading, a wrong row of fleet.csv or a cable that was "
+            "where almost none of them puts it; look for a wrong reading, a wrong row of fleet.csv or a cable that was "
             "changed, and leave that inspection out"
         )
     return reasons

@@ -150,8 +150,8 @@ def next_sentences(pool: Pool) -> list[str]:
         )
     else:
         what = (
-            f"its wear in {_format_cycles(pool.reference_cycles)} would be known to ± {percent(best.after)}, now to ± "
-            f"{percent(best.before)}"
+            f"that would narrow its wear in {_format_cycles(pool.reference_cycles)} from ± {percent(best.before)} to ± "
+            f"{percent(best.after)}"
         )
     return [f"Inspect {best.cable} next, after {_format_cycles(best.cycles)}: {what}."]
 
@@ -299,7 +299,7 @@ def captions(pool: Pool) -> dict[str, str]:
             "to the dotted line; beyond it wear is assumed to go on as before."
         ),
         "pooled-life": (
-            f"Probability that {what} before so many cycles: of each cable (thin) and of a new one (thick). n = "
+            f"Probability that {what} before a number of cycles: of each cable (thin) and of a new one (thick). n = "
             f"{len(pool.cables)} cables."
         ),
     }

@@ -177,7 +177,7 @@ def _name_gait_column(table: RawTable, column: str) -> ColumnSource:
         return ColumnSource(name=heading, unit=ending)
     if not split_brackets(heading)[1] and not table.units[table.header.index(heading)]:
         raise DatasetError(
-            f"--gait-column {column!r}: the column does not say its unit; write it behind the heading, as --gait-column "
+            f"--gait-column {column!r}: the column does not state its unit; write it behind the heading, as --gait-column "
             f"{f'{heading}:deg'!r}."
         )
     return ColumnSource(name=heading)

@@ -253,7 +253,7 @@ VERB = Verb(
 
     --table FILE predicts one row for each of many: columns with a length, the wrap angle
     of any contact, input_force or output_force, and stroke; what a row leaves blank
-    is as fitted, and a column that is none of these is refused.
+    is as fitted, and any other column is refused.
 
     --contact NAME with several --wrap-angle, or --gait FILE, gives the mean while
     this contact bends, such as over a stride; with moment arms in that file

@@ -68,8 +68,8 @@ def caption(recordings: tuple[Autocorrelation, ...]) -> str:
     shown = min(len(recordings), MOST)
     return (
         f"Autocorrelation of the deviations from the fit in {count_shown(shown, len(recordings), 'recording')}, by the "
-        "time between them. Of white noise 95 % lie in the gray band; a slow wave outside it is an effect that the model does "
-        f"not include. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
+        "time between them. For white noise, 95 % lie in the gray band; a slow wave outside it is an effect that the model "
+        f"does not include. n = {sum(r.n_blocks for r in recordings)} blocks of samples."
     )
 
 

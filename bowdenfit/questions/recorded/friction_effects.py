@@ -61,7 +61,7 @@ class RateEffect:
         )
         where = f" {self.place}" if self.place else ""
         return (
-            f"Efficiency{where} at {significant(self.fast)} {self.unit} less that at {significant(self.slow)} {self.unit}: "
+            f"Efficiency{where} at {significant(self.fast)} {self.unit} minus that at {significant(self.slow)} {self.unit}: "
             f"{100 * self.difference.median:+.2f} points (90 % interval {low:+.2f} to {high:+.2f}), {verdict}."
         )
 

@@ -26,7 +26,7 @@ def changes_section(fit: Record, earlier: Record, name: str) -> PageSection:
     """
     when = f", of {earlier.provenance.created[:10]}" if earlier.provenance.created else ""
     sentences = [
-        f"Beside the earlier fit {PurePath(name).name or name}{when}.",
+        f"Compared with the earlier fit {PurePath(name).name or name}{when}.",
         _describe_inputs(fit, earlier),
         _describe_settings(fit, earlier),
         _describe_verdicts(fit, earlier),

@@ -124,7 +124,7 @@ def write_report(
         output, fit, figures = output or folder / REPORT, load(folder), read_figure_data(folder)
         guard = damage_as(damaged_figure_data(folder)) if figures else guard
     if output is None:
-        raise UsageError("a fit by itself has no folder; name a file for the report.")
+        raise UsageError("a fit on its own has no folder; name a file for the report.")
     ranking = rank_measurements(fit) if rank_next else None
     figures, path, mark = figures or dict(collect_figure_data(fit)), Path(output), warning_mark(assess_fit(fit).troubles)
     path = path / REPORT if path.is_dir() else path

@@ -177,7 +177,7 @@ def write_fleet(plan: FleetPlan, inspections: list[SimulatedInspection], truth: 
     for inspection in inspections:
         texts = list(table_texts(inspection.dataset.description, inspection.dataset.measurements).values())
         if len(texts) != 1:
-            raise DescriptionError("a simulated fleet has one table an inspection; leave one under [tables] of the plan.")
+            raise DescriptionError("a simulated fleet has one table per inspection; leave one under [tables] of the plan.")
         files[inspection.file] = texts[0]
         lubricated = "yes" if inspection.lubricated else "no"
         numbers = f"{inspection.cycles:.0f}", f"{inspection.temperature:g}"

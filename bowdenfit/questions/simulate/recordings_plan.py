@@ -228,7 +228,7 @@ def _plan_recording(
     speed = also.speed or page.speeds[0]
     sections = {name: {**getattr(page, name), **getattr(also, name)} for name in RecordingSettings.model_fields}
     if "speed" in sections["profile"]:
-        raise DescriptionError(f"{where}, profile: unknown key 'speed'; write speeds or speed beside [profile].")
+        raise DescriptionError(f"{where}, profile: unknown key 'speed'; write speeds or speed next to [profile].")
     sections["profile"]["speed"] = _parse_motor_speed(speed, where)
     name = (
         f"{also.length:g} {description.route.unit}, {speed}" if also.length is not None and description.route else speed

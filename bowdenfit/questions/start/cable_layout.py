@@ -107,7 +107,7 @@ def _add_route(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
     lengths = unknown_columns_of(file, "length")
     if not lengths:
         raise DatasetError(
-            f"{file.name} has no column of lengths beside the wrap angles; add one, such as cable_length_mm."
+            f"{file.name} has no column of lengths next to the wrap angles; add one, such as cable_length_mm."
         )
     why = f"{file.name} does not say which of its columns is the length; name that column cable_length_mm."
     sure = len(lengths) == 1 and bool(lengths[0].dimension)
@@ -197,7 +197,7 @@ def _several_columns_question(words: str, columns: Sequence[FileColumn], file: s
         if not numbers_typed or not all(
             number.isdecimal() and 1 <= int(number) <= len(columns) for number in numbers_typed
         ):
-            raise UsageError(f"{shown(typed)} are none of them; write their numbers separated by spaces, such as 1 2.")
+            raise UsageError(f"{shown(typed)} are not among them; write their numbers separated by spaces, such as 1 2.")
         return [columns[i - 1] for i in sorted({int(number) for number in numbers_typed})]
 
     why = f"{file} does not say which of its columns are wrap angles; write their unit into their headings."

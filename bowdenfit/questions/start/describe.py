@@ -35,7 +35,7 @@ from bowdenfit.recordings.named_channels import parse_channels
 from bowdenfit.words import listed
 
 _REMARKS = {
-    "schema": "Written by `bowdenfit init` from the files beside it; `bowdenfit check` says how it is understood.",
+    "schema": "Written by `bowdenfit init` from the files next to it; `bowdenfit check` says how it is understood.",
     "route": "What the design question varies, and where the curves of the wrap angles hold.",
     "contact": "One [[contact]] for each place where the rope rubs; contacts may share a coefficient.",
 }
@@ -156,7 +156,7 @@ def _ask_kind(file: MeasuredFile, asker: Asker) -> MeasuredFile:
     columns = listed([column.words for column in file.columns])
     why = (
         f"{file.name} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "
-        "efficiency_percent, or cable_length_mm beside wrap angles in deg; or run this in a terminal, which asks."
+        "efficiency_percent, or cable_length_mm next to wrap angles in deg; or run this in a terminal, which asks."
     )
     kind = asker.ask(
         choice_question(f"{file.name} has the columns {columns}. What does it hold?", options, default, why)

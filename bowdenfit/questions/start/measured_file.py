@@ -383,5 +383,5 @@ def name_channels(file: MeasuredFile, asker: Asker) -> None:
     name_columns(file, asker)
     if not file.has_clock:
         why = f"{file.name} does not say when its samples were taken; add a column of time."
-        rate = asker.ask(number_question(f"How many samples a second has {file.name}?", None, why, "1000"))
+        rate = asker.ask(number_question(f"How many samples per second has {file.name}?", None, why, "1000"))
         file.sources["time"] = ColumnSource(name=f"{rate:g} Hz")

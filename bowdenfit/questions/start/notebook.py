@@ -11,11 +11,11 @@ _FORMAT = {"nbformat": 4, "nbformat_minor": 5}  # of Jupyter
 _KERNEL = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
 _CODE, _TEXT = "code", "markdown"
 _BEGIN = (
-    (_TEXT, "# {name}\n\nThis notebook lies in the folder of a data set, beside its `cable.toml`; start Jupyter there."),
+    (_TEXT, "# {name}\n\nThis notebook is in the folder of a data set, next to its `cable.toml`; start Jupyter there."),
     (_CODE, 'import bowdenfit as bf\n\nfit = bf.fit(".", seed=1)\nfit'),
     (_TEXT, "Whether these numbers can be trusted, and why, is said first; here for programs:"),
     (_CODE, "fit.verdict()"),
-    (_TEXT, "## Friction coefficients\n\nMedians with 90 % intervals, beside least squares, and the draws behind them:"),
+    (_TEXT, "## Friction coefficients\n\nMedians with 90 % intervals, next to least squares, and the draws behind them:"),
     (_CODE, "fit.to_frame()"),
     (_CODE, "fit.plot.coefficients()"),
 )

@@ -127,7 +127,7 @@ def choice_question(
         answer = typed.strip()
         if answer.isascii() and answer.isdecimal() and 1 <= int(answer) <= len(options):
             return options[int(answer) - 1][1]
-        raise UsageError(f"{shown(typed)} is none of them; write a number from 1 to {len(options)}.")
+        raise UsageError(f"{shown(typed)} is not one of them; write a number from 1 to {len(options)}.")
 
     return Question(
         words,

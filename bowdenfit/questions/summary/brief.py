@@ -148,7 +148,7 @@ def _outlier_lines(fit: Record) -> list[str]:
 
 def say_no_outliers(readings: Sequence[CheckedReading]) -> str:
     """Say that every reading agrees with all the others."""
-    return f"None of {len(readings)} readings is an outlier." if len(readings) > 1 else "The reading is not an outlier."
+    return f"None of the {len(readings)} readings is an outlier." if len(readings) > 1 else "The reading is not an outlier."
 
 
 def format_reading(reading: CheckedReading) -> tuple[str, str, str, str]:

@@ -138,7 +138,7 @@ def _prior_driven_sentence(fit: Record, page: dict[str, Any]) -> str:
     if not names:
         return ""
     verb = "rests" if len(names) == 1 else "rest"
-    return filled(f"Hardly determined by the measurements: {listed(names)} {verb} on the prior almost alone.")
+    return filled(f"Barely determined by the measurements: {listed(names)} {verb} on the prior almost alone.")
 
 
 def _curve_block(fit: Record, page: dict[str, Any]) -> str:
@@ -194,8 +194,8 @@ def _mounting_scatter_block(fit: Record, page: dict[str, Any]) -> str:
     )
     return filled(
         f"From one mounting of the cable to the next the efficiency scatters by {median} % of itself (90 % interval {low} to "
-        f"{high} %). All samples of a run share what its mounting did, so longer runs do not make the coefficients surer; "
-        f"more runs do.{heavy}"
+        f"{high} %). All samples of a run share its mounting effect, so more runs, not longer ones, narrow the "
+        f"coefficients.{heavy}"
     )
 
 
@@ -215,7 +215,7 @@ def _friction_model_block(fit: Record) -> str:
         lines.append(
             f"Coefficients, efficiency curves and the best length are stated for an input force of "
             f"{conditions.reference_force:g} N, because friction depends on the load; measured efficiencies hold at the force "
-            "that stands beside them."
+            "given with them."
         )
         lost = compute_lost_force(fit)
         lines += [lost.explanation()] if lost is not None else []

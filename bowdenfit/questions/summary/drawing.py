@@ -42,7 +42,7 @@ def draw_into_folder(
     if results is not None:
         output = output or results / FIGURES_FOLDER
     if output is None:
-        raise UsageError("a fit by itself has no folder; name one for the figures.")
+        raise UsageError("a fit on its own has no folder; name one for the figures.")
     endings = _check_formats(formats)
     existing = _find_drawn_figures(results, names, endings) if results is not None and width is None else None
     captions, order, write_files = existing or summary.prepare_figures(fit, names, width)

@@ -58,8 +58,8 @@ def caption(data: Residuals) -> str:
     """Describe what is drawn, in plain words."""
     n, bars = sum(len(points.labels) for points in data.points), _describe_bars(data)
     return (
-        f"Left: every measured efficiency beside its prediction; {bars} Right: measured minus predicted, in percentage points. "
-        f"n = {counted(n, 'efficiency', 'efficiencies')}."
+        f"Left: every measured efficiency next to its prediction; {bars} Right: measured minus predicted, in percentage "
+        f"points. n = {counted(n, 'efficiency', 'efficiencies')}."
     )
 
 
@@ -68,7 +68,7 @@ def _describe_bars(data: Residuals) -> str:
     if len(data.points[0].predicted) == 1:
         return "the line is the least-squares prediction."
     return (
-        "bars: where a reading would lie with 50 % and 90 % probability if it were taken anew, on a new mounting where "
+        "bars: where a reading would lie with 50 % and 90 % probability if it were taken again, on a new mounting where "
         "readings are runs; about one reading in ten may lie outside the longer one."
     )
 
@@ -150,7 +150,7 @@ def make_residual_charts(data: Residuals) -> tuple[Chart, Chart]:
     off = _series_of_rows(measured - center, predicted - center, inside)
     places, row_label = np.arange(1.0, len(rows) + 1), "Reading"
     return (
-        Chart("Measured beside predicted", row_label, "Efficiency (%)", (SeriesGroup(places, beside),), place_names=names),
+        Chart("Measured and predicted", row_label, "Efficiency (%)", (SeriesGroup(places, beside),), place_names=names),
         Chart(
             "Measured minus predicted", row_label, "Difference (points)", (SeriesGroup(places, off),),
             place_names=names,
@@ -183,4 +183,4 @@ def describe_residual_charts(data: Residuals) -> str:
     """Describe the charts."""
     n, bars = sum(len(table.labels) for table in data.points), _describe_bars(data)
     counting = count_shown(min(n, MOST_POINTS), n, "efficiency", "efficiencies")
-    return f"Every measured efficiency beside its prediction, or minus it, in percentage points; {bars} n = {counting}."
+    return f"Every measured efficiency next to its prediction, or minus it, in percentage points; {bars} n = {counting}."

@@ -89,7 +89,7 @@ def _correlation_table(fit: Record) -> PageTable:
     rows = tuple(
         (name, *(f"{matrix[i, k]:z.2f}" for k in range(i)), "1", *([""] * (len(names) - i - 1))) for i, name in enumerate(names)
     )
-    caption = "Close to 1 or -1: the readings determine a combination of the two, hardly each alone."
+    caption = "Close to 1 or -1: the readings determine a combination of the two, and barely either alone."
     return PageTable(("", *names), rows, caption)
 
 
@@ -104,7 +104,7 @@ def checks_section(fit: Record) -> PageSection | None:
     all_readings = PageTable(heads, tuple(map(format_reading, readings[:_MOST_READINGS])))
     heading = "All readings" if len(readings) <= _MOST_READINGS else f"The first {_MOST_READINGS} of {len(readings)} readings"
     folded: list[tuple[str, str | PageTable]] = [
-        (f"{heading} beside the prediction from all the others (leave-one-out)", all_readings),
+        (f"{heading} next to the prediction from all the others (leave-one-out)", all_readings),
         ("The leave-one-out checks, with their numbers", describe_checks(check_readings(fit))),
     ]
     return prose_section("Checks", [say_no_outliers(readings) if not outliers else ""], [outlier_table], folded=folded)

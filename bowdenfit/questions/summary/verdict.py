@@ -50,7 +50,7 @@ _TRUSTED = "You can trust this: the fit has converged, and the readings agree wi
 _TRUSTED_ALONE = "You can trust this: the fit has converged, and the reading agrees with the model."
 _IN_DOUBT = (
     "The fit has converged, and nothing speaks clearly against the model, but {}, by more than happens by chance in one fit "
-    "of a hundred. You can trust this once you know why."
+    "in a hundred. You can trust this once you know why."
 )
 _LEAST_SQUARES_ONLY = (
     "Nothing speaks against these numbers, but they come from least squares alone{}. A mistake in a single reading, such as "
@@ -195,14 +195,14 @@ def suggest_next_step(fit: Record) -> str:
     if outliers:
         return f"Next: look at how {_name_reading(outliers[0])} was measured and written down: it is an outlier (see below)."
     if describe_misfits(checks):
-        return "Next: look at the noise that is stated for these readings; checks.png shows where each of them lies."
+        return "Next: look at the noise that is stated for these readings; checks.png shows each of them."
     if rests_on_one_mounting(fit):
-        return "Next: mount the cable anew and repeat a measurement; one mounting cannot show how far mountings differ."
+        return "Next: remount the cable and repeat a measurement; one mounting cannot show how far mountings differ."
     influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
     what = "reading" if len(checks.influential) == 1 else "readings"
     remeasure = f"; if in doubt, first repeat the most influential {what}: {influential}" if influential else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
-        return f"Next: nothing needs to be measured{remeasure}. bowdenfit next ranks further measurements."
+        return f"Next: no further measurement is needed{remeasure}. bowdenfit next ranks further measurements."
     if not has_candidates(fit):
         return f"Next: a measurement of another kind, or at other bends, would add more{remeasure}."
     return f"Next: bowdenfit next says which measurement would help most{remeasure}."

@@ -157,7 +157,7 @@ def explain_backward_clock(name: str, time: Vector) -> str:
     if -_HALF_DAY <= time[at + 1] - time[at] < -_HALF_DAY + max(60.0, 10 * float(np.nanmedian(np.abs(some)))):
         return f"{where} a 12-hour clock written without AM and PM. Export the time with 24 hours, or in seconds."
     if np.mean(some < 0) > _MOST_REPEATED:
-        return f"{where} a file whose last sample stands first. Sort its rows by the time."
+        return f"{where} a file whose last sample comes first. Sort its rows by the time."
     return f"{where} two recordings in one file. Split the file there."
 
 

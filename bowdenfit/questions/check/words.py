@@ -148,7 +148,7 @@ def describe_prior_influence(checks: Checks) -> str:
     sentences += _describe_widths(checks)
     if sensitivities and not any(sentences):
         answers = " and the design answer" if any(s.quantity in _ANSWERS for s in sensitivities) else ""
-        sentences.append(f"Priors have little effect on the coefficients{answers} and on the widths of their intervals.")
+        sentences.append(f"Priors have little effect on the coefficients{answers}, or on the widths of their intervals.")
     return " ".join(part for part in sentences if part)
 
 

@@ -101,17 +101,17 @@ def make_fleet(number: int, folder: Path) -> Path:
 
 def command(fleet: Path, results: Path, programs: Path) -> tuple[float, float]:
     """Seconds and CPU seconds of a whole command, which keeps what it compiles in a folder."""
-    own = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
-    begin, before = time.perf_counter(), _used()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    begin, usage_at_start = time.perf_counter(), _used()
     words = [sys.executable, "-m", "bowdenfit", "fleet", fleet, "-o", results, "--seed", "1", "--force"]
-    subprocess.run(words, env=own | {"XDG_CACHE_HOME": str(programs)}, check=True, capture_output=True)
-    return time.perf_counter() - begin, _used() - before
+    subprocess.run(words, env=environment | {"XDG_CACHE_HOME": str(programs)}, check=True, capture_output=True)
+    return time.perf_counter() - begin, _used() - usage_at_start
 
 
 def _used() -> float:
     """CPU seconds of all that has ended."""
-    found = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return found.ru_utime + found.ru_stime
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def time_commands(numbers: list[int]) -> None:
@@ -122,8 +122,8 @@ def time_commands(numbers: list[int]) -> None:
             fleet = make_fleet(number, folder)
             (cold, of_cold), (warm, of_warm) = (command(fleet, folder / "fits", folder / "programs") for _ in range(2))
             fitted = json.loads((folder / "fits" / FLEET_PAGE).read_text())["fitted"]
-            engines = ", ".join(f"{count} {name}" for name, count in Counter(each["engine"] for each in fitted).items())
-            failed = sum(bool(each["reasons"]) for each in fitted)
+            engines = ", ".join(f"{count} {name}" for name, count in Counter(item["engine"] for item in fitted).items())
+            failed = sum(bool(item["reasons"]) for item in fitted)
             print(
                 f"{number:6d} {cold:7.1f} {of_cold:6.1f} {warm:7.1f} {of_warm:6.1f} {1000 * of_warm / number:15.1f}  "
                 f"{engines}; {failed} not to be trusted",
@@ -140,19 +140,19 @@ def cables(number: int) -> list[LogDensity]:
             "tables": {"forces": {"file": "forces.csv"}},
         }
     )
-    own = {f"{name}_angle": column for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)}
-    design = make_design(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own)
+    own_angles = {f"{name}_angle": column for name, column in zip(CONTACTS, zip(*ANGLES, strict=True), strict=True)}
+    design = make_design(runs=(0.0,) * len(ANGLES), input_forces=FORCES, strokes=STROKES, own_angles=own_angles)
     tables = empty_tables(description, design)
-    found: list[LogDensity] = []
+    densities: list[LogDensity] = []
     seeds = itertools.count()
-    while len(found) < number:
+    while len(densities) < number:
         seed = next(seeds)
         of_truth, of_readings = jax.random.split(jax.random.key(seed))
         values = draw_true_values(description, tables, {"tau": 0.01, "sigma_F": 0.4}, of_truth)
         made = simulate_design(description, design, values, of_readings)
         if not why_implausible(made, made):
-            found.append(LogDensity(build_model(made)))
-    return found
+            densities.append(LogDensity(build_model(made)))
+    return densities
 
 
 def seconds_alone(posterior: LogDensity) -> float:
@@ -192,8 +192,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Time fleets of simple cables; the head of this file says how.")
     parser.add_argument("--numbers", type=int, nargs="+", default=NUMBERS, metavar="N", help="how many cables")
     parser.add_argument("--programs", action="store_true", help="the fits by themselves, of cables drawn from the priors")
-    asked = parser.parse_args()
-    (time_programs if asked.programs else time_commands)(list(asked.numbers))
+    options = parser.parse_args()
+    (time_programs if options.programs else time_commands)(list(options.numbers))
 
 
 if __name__ == "__main__":

@@ -126,10 +126,10 @@ class Row:
     def cells(self) -> list[str]:
         """Times and memory, those of the other, ratios with their spread, target, load."""
         sides = [side for runs in (self.runs, self.against) for side in _side(runs)]
-        said = [spread(self.ratios(of)) for of in ("seconds", "cpu")]
+        ratios = [spread(self.ratios(of)) for of in ("seconds", "cpu")]
         target = f"{SECONDS[self.name]} s" if self.name in SECONDS else f"{TARGETS.get(self.name, '-')}"
         loads = [run.load for run in (*self.runs, *self.against)]
-        return [self.name, *sides, *said, target, f"{min(loads):.0f} to {max(loads):.0f}" if any(loads) else "-"]
+        return [self.name, *sides, *ratios, target, f"{min(loads):.0f} to {max(loads):.0f}" if any(loads) else "-"]
 
 
 SIDE = ["wall [s]", "CPU [s]", "peak [MiB]"]
@@ -143,7 +143,9 @@ def spread(ratios: list[float]) -> str:
 
 def _side(runs: list[Run]) -> list[str]:
     numbers = [[getattr(run, of) for run in runs] for of in ("seconds", "cpu", "memory")]
-    return [f"{np.median(each):.{digits}f}" if any(each) else "-" for each, digits in zip(numbers, (2, 2, 0), strict=True)]
+    return [
+        f"{np.median(number):.{digits}f}" if any(number) else "-" for number, digits in zip(numbers, (2, 2, 0), strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -215,9 +217,9 @@ class Bench:
         return replace(more, seconds=seconds, cpu=cpu)
 
     def _calibration(self, tree: Path, n: int) -> Run:
-        at = self.folder / f"calibration_{n}_{self.trees.index(tree)}"
-        asked = ["calibrate", DATASET, "--replications", str(n), "--seed", "1"]
-        return self.command(tree, asked, f"{at.name}_cache", at)
+        index = self.folder / f"calibration_{n}_{self.trees.index(tree)}"
+        command = ["calibrate", DATASET, "--replications", str(n), "--seed", "1"]
+        return self.command(tree, command, f"{index.name}_cache", index)
 
     def cables(self) -> tuple[Row, str]:
         """Whole fleets of simple cables; the row of the largest number, cold, and what is printed of all."""
@@ -236,12 +238,12 @@ class Bench:
             say(f"{name}, {'memory' if watched else f'{i + 1} of {self.repeats}'}")
             for number, (tree, runs) in enumerate(zip(trees, sides, strict=True)):
                 stands = {"FIT": str(self.finished(tree)), "SEED": str(i % self.repeats + 1)}
-                given = [stands.get(part, part) for part in arguments]
-                at = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
-                cache = f"{at.name}_cache" if cold else "unmeasured"
-                run = self.command(tree, given, cache, at if cold or writes else None, watched)
+                values = [stands.get(part, part) for part in arguments]
+                folder = self.folder / f"{name}_{number}_{i}".replace(",", "").replace(" ", "_")
+                cache = f"{folder.name}_cache" if cold else "unmeasured"
+                run = self.command(tree, values, cache, folder if cold or writes else None, watched)
                 if watched:
-                    runs[:] = [replace(each, memory=run.memory) for each in runs]
+                    runs[:] = [replace(item, memory=run.memory) for item in runs]
                 else:
                     runs.append(run)
         return Row(name, sides[0], sides[1] if len(sides) > 1 else [])
@@ -253,7 +255,7 @@ class Bench:
 
 def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
     """Time to 1000 effective draws of bowdenfit and of the plain programs, in turns."""
-    found: dict[str, list[Sampler]] = {}
+    results: dict[str, list[Sampler]] = {}
     for seed in range(1, repeats + 1):
         for name, script in {"bowdenfit": "with_bowdenfit.py", **PLAIN}.items():
             say(f"{name} to 1000, {seed} of {repeats}")
@@ -261,13 +263,13 @@ def samplers(folder: Path, repeats: int) -> dict[str, list[Sampler]]:
             run = measured([str(BASELINES / script), str(seed)], environment, watched=False)
             page = json.loads(run.output)
             sampler = Sampler(page["ready_at"] - run.started, page["ess"], np.array(page["mean"]), np.array(page["sd"]))
-            found.setdefault(name, []).append(sampler)
-    return found
+            results.setdefault(name, []).append(sampler)
+    return results
 
 
-def beside_plain(found: dict[str, list[Sampler]], fits: Sequence[Row]) -> Iterator[Row]:
+def beside_plain(results: dict[str, list[Sampler]], fits: Sequence[Row]) -> Iterator[Row]:
     """Bowdenfit beside the plain programs: to 1000 effective draws, and whole fits, cold and with the cache filled."""
-    runs = {name: [Run(0.0, s.to_target, 0.0, "") for s in each] for name, each in found.items()}
+    runs = {name: [Run(0.0, s.to_target, 0.0, "") for s in item] for name, item in results.items()}
     for name in PLAIN:
         yield Row(f"to 1000, beside {name}", runs["bowdenfit"], runs[name])
     for row in fits:
@@ -293,15 +295,15 @@ def counts() -> Iterator[str]:
         say(f"counting, {name}")
         run = measured([str(BASELINES / "counted.py"), name], {"PYTHONPATH": search_path()})
         page = json.loads(run.output)
-        answers = ", ".join(f"{asked.split('.', 2)[-1]} {times}" for asked, times in page["answers"].items())
+        answers = ", ".join(f"{request.split('.', 2)[-1]} {times}" for request, times in page["answers"].items())
         yield f"{name}: {page['programs']} programs compiled; answers worked out: {answers}."
 
 
-def disagreements(found: dict[str, list[Sampler]]) -> Iterator[str]:
+def disagreements(results: dict[str, list[Sampler]]) -> Iterator[str]:
     """Means that differ, which would make this a comparison of unequal things."""
-    first = found["bowdenfit"]
+    first = results["bowdenfit"]
     for other in PLAIN:
-        ours, theirs = (np.mean([s.mean for s in each], axis=0) for each in (first, found[other]))
+        ours, theirs = (np.mean([s.mean for s in item], axis=0) for item in (first, results[other]))
         for name, distance in zip(COEFFICIENTS, np.abs(theirs - ours) / first[0].sd, strict=True):
             if not distance < AGREEMENT:
                 yield f"Warning: the means of {name} by bowdenfit and by {other} are {distance:.2f} sd apart."
@@ -315,10 +317,10 @@ def markdown(rows: Table) -> str:
 
 def record(sections: Sequence[str]) -> None:
     """Replace the tables of the last record by those just measured."""
-    before = RECORD.read_text(encoding="utf-8") if RECORD.exists() else ""
-    kept = before[before.index(BY_HAND) :] if BY_HAND in before else ""
+    initial = RECORD.read_text(encoding="utf-8") if RECORD.exists() else ""
+    by_hand = initial[initial.index(BY_HAND) :] if BY_HAND in initial else ""
     RECORD.parent.mkdir(exist_ok=True)
-    RECORD.write_text(HEAD + "\n" + "\n\n".join(sections) + "\n\n" + kept, encoding="utf-8")
+    RECORD.write_text(HEAD + "\n" + "\n\n".join(sections) + "\n\n" + by_hand, encoding="utf-8")
 
 
 def main() -> None:
@@ -332,20 +334,20 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=(), choices=names, metavar="NAME", help="rows, or plain, many, counts [default: all]"
     )
-    asked = parser.parse_args()
-    other = asked.against and asked.against.resolve()
+    options = parser.parse_args()
+    other = options.against and options.against.resolve()
     with tempfile.TemporaryDirectory() as folder:
         os.environ.update(byte_code(Path(folder)))
-        rows, remarks = measurements(Bench(Path(folder), max(asked.repeats, 1), other, asked.only))
+        rows, remarks = measurements(Bench(Path(folder), max(options.repeats, 1), other, options.only))
         stages = stage_rows(rows)
     table = [COLUMNS, *(row.cells() for row in rows)]
-    for each in filter(None, (table, stages)):
-        show(each)
+    for item in filter(None, (table, stages)):
+        show(item)
     against = f" Other: commit {commit(other)}." if other else ""
     print("\n".join([*remarks, machine(*LIBRARIES) + against]))
-    if asked.record:
+    if options.record:
         title = f"## {date.today().isoformat()}, {commit(ROOT)}"
-        tables = [markdown(each) for each in (table, stages) if each]
+        tables = [markdown(stage) for stage in (table, stages) if stage]
         record([title, machine(*LIBRARIES) + against, *tables, *remarks])
 
 
@@ -353,9 +355,9 @@ def measurements(bench: Bench) -> tuple[list[Row], list[str]]:
     """All rows that are asked for, and what is to be said besides."""
     rows, remarks = list(bench.rows()), list[str]()
     if bench.asked("plain"):
-        found = samplers(bench.folder, bench.repeats)
-        rows += beside_plain(found, [row for row in rows if row.name in {"fit", FILLED}])
-        remarks += disagreements(found)
+        computed = samplers(bench.folder, bench.repeats)
+        rows += beside_plain(computed, [row for row in rows if row.name in {"fit", FILLED}])
+        remarks += disagreements(computed)
     if bench.asked("library"):
         rows.append(bench.library())
     if bench.asked("many"):

@@ -25,9 +25,9 @@ def show(rows: Table) -> None:
     print(flush=True)
 
 
-def say(what: str) -> None:
+def say(case: str) -> None:
     """What is being measured, for those who wait."""
-    print(f"measuring: {what}", file=sys.stderr, flush=True)
+    print(f"measuring: {case}", file=sys.stderr, flush=True)
 
 
 def machine(*libraries: str) -> str:
@@ -54,6 +54,6 @@ def installed(package: str) -> str:
 
 def commit(tree: Path) -> str:
     """What a checkout is at; "+" where it has been changed since."""
-    asked = ["git", "-C", str(tree), "describe", "--always", "--dirty=+", "--exclude", "*"]
-    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    command = ["git", "-C", str(tree), "describe", "--always", "--dirty=+", "--exclude", "*"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "unknown"

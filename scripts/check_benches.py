@@ -59,48 +59,48 @@ def verdicts(laboratory: Laboratory, row: Row, sessions: int, scratch: Path) -> 
     for seed in range(sessions):
         folder = laboratory.write(scratch / f"verdict {seed}", seed)
         for model in laboratory.models:
-            said = fault(laboratory, model, *ending(laboratory, folder, model))
-            right += not said
-            row.wrong += (f"{said} (session {seed})",) if said else ()
+            message = fault(laboratory, model, *ending(laboratory, folder, model))
+            right += not message
+            row.wrong += (f"{message} (session {seed})",) if message else ()
     row.verdicts = f"{right} of {sessions * len(laboratory.models)}"
 
 
 def comparison(laboratory: Laboratory, row: Row, scratch: Path) -> None:
     """What `compare` says of the models."""
     folder = laboratory.write(scratch / "compared", 1)
-    found = bf.compare({name: bf.fit(folder, seed=1, **given) for name, given in laboratory.models.items()})
-    told = [name for name in found.differences if name != found.best and found.verdict(name) == "clear"]
-    alike = [name for name in found.differences if name not in told]
+    computed = bf.compare({name: bf.fit(folder, seed=1, **options) for name, options in laboratory.models.items()})
+    clear_losers = [name for name in computed.differences if name != computed.best and computed.verdict(name) == "clear"]
+    alike = [name for name in computed.differences if name not in clear_losers]
     row.compared = f"{alike[0]} is best" if len(alike) == 1 else f"cannot tell {', '.join(alike)}"
     if laboratory.right not in alike:
-        row.wrong += (f"compare prefers {found.best}",)
+        row.wrong += (f"compare prefers {computed.best}",)
 
 
 def intervals(laboratory: Laboratory, row: Row, sessions: int, scratch: Path) -> None:
     """Whether intervals hold the truth at their rate."""
     from scipy.stats import binomtest
 
-    found = held(laboratory, sessions, scratch)
-    fitted = found.pop("")
-    row.intervals = ", ".join(f"{name} {count / max(fitted, 1):.0%}" for name, count in found.items()) + f" of {fitted}"
-    rates = sum(len(each.truth) for each in LABORATORIES.values() if each.right)
-    for name, count in found.items():
+    coverage = held(laboratory, sessions, scratch)
+    fitted = coverage.pop("")
+    row.intervals = ", ".join(f"{name} {count / max(fitted, 1):.0%}" for name, count in coverage.items()) + f" of {fitted}"
+    rates = sum(len(laboratory.truth) for laboratory in LABORATORIES.values() if laboratory.right)
+    for name, count in coverage.items():
         if count < HELD * fitted and binomtest(count, fitted, HELD).pvalue < TOGETHER / rates:
             row.wrong += (f"the interval of {name} holds it too seldom",)
     if fitted < HELD * sessions:
         row.wrong += (f"{sessions - fitted} of {sessions} did not converge",)
 
 
-def investigate(name: str, asked: argparse.Namespace) -> Row:
+def investigate(name: str, options: argparse.Namespace) -> Row:
     """Everything about one laboratory."""
     laboratory, row = LABORATORIES[name], Row(name)
     with tempfile.TemporaryDirectory() as scratch:
-        if asked.verdicts:
-            verdicts(laboratory, row, asked.verdicts, Path(scratch))
-        if len(laboratory.models) > 1 and not asked.no_comparison:
+        if options.verdicts:
+            verdicts(laboratory, row, options.verdicts, Path(scratch))
+        if len(laboratory.models) > 1 and not options.no_comparison:
             comparison(laboratory, row, Path(scratch))
-        if laboratory.right and asked.intervals:
-            intervals(laboratory, row, asked.intervals, Path(scratch))
+        if laboratory.right and options.intervals:
+            intervals(laboratory, row, options.intervals, Path(scratch))
     return row
 
 
@@ -108,13 +108,13 @@ def write(path: Path, row: Row) -> None:
     """Put a row into the table between its marks in a file of text, in place of an earlier one of the laboratory."""
     commit = subprocess.run(["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout
     made = f"{datetime.datetime.now(datetime.UTC).date()}, {commit.strip()}"
-    before, _, rest = path.read_text().partition(START)
-    old, _, after = rest.partition(END)
+    head, _, tail = path.read_text().partition(START)
+    old, _, after = tail.partition(END)
     rows = {line.split(" | ")[0]: line for line in old.splitlines() if line.startswith("| ") and "---" not in line}
     rows[f"| {row.name}"] = "| " + " | ".join((*row.cells, made)) + " |"
     order = [f"| {name}" for name in LABORATORIES]
     heads = ["| " + " | ".join((*HEADS, "made")) + " |", "| " + " | ".join(["---"] * (len(HEADS) + 1)) + " |"]
-    path.write_text(before + "\n".join([START, "", *heads, *(rows[k] for k in order if k in rows), "", END]) + after)
+    path.write_text(head + "\n".join([START, "", *heads, *(rows[k] for k in order if k in rows), "", END]) + after)
 
 
 def main() -> None:
@@ -125,16 +125,16 @@ def main() -> None:
     parser.add_argument("--intervals", type=int, default=200)
     parser.add_argument("--no-comparison", action="store_true")
     parser.add_argument("--write", type=Path)
-    asked = parser.parse_args()
-    unknown = [name for name in asked.laboratories if name not in LABORATORIES]
+    options = parser.parse_args()
+    unknown = [name for name in options.laboratories if name not in LABORATORIES]
     if unknown:
         parser.error(f"there is no laboratory {unknown[0]!r}; there are {', '.join(LABORATORIES)}.")
     rows = []
-    for name in asked.laboratories or LABORATORIES:
-        rows.append(investigate(name, asked))
+    for name in options.laboratories or LABORATORIES:
+        rows.append(investigate(name, options))
         print(" | ".join(rows[-1].cells), flush=True)
-        if asked.write:
-            write(asked.write, rows[-1])
+        if options.write:
+            write(options.write, rows[-1])
     print("\n" + table(HEADS, [row.cells for row in rows]))
     sys.exit(1 if any(row.wrong for row in rows) else 0)
 

@@ -34,20 +34,20 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100, help="how many mistakes, shared among the data sets")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--least-squares", action="store_true", help="without sampling, in a quarter of the time")
-    asked = parser.parse_args()
-    folders = asked.datasets or sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
-    fits = {folder: bf.fit(folder, mcmc=not asked.least_squares, seed=1) for folder in folders}
+    options = parser.parse_args()
+    folders = options.datasets or sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
+    fits = {folder: bf.fit(folder, mcmc=not options.least_squares, seed=1) for folder in folders}
     clean = {folder: answers(fit) for folder, fit in fits.items()}
     bad = [f"{folder.name}: not trusted without a mistake" for folder in folders if not fits[folder].verdict().trusted]
     ends: Counter[tuple[str, str]] = Counter()
-    for seed in range(asked.first, asked.first + asked.seeds):
+    for seed in range(options.first, options.first + options.seeds):
         dataset = folders[seed % len(folders)]
         with tempfile.TemporaryDirectory() as scratch:
-            what = corrupt(dataset, Path(scratch) / dataset.name, seed)
-            end, why = end_of(Path(scratch) / dataset.name, clean[dataset], not asked.least_squares)
+            corruption = corrupt(dataset, Path(scratch) / dataset.name, seed)
+            end, reason = end_of(Path(scratch) / dataset.name, clean[dataset], not options.least_squares)
         ends[dataset.name, end] += 1
-        print(f"{seed:3d} {dataset.name}, {what}: {end}{f' ({why})' if why else ''}", flush=True)
-        bad += [f"{seed} {dataset.name}, {what}: {why}"] if end == WRONG else []
+        print(f"{seed:3d} {dataset.name}, {corruption}: {end}{f' ({reason})' if reason else ''}", flush=True)
+        bad += [f"{seed} {dataset.name}, {corruption}: {reason}"] if end == WRONG else []
     rows = [(folder.name, *(str(ends[folder.name, end]) for end in ENDS)) for folder in folders]
     total = ("all", *(str(sum(ends[folder.name, end] for folder in folders)) for end in ENDS))
     print("\n" + table(("data set", *ENDS), [*rows, total]))

@@ -47,12 +47,14 @@ def main() -> None:
         estimates = fit(truth, options.rate, seed, options.friction)
         words = []
         for name, value in true_values(truth, options.friction).items():
-            one = estimates[name]
-            if np.isnan(one.lower):
+            estimate = estimates[name]
+            if np.isnan(estimate.lower):
                 words.append(f"{name} {value:.3g} undetermined")
                 continue
-            held.setdefault(name, []).append(bool(one.lower <= value <= one.upper))
-            words.append(f"{name} {value:.3g} [{one.lower:.3g}, {one.upper:.3g}]{'' if held[name][-1] else ' MISSED'}")
+            held.setdefault(name, []).append(bool(estimate.lower <= value <= estimate.upper))
+            words.append(
+                f"{name} {value:.3g} [{estimate.lower:.3g}, {estimate.upper:.3g}]{'' if held[name][-1] else ' MISSED'}"
+            )
         print(f"{seed}: {'; '.join(words)}", flush=True)
 
     wrong = False

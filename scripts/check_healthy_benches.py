@@ -94,13 +94,15 @@ def write_angles(folder: Path, generator: np.random.Generator, places: int, digi
     """
     folder.mkdir(parents=True, exist_ok=True)
     height, middle, width = generator.uniform(50, 120), generator.uniform(460, 520), generator.uniform(80, 160)
-    angle = lambda at: height * np.exp(-(((at - middle) / width) ** 2))  # noqa: E731
+    angle = lambda length: height * np.exp(-(((length - middle) / width) ** 2))  # noqa: E731
     lengths, mounted = np.linspace(430, 550, places), np.linspace(440, 540, 10).round()
     read = angle(lengths) + generator.uniform(0.5, 2.0) * generator.standard_normal(len(lengths))
-    cells = [f"{at:g},{deg:.{digits}f}" if deg >= 5 else f"{at:g},<5" for at, deg in zip(lengths, read, strict=True)]
+    cells = [
+        f"{length:g},{deg:.{digits}f}" if deg >= 5 else f"{length:g},<5" for length, deg in zip(lengths, read, strict=True)
+    ]
     exponent = log_uniform(generator, 0.08, 0.3) * np.deg2rad(angle(mounted))
     exponent += log_uniform(generator, 0.003, 0.01) * generator.standard_normal(len(mounted))
-    shares = [f"{at:g},{100 * np.exp(-loss):.1f}" for at, loss in zip(mounted, exponent, strict=True)]
+    shares = [f"{length:g},{100 * np.exp(-loss):.1f}" for length, loss in zip(mounted, exponent, strict=True)]
     (folder / "cable.toml").write_text(ROUTE)
     (folder / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *cells]) + "\n")
     (folder / "efficiencies.csv").write_text("\n".join(["cable_length_mm,efficiency_percent", *shares]) + "\n")

@@ -38,19 +38,19 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", default="emcee,nuts,calibrate,writing,fleet")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     struck, wrong = Counter[str](), 0
     with tempfile.TemporaryDirectory() as place:
-        jobs = tuple(job for job in (*JOBS, fleet_job(Path(place) / "measured")) if job.name in asked.jobs.split(","))
-        for blow in blows(random.Random(asked.seed), jobs, Path(place)):
+        jobs = tuple(job for job in (*JOBS, fleet_job(Path(place) / "measured")) if job.name in options.jobs.split(","))
+        for blow in blows(random.Random(options.seed), jobs, Path(place)):
             wrong += bool(blow.wrong)
             if blow.struck is not None:
-                what = blow.sent.name if blow.sent else "memory"
-                struck.update((f"{blow.job.name}, {what}", CALLED[blow.struck], "all"))
+                kind = blow.sent.name if blow.sent else "memory"
+                struck.update((f"{blow.job.name}, {kind}", CALLED[blow.struck], "all"))
             print(f"{struck['all']:3d} {blow}", flush=True)
-            if struck["all"] >= asked.kills:
+            if struck["all"] >= options.kills:
                 break
-    print("; ".join(f"{what} {times}" for what, times in sorted(struck.items())))
+    print("; ".join(f"{case} {times}" for case, times in sorted(struck.items())))
     print(f"{wrong} went wrong of {struck['all']} that struck")
     sys.exit(wrong > 0)
 

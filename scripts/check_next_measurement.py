@@ -49,7 +49,7 @@ from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, 
 from bowdenfit.results.along_route import make_optimizer
 
 LENGTHS = (430.0, 455.0, 480.0, 505.0, 530.0)
-CANDIDATES = tuple(Candidate(kind, at) for kind in ("angle", "efficiency") for at in LENGTHS)
+CANDIDATES = tuple(Candidate(kind, length) for kind in ("angle", "efficiency") for length in LENGTHS)
 DESIGN = make_design(angles=(435.0, 450.0, 475.0, 500.0, 525.0), efficiencies=(445.0, 470.0, 510.0))
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=2000, target_ess=500, target_r_hat=1.03)
 BASE, OUTCOMES = 4096, 1000  # draws that are weighted, and outcomes that they are weighted for
@@ -179,8 +179,8 @@ class Bench:
     def _values(self, posterior: LogDensity) -> Any:
         return for_each_draw(value_function(posterior.model), posterior.model.space.size)
 
-    def _program(self, posterior: LogDensity, what: str, make: Callable[[LogDensity], Any]) -> Any:
-        shapes = what + str(jax.tree.map(np.shape, posterior.data))
+    def _program(self, posterior: LogDensity, case: str, make: Callable[[LogDensity], Any]) -> Any:
+        shapes = case + str(jax.tree.map(np.shape, posterior.data))
         if shapes not in self.programs:
             self.programs[shapes] = make(posterior)
         return self.programs[shapes]
@@ -222,8 +222,8 @@ def _extended(measured: Measurements, candidate: Candidate, reading: np.ndarray)
     assert rows is not None  # as described above
     route, n = np.append(rows.route, candidate.route), len(rows.route) + 1
     nothing = np.full((n, len(rows.own.names)), np.nan)
-    own = OwnAngles(rows.own.names, nothing, nothing)
-    longer = EfficiencyTable(route, np.append(rows.efficiency, reading), np.zeros(n), own, _origin(n))
+    own_angles = OwnAngles(rows.own.names, nothing, nothing)
+    longer = EfficiencyTable(route, np.append(rows.efficiency, reading), np.zeros(n), own_angles, _origin(n))
     return measured.with_tables(longer)
 
 
@@ -256,8 +256,8 @@ def _refitted(posterior: LogDensity, extended: LogDensity) -> Callable[..., Any]
             return state, state[0]
 
         first = start, new(start, new_data)
-        _, kept = jax.lax.scan(several, first, jax.random.split(of_steps, 2 * KEPT))
-        return optimum(kept[KEPT:].reshape(-1, base.shape[1]))[0]
+        _, steps = jax.lax.scan(several, first, jax.random.split(of_steps, 2 * KEPT))
+        return optimum(steps[KEPT:].reshape(-1, base.shape[1]))[0]
 
     return refit
 

@@ -97,8 +97,8 @@ def main() -> None:
                 texts.append(" ".join(next_measurement_text(once).split()))
                 second = bench.measure(np.random.default_rng([options.seed, number, seed]), "2")
                 twice = bf.fit(write(Path(scratch) / "twice", join(first, second)), seed=seed)
-                interval, stated = twice.parameter("mu"), once.second_mounting
-                held += stated.low <= interval.q95 - interval.q05 <= stated.high
+                interval, stated_value = twice.parameter("mu"), once.second_mounting
+                held += stated_value.low <= interval.q95 - interval.q05 <= stated_value.high
         wordings, worst = compare_advice(texts)
         inside += held
         wrong += wordings > 1 or worst > 1

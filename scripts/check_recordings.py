@@ -53,15 +53,15 @@ class Shown:
     def sds(self, truth: float) -> float:
         """How far off it is, as standard deviations of a normal distribution that are as unlikely."""
         half = self.value - self.lower if self.value > truth else self.upper - self.value
-        at = stdtrit(self.freedom, 0.95) * (self.value - truth) / half
-        return float(np.copysign(-ndtri(stdtr(self.freedom, -abs(at))), at))
+        t_value = stdtrit(self.freedom, 0.95) * (self.value - truth) / half
+        return float(np.copysign(-ndtri(stdtr(self.freedom, -abs(t_value))), t_value))
 
 
 def shown(fit: bf.Fit, mountings: int) -> Shown:
     """What the summary shows of the coefficient."""
     if fit.sampled is not None:
-        found = fit.parameter("mu")
-        return Shown(found.median, found.q05, found.q95, mountings - 1 or MANY)
+        computed = fit.parameter("mu")
+        return Shown(computed.median, computed.q05, computed.q95, mountings - 1 or MANY)
     estimate = fit.least_squares.estimates["mu"]
     errors = (estimate.upper - estimate.lower) / 2 / estimate.standard_error
     freedom = brentq(lambda f: stdtrit(f, 0.95) - errors, 0.5, MANY) if errors > stdtrit(MANY, 0.95) else MANY
@@ -70,20 +70,20 @@ def shown(fit: bf.Fit, mountings: int) -> Shown:
 
 def ending(bench: RecordedBench, folder: Path, seed: int, sampled: bool) -> tuple[str, float, str]:
     """How a fit ends, how many standard deviations the coefficient is off (NaN if there is none), and what is said."""
-    given = {"friction": "drag"} if bench.drag else {}
+    options = {"friction": "drag"} if bench.drag else {}
     try:
-        fit = bf.fit(write(bench, folder, seed), mcmc=sampled, seed=1, **given)
+        fit = bf.fit(write(bench, folder, seed), mcmc=sampled, seed=1, **options)
     except bf.BowdenfitError as error:
         return "refused", float("nan"), str(error)
     verdict, truth = fit.verdict(), bench.exponent / WRAP
-    found = shown(fit, bench.mountings)
-    relative = f"off by {100 * (found.value / truth - 1):+.1f} %"
-    if not np.all(np.isfinite([found.lower, found.upper])):
+    computed = shown(fit, bench.mountings)
+    relative = f"off by {100 * (computed.value / truth - 1):+.1f} %"
+    if not np.all(np.isfinite([computed.lower, computed.upper])):
         return "no interval", float("nan"), relative
-    sds = found.sds(truth)
+    sds = computed.sds(truth)
     if not verdict.trusted:
         return "not trusted", sds, "; ".join([relative, *verdict.troubles])
-    return ("right" if found.lower <= truth <= found.upper else "WRONG"), sds, relative
+    return ("right" if computed.lower <= truth <= computed.upper else "WRONG"), sds, relative
 
 
 def main() -> None:
@@ -92,15 +92,15 @@ def main() -> None:
     parser.add_argument("--benches", type=int, default=60, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="S")
     parser.add_argument("--sampled", action="store_true", help="by sampling, not least squares alone")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     ends, far = Counter[str](), 0
-    for seed in range(asked.first, asked.first + asked.benches):
+    for seed in range(options.first, options.first + options.benches):
         bench = drawn(seed)
         with tempfile.TemporaryDirectory() as scratch:
-            end, sds, said = ending(bench, Path(scratch) / "bench", seed, asked.sampled)
+            end, sds, message = ending(bench, Path(scratch) / "bench", seed, options.sampled)
         ends[end] += 1
         far += end == "WRONG" and bool(np.abs(sds) > FAR)
-        print(f"{seed:3d} {end:11s} {sds:+5.1f} sd, {bench.unusual}: {said[:200]}", flush=True)
+        print(f"{seed:3d} {end:11s} {sds:+5.1f} sd, {bench.unusual}: {message[:200]}", flush=True)
     trusted = ends["right"] + ends["WRONG"]
     chance = float(binom.sf(ends["WRONG"] - 1, trusted, MISSED))
     print(", ".join(f"{n} {end}" for end, n in ends.items()), f"(chance of so many misses {chance:.2g}; {far} far off)")

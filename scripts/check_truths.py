@@ -72,9 +72,9 @@ class Bench:
         limit = {"file": "angles.csv", "detection_limit": {"value": 5, "unit": "deg"}}
         tables = {"angles": limit, "forces": {"file": "forces.csv"}}
         raw = {"name": "bench", "route": ROUTE, "contact": contacts, "tables": tables}
-        at = np.linspace(410.0, 590.0, self.mountings)
+        points = np.linspace(410.0, 590.0, self.mountings)
         design = make_design(
-            angles=LENGTHS, runs=tuple(at), input_forces=tuple(self.load * np.array([0.4, 0.8, 1.2, 1.6]))
+            angles=LENGTHS, runs=tuple(points), input_forces=tuple(self.load * np.array([0.4, 0.8, 1.2, 1.6]))
         )
         description = parse_description(raw)
         return Dataset(description, empty_tables(description, design), {})
@@ -120,12 +120,12 @@ REPLACED: dict[str, tuple[str, ...]] = {
 class Keeping(BatchFitter):
     """Keeps what it fitted, in order."""
 
-    found: list[BatchFit] = field(default_factory=list)
+    collected: list[BatchFit] = field(default_factory=list)
 
-    def fits(self, posteriors: Sequence[LogDensity], seeds: Sequence[int]) -> list[BatchFit]:
-        """See `Laboratory`."""
+    def fit_all(self, posteriors: Sequence[LogDensity], seeds: Sequence[int]) -> list[BatchFit]:
+        """Fit as the calibration does, and keep the fits."""
         done = super().fit_all(posteriors, seeds)
-        self.found.extend(done)
+        self.collected.extend(done)
         return done
 
 
@@ -154,13 +154,13 @@ def rows_of(name: str, bench: Bench, replications: int, seed: int) -> list[tuple
     """What the intervals of one bench held, by quantity."""
     plan = plan_of(name, bench, seed)
     with jax.enable_x64(True):
-        known = list_quantities(plan)
+        quantities = list_quantities(plan)
     made = Replicator(plan, BatchFitter()).replicate(range(replications))
-    found = summarize_replications(list(made), known, truths=tuple(truth.text for truth in plan.truths), seed=seed)
+    calibration = summarize_replications(list(made), quantities, truths=tuple(truth.text for truth in plan.truths), seed=seed)
     return [
         (name, q.name, *(f"{c.rate:.1%} ({c.low:.0%} to {c.high:.0%})" for c in q.coverage),
-         f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{found.ranked}", q.fault)
-        for q in found.quantities if q.judged_by
+         f"{q.bias:+.2f} +- {q.bias_error:.2f}", f"{calibration.ranked}", q.fault)
+        for q in calibration.quantities if q.judged_by
     ]  # fmt: skip
 
 
@@ -169,21 +169,23 @@ def apart(name: str, bench: Bench, replications: int, seed: int) -> list[tuple[s
     plan, laboratory = plan_of(name, bench, seed), Keeping(MORE)
     workbench = Replicator(plan, laboratory)
     made = list(workbench.replicate(range(replications)))
-    kept = [(each, fit) for each, fit in zip(made, laboratory.found, strict=True) if not each.reasons]
+    converged = [
+        (replication, fit) for replication, fit in zip(made, laboratory.collected, strict=True) if not replication.reasons
+    ]
     space, held = workbench.stated.space, dict[tuple[str, str], list[Held | None]]()
     with jax.enable_x64(True):
         optimum = for_each_draw(make_optimizer(workbench.stated), space.size)
-        for each, fit in kept:
+        for item, fit in converged:
             draws = dict(zip((p.name for p in space.free), fit.z.T, strict=True))
-            own = {truth.parameter.name: of_range(truth, draws[truth.parameter.name]) for truth in plan.truths}
+            own_values = {truth.parameter.name: of_range(truth, draws[truth.parameter.name]) for truth in plan.truths}
             answers = {n: z for n, z in draws.items() if n.startswith("mu")}
             answers |= dict(zip((OPTIMAL_LENGTH, OPTIMAL_EFFICIENCY), optimum(fit.z), strict=True))
-            for what, starts in REPLACED.items():
-                log_weight = sum((own[n] for n in own if n.startswith(starts)), start=np.zeros(len(fit.z)))
+            for kind, starts in REPLACED.items():
+                log_weight = sum((own_values[n] for n in own_values if n.startswith(starts)), start=np.zeros(len(fit.z)))
                 for quantity, values in answers.items():
-                    held.setdefault((what, quantity), []).append(weighted(each.ranked[quantity], values, log_weight))
+                    held.setdefault((kind, quantity), []).append(weighted(item.ranked[quantity], values, log_weight))
     return [
-        (name, what, quantity, *summed(found, held["none", quantity])) for (what, quantity), found in held.items()
+        (name, case, quantity, *summed(computed, held["none", quantity])) for (case, quantity), computed in held.items()
     ]  # fmt: skip
 
 
@@ -191,8 +193,8 @@ def of_range(truth: StatedTruth, z: np.ndarray) -> np.ndarray:
     """Logarithm of the density of a range over that of a prior, up to a constant, at draws of a parameter's z."""
     prior, scale = truth.parameter.prior, truth.parameter.shown_scale
 
-    def even(at: jax.Array) -> jax.Array:
-        value = jnp.asarray(prior.constrain(at)) * scale
+    def even(position: jax.Array) -> jax.Array:
+        value = jnp.asarray(prior.constrain(position)) * scale
         return jnp.log(value) if truth.log_uniform else value
 
     value, slope = (np.asarray(part) for part in jax.vmap(jax.value_and_grad(even))(jnp.asarray(z)))
@@ -201,7 +203,7 @@ def of_range(truth: StatedTruth, z: np.ndarray) -> np.ndarray:
     return np.where(inside, np.log(np.where(inside, slope, 1.0)) + z**2 / 2, -np.inf)
 
 
-def weighted(known: RankedTruth, values: np.ndarray, log_weight: np.ndarray) -> Held | None:
+def weighted(ranked_truth: RankedTruth, values: np.ndarray, log_weight: np.ndarray) -> Held | None:
     """Rank of a truth among weighted draws, and the width of their interval; None of too few."""
     if not np.isfinite(log_weight).any():
         return None
@@ -209,19 +211,21 @@ def weighted(known: RankedTruth, values: np.ndarray, log_weight: np.ndarray) -> 
     weight /= weight.sum()
     if 1 / np.sum(weight**2) < FEWEST:
         return None
-    tied, order = values == known.truth, np.argsort(values)
+    tied, order = values == ranked_truth.truth, np.argsort(values)
     # Where an end of the range has probability of its own, the truth keeps the place that was drawn for it.
-    tie = (known.rank - np.mean(values < known.truth)) / np.mean(tied) if tied.any() else 0.0
+    tie = (ranked_truth.rank - np.mean(values < ranked_truth.truth)) / np.mean(tied) if tied.any() else 0.0
     low, high = np.interp([0.05, 0.95], np.cumsum(weight[order]), values[order])
-    return Held(float(weight @ (values < known.truth) + tie * (weight @ tied)), float(high - low))
+    return Held(float(weight @ (values < ranked_truth.truth) + tie * (weight @ tied)), float(high - low))
 
 
-def summed(found: Sequence[Held | None], before: Sequence[Held | None]) -> tuple[str, ...]:
+def summed(computed: Sequence[Held | None], initial: Sequence[Held | None]) -> tuple[str, ...]:
     """Rates, and how much of the width there was before is left."""
-    both = [(one, other) for one, other in zip(found, before, strict=True) if one is not None and other is not None]
-    apart = np.abs([one.rank - 0.5 for one, _ in both])
+    both = [
+        (record, other) for record, other in zip(computed, initial, strict=True) if record is not None and other is not None
+    ]
+    apart = np.abs([record.rank - 0.5 for record, _ in both])
     of_all = sum(other.width for _, other in both)
-    width = f"{sum(one.width for one, _ in both) / of_all:.2f}" if of_all > 0 else "-"
+    width = f"{sum(record.width for record, _ in both) / of_all:.2f}" if of_all > 0 else "-"
     return f"{np.mean(apart < 0.25):.1%}", f"{np.mean(apart < 0.45):.1%}", width, f"{len(both)}"
 
 
@@ -232,16 +236,16 @@ def main() -> None:
     parser.add_argument("--replications", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--apart", action="store_true", help="say what each prior does to the rates")
-    asked = parser.parse_args()
-    unknown = [name for name in asked.benches if name not in BENCHES]
+    options = parser.parse_args()
+    unknown = [name for name in options.benches if name not in BENCHES]
     if unknown:
         parser.error(f"there is no bench {unknown[0]!r}; there are {', '.join(BENCHES)}.")
     rows = []
-    for name in asked.benches or BENCHES:
-        rows += (apart if asked.apart else rows_of)(name, BENCHES[name], asked.replications, asked.seed)
+    for name in options.benches or BENCHES:
+        rows += (apart if options.apart else rows_of)(name, BENCHES[name], options.replications, options.seed)
         print(f"{name}: done", flush=True)
     rates = ("50 % held", "90 % held")
-    of_all = ("bench", "priors replaced", "quantity", *rates, "width", "of") if asked.apart else None
+    of_all = ("bench", "priors replaced", "quantity", *rates, "width", "of") if options.apart else None
     print(table(of_all or ("bench", "quantity", *rates, "bias", "ranked", "fault"), rows))
 
 

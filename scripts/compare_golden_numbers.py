@@ -35,15 +35,15 @@ def main() -> int:
         return 2
     differ = 0
     for path in sorted(path.relative_to(ROOT) for pattern in GOLDEN for path in ROOT.glob(pattern)):
-        before, after = (NUMBER.findall(text) for text in (text_at(sys.argv[1], path), (ROOT / path).read_text("utf-8")))
-        if not before:
+        earlier, after = (NUMBER.findall(text) for text in (text_at(sys.argv[1], path), (ROOT / path).read_text("utf-8")))
+        if not earlier:
             print(f"new    {path}")
-        elif before == after:
+        elif earlier == after:
             print(f"equal  {path}: {len(after)} numbers")
         else:
             differ += 1
-            print(f"DIFFER {path}: {len(before)} numbers before, {len(after)} after")
-            for change in difflib.unified_diff(before, after, "before", "after", lineterm="", n=2):
+            print(f"DIFFER {path}: {len(earlier)} numbers before, {len(after)} after")
+            for change in difflib.unified_diff(earlier, after, "before", "after", lineterm="", n=2):
                 print(f"       {change}")
     return int(differ > 0)
 

@@ -49,20 +49,20 @@ def changed(folder: Path, file: str) -> Path:
 
 def length(fit: bf.Fit) -> str:
     """Best length with its interval and standard deviation [mm]."""
-    found = fit.optimal_length().length
-    return f"{found.median:.0f} mm ({found.q05:.0f} to {found.q95:.0f} mm; ± {found.sd:.1f} mm)"
+    best_length = fit.optimal_length().length
+    return f"{best_length.median:.0f} mm ({best_length.q05:.0f} to {best_length.q95:.0f} mm; ± {best_length.sd:.1f} mm)"
 
 
 def span(fit: bf.Fit, name: str) -> str:
     """Ends of an interval."""
-    found = fit.parameter(name)
-    return f"{found.q05:.3f} to {found.q95:.3f}"
+    estimate = fit.parameter(name)
+    return f"{estimate.q05:.3f} to {estimate.q95:.3f}"
 
 
 def share(fit: bf.Fit, name: str) -> str:
     """Standard deviation of a coefficient in percent of it."""
-    found = fit.parameter(name)
-    return f"{100 * found.sd / found.mean:.0f} %"
+    estimate = fit.parameter(name)
+    return f"{100 * estimate.sd / estimate.mean:.0f} %"
 
 
 def to_measure(fit: bf.Fit) -> dict[str, str]:

@@ -202,7 +202,7 @@ def on_body_rows(programs: Programs, place: Path) -> list[Row]:
         ("section 3.3, figure 18: 550 mm against none", "-6.98 %, P = 0.011", "550 mm no exoskeleton", "P yes"),
         ("section 3.3, figure 18: 470 against 550 mm", "P = 0.222", "470 mm 550 mm", "yes; it is not significant"),
     )
-    rows += [Row(where, printed, command, difference(study, names), out) for where, printed, names, out in differences]
+    rows += [Row(location, printed, command, difference(study, names), out) for location, printed, names, out in differences]
     rows.append(
         Row(
             "section 3.3: change with 550 mm", "-6.98 %", command, sentence(study, "-6.98 % for 550 mm does"),

@@ -52,12 +52,12 @@ def publish(name: str, fitted: Path, figure: str, further: tuple[str, ...]) -> N
     import bowdenfit as bf
 
     bf.fit(ROOT / "datasets" / name, output=fitted, seed=1)
-    kept = PUBLISHED / name
-    shutil.rmtree(kept, ignore_errors=True)
-    (kept / "figures").mkdir(parents=True)
+    folder = PUBLISHED / name
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "figures").mkdir(parents=True)
     for file in ("summary.txt", "details.txt", *further):
-        shutil.copy(fitted / file, kept / file)
-    draw_small(fitted / "figures" / f"{figure}.png", kept / "figures" / f"{figure}.png")
+        shutil.copy(fitted / file, folder / file)
+    draw_small(fitted / "figures" / f"{figure}.png", folder / "figures" / f"{figure}.png")
 
 
 def draw_small(source: Path, target: Path) -> None:
@@ -75,8 +75,8 @@ def compare(place: Path) -> None:
 
     name = "synthetic-recordings"
     rate = bf.fit(ROOT / "datasets" / name, friction="rate-dependent", seed=1)
-    found = bf.compare({"plain": bf.load(place / name), "rate": rate})
-    (PUBLISHED / name / "comparison.txt").write_text(comparison_text(found), encoding="utf-8")
+    comparison = bf.compare({"plain": bf.load(place / name), "rate": rate})
+    (PUBLISHED / name / "comparison.txt").write_text(comparison_text(comparison), encoding="utf-8")
 
 
 def write_quoted_numbers(fits: Path, place: Path) -> None:

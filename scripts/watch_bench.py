@@ -200,8 +200,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"longest {max(delays):.2f} s, allowed {ALLOWED:g} s")
         differ = 0
         for count, answer in sorted(answers.items()):
-            known = f"{answer.interval}, sd {answer.interval.sd:.3g}, stop {answer.may_stop}"
-            line = f"{count:3} mountings: {known}, {answer.seconds:.2f} s"
+            reference = f"{answer.interval}, sd {answer.interval.sd:.3g}, stop {answer.may_stop}"
+            line = f"{count:3} mountings: {reference}, {answer.seconds:.2f} s"
             if options.by_hand:
                 sd, enough = by_hand(bench, count, until)
                 differ += enough != answer.may_stop

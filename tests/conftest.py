@@ -196,8 +196,8 @@ def run(monkeypatch, capsys, request):
         with pytest.raises(SystemExit) as stop:
             cli.main()
         printed = capsys.readouterr()
-        said = f"{printed.out}{printed.err}Exit code {stop.value.code}."
-        request.node.add_report_section("call", " ".join(sys.argv), said)
+        message = f"{printed.out}{printed.err}Exit code {stop.value.code}."
+        request.node.add_report_section("call", " ".join(sys.argv), message)
         return stop.value.code, printed.out, printed.err
 
     return call
@@ -208,7 +208,7 @@ def refuse(run, tmp_path):
     """Run the command line on bad input, and return its sentences, one a fault; nothing may be written."""
 
     def call(*arguments, faults=1):
-        before = sorted(tmp_path.rglob("*"))
+        files_at_start = sorted(tmp_path.rglob("*"))
         code, out, err = run(*arguments)
         assert code == 2, (out, err)
         assert out == ""
@@ -221,7 +221,7 @@ def refuse(run, tmp_path):
         assert all(len(line) < 520 for line in lines)
         assert all(line[-1] in ".?" for line in lines)
         assert "inside bowdenfit" not in err
-        assert sorted(tmp_path.rglob("*")) == before
+        assert sorted(tmp_path.rglob("*")) == files_at_start
         return err
 
     return call

@@ -18,16 +18,16 @@ COMPILED = "/jax/core/compile/backend_compile_duration"  # what JAX calls it
 
 def questions() -> dict[tuple[str, int, str], str]:
     """Every question that is answered once for each fit, by where a profile has it."""
-    found = {}
+    results = {}
     for name, module in list(sys.modules.items()):
         for function in vars(module).values() if name.startswith("bowdenfit.") else ():
             if getattr(getattr(function, "__code__", None), "co_qualname", "") == KEEPER:
                 question = function.__wrapped__
                 code = question.__code__
-                found[code.co_filename, code.co_firstlineno, code.co_name] = (
+                results[code.co_filename, code.co_firstlineno, code.co_name] = (
                     f"{question.__module__}.{question.__name__}"
                 )
-    return found
+    return results
 
 
 def main() -> None:
@@ -40,7 +40,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         profile.runcall(bf.fit, sys.argv[1], output=folder, seed=1, force=True)
     profile.create_stats()
-    calls = {asked: profile.stats[place][1] for place, asked in questions().items() if place in profile.stats}
+    calls = {question: profile.stats[place][1] for place, question in questions().items() if place in profile.stats}
     print(json.dumps({"programs": len(seconds), "answers": calls}))
 
 

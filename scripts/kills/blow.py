@@ -17,20 +17,20 @@ class Blow:
         job: What is struck.
         sent: The signal; None for no memory.
         phase: Aimed at.
-        at: Seconds behind its beginning.
+        moment: Seconds after the phase begins.
         memory: The limit that it runs under [bytes].
         struck: Phase that it was in; None where it was too late, or the limit was enough.
-        said: How it ended and what came then.
+        report: How it ended and what came then.
         wrong: Which promise was broken.
     """
 
     job: Job
     sent: signal.Signals | None
     phase: int
-    at: float
+    moment: float
     memory: int = resource.RLIM_INFINITY
     struck: int | None = None
-    said: str = ""
+    report: str = ""
     wrong: str = ""
 
     @property
@@ -39,6 +39,6 @@ class Blow:
         return self.memory != resource.RLIM_INFINITY
 
     def __str__(self) -> str:
-        what = self.sent.name if self.sent else f"{self.memory / 1e6:.0f} MB" if self.starved else "OOM killer"
+        case = self.sent.name if self.sent else f"{self.memory / 1e6:.0f} MB" if self.starved else "OOM killer"
         when = "too late" if self.struck is None else CALLED[self.struck]
-        return f"{self.job.name:9s} {what:10s} {when:9s} {self.said}{self.wrong and f'; WRONG: {self.wrong}'}"
+        return f"{self.job.name:9s} {case:10s} {when:9s} {self.report}{self.wrong and f'; WRONG: {self.wrong}'}"

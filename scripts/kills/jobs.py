@@ -20,7 +20,7 @@ class Job:
     Args:
         name: What it is.
         words: Of its command, before the results folder.
-        kept: File or folder that lets it go on.
+        checkpoint: File or folder that lets it go on.
         done: File that is there once it has finished.
         samples: Whether, by what is kept, something has been drawn.
         phases: In which it is struck.
@@ -28,7 +28,7 @@ class Job:
 
     name: str
     words: tuple[str, ...]
-    kept: str
+    checkpoint: str
     done: str
     samples: Callable[[Path], bool] = Path.exists
     phases: tuple[int, ...] = PHASES
@@ -40,8 +40,8 @@ class Job:
     def phase(self, folder: Path) -> int:
         """What it does, by what lies in its folder."""
         try:
-            others = {path.name for path in folder.iterdir() if not path.match(".*.partial")} - {self.kept, ".lock"}
-            return WRITE if others else SAMPLE if self.samples(folder / self.kept) else COMPILE
+            other_files = {path.name for path in folder.iterdir() if not path.match(".*.partial")} - {self.checkpoint, ".lock"}
+            return WRITE if other_files else SAMPLE if self.samples(folder / self.checkpoint) else COMPILE
         except FileNotFoundError:
             return START
 
@@ -54,9 +54,9 @@ class Job:
         if self.done == "fleet.json":
             from bowdenfit.results.fleet_folder import read_fleet_draws
 
-            drawn = read_fleet_draws(folder)
-            return drawn.label, {name: values.tobytes() for name, values in drawn.values.items()}
-        lines = [json.loads(line) for line in (folder / self.kept).read_text().splitlines()[1:]]
+            fleet = read_fleet_draws(folder)
+            return fleet.label, {name: values.tobytes() for name, values in fleet.values.items()}
+        lines = [json.loads(line) for line in (folder / self.checkpoint).read_text().splitlines()[1:]]
         return sorted((line["number"], json.dumps(line["ranked"])) for line in lines)
 
 

@@ -17,16 +17,16 @@ OURS = re.compile(r"Interrupted|Error: |Warning: |Wrote |\S+ holds the whole fit
 
 def broken(blow: Blow, code: int, err: str, finished: bool, session: int, folder: Path) -> str:
     """Which promise a job broke that was struck; empty if none."""
-    asked = blow.sent in {signal.SIGINT, signal.SIGTERM}
-    before = code == -blow.sent or err.startswith(PYTHONS) if asked else False  # anything of ours was loaded
-    early = before and blow.struck == START
+    interrupted = blow.sent in {signal.SIGINT, signal.SIGTERM}
+    initial = code == -blow.sent or err.startswith(PYTHONS) if interrupted else False  # anything of ours was loaded
+    early = initial and blow.struck == START
     lines = err.splitlines()
     if is_running(session):
         os.killpg(session, signal.SIGKILL)
         return "a process is left"
     if code in {0, 3} and not finished:
         return f"exit code {code}, but {blow.job.done} is missing"
-    if asked and blow.struck is not None and not finished and code != 130 and not early:
+    if interrupted and blow.struck is not None and not finished and code != 130 and not early:
         return f"exit code {code}"
     if blow.starved and code < 0:  # a compiled library that gets no memory aborts, in words of its own
         return ""
@@ -34,27 +34,27 @@ def broken(blow: Blow, code: int, err: str, finished: bool, session: int, folder
         return f"exit code {code}, and said {err[:300]!r}"
     if not early and not all(OURS.match(line) for line in lines if line):
         return f"said {err[:300]!r}"
-    if "--resume" in err and not (folder / blow.job.kept).exists():
+    if "--resume" in err and not (folder / blow.job.checkpoint).exists():
         return "--resume is promised, and nothing is kept"
     return ""
 
 
-def go_on(blow: Blow, known: Known, folder: Path) -> None:
+def go_on(blow: Blow, reference: Known, folder: Path) -> None:
     """Give the command again; it must find what it finds when nothing ends it."""
     job = blow.job
     if not folder.exists():
-        blow.said += ", and nothing is left"
+        blow.report += ", and nothing is left"
         return
-    more = ["--resume"] if (folder / job.kept).exists() else ["--force"] if any(folder.iterdir()) else []
+    more = ["--resume"] if (folder / job.checkpoint).exists() else ["--force"] if any(folder.iterdir()) else []
     try:
         again = subprocess.run(job.command(folder, *more), capture_output=True, text=True, check=False, timeout=LONGEST)
     except subprocess.TimeoutExpired:
         blow.wrong = f"which goes on for more than {LONGEST:g} s"
         return
-    blow.said += f", then {more[0] if more else 'anew'}"
+    blow.report += f", then {more[0] if more else 'anew'}"
     if again.returncode not in {0, 3}:
         blow.wrong = f"which ended with {again.returncode}: {again.stderr[-200:]}"
-    elif job.result(folder) != known.result:
+    elif job.result(folder) != reference.result:
         blow.wrong = "another result than without the kill"
 
 

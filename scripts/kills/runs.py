@@ -75,10 +75,10 @@ class Watched:
     def end(self) -> tuple[str, str]:
         """What it prints; waits for it, and ends it where its output stays open."""
         try:
-            said = self.process.communicate(timeout=LONGEST)
+            streams = self.process.communicate(timeout=LONGEST)
             if self.process.returncode in {0, 3} and len(self.began) == len(PHASES):
                 self.began.append(time.monotonic())  # which ends the last
-            return said
+            return streams
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, signal.SIGKILL)
             return "", f"its output stayed open for {LONGEST:g} s"
@@ -87,10 +87,10 @@ class Watched:
 def run_whole(job: Job, folder: Path) -> Known:
     """How long a job takes once its programs are compiled, and what it finds."""
     subprocess.run(job.command(folder), check=False, capture_output=True)
-    known = Known(job.result(folder))
+    reference = Known(job.result(folder))
     shutil.rmtree(folder)
     run = Watched(job, folder)
     run.wait(WRITE, float("inf"))
     run.end()
-    known.seconds = [end - start for start, end in pairwise(run.began)]
-    return known
+    reference.seconds = [end - start for start, end in pairwise(run.began)]
+    return reference

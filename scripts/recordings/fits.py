@@ -20,7 +20,7 @@ def fit_tables(simulated: Simulated) -> Iterator[Table]:
     folders = {"CSV, long": simulated.long, "Parquet, long": simulated.long_parquet, "CSV, short": simulated.short}
     say("(one fit that is not measured)")
     fit(simulated, simulated.short, "unmeasured", "--no-mcmc")
-    fits, steps, others = {}, {}, {}
+    fits, steps, remaining = {}, {}, {}
     for name, folder in folders.items():
         runs, against = [], []
         for i in range(simulated.size.repeats):
@@ -30,7 +30,7 @@ def fit_tables(simulated: Simulated) -> Iterator[Table]:
             if simulated.against:
                 against.append(fit(simulated, folder, f"{results}_against", tree=simulated.against))
         fits[name] = typical(runs)
-        others[name] = list(zip(runs, against, strict=False))
+        remaining[name] = list(zip(runs, against, strict=False))
         steps[name] = json.loads(reader(simulated, "steps", folder).output)
     samples = {name: (1000 if "short" in name else 1000 * simulated.size.cycles) for name in folders}
     rows = [["fit of ten recordings", "samples", "wall [s]", "target [s]", "peak [MiB]", "target [MiB]"]]
@@ -39,15 +39,15 @@ def fit_tables(simulated: Simulated) -> Iterator[Table]:
         rows.append([name, *numbers, f"{run.memory:.0f}", f"{MEMORY_TARGET:.0f}"])
     yield rows
     if simulated.against:
-        yield pair_table(others)
+        yield pair_table(remaining)
     yield from (step_table(fits, steps), stage_table(fits, steps))
 
 
 def pair_table(pairs: dict[str, list[tuple[Run, Run]]]) -> Table:
     """Fits beside those of another checkout."""
     rows = [["fit beside the other checkout's", "ratio of times", "lowest", "highest", "ratio of memory"]]
-    for name, each in pairs.items():
-        times, memory = ([getattr(a, what) / getattr(b, what) for a, b in each] for what in ("seconds", "memory"))
+    for name, pair in pairs.items():
+        times, memory = ([getattr(a, case) / getattr(b, case) for a, b in pair] for case in ("seconds", "memory"))
         rows.append([name, *(f"{x:.2f}" for x in (np.median(times), min(times), max(times), np.median(memory)))])
     return rows
 
@@ -63,7 +63,7 @@ def fit(simulated: Simulated, folder: Path, name: str, *options: str, tree: Path
 
 def step_table(fits: dict[str, Run], steps: dict[str, dict[str, float]]) -> list[list[str]]:
     """Seconds of each step from the files to the model, in a process of its own."""
-    names = list(dict.fromkeys(step for each in steps.values() for step in each))
+    names = list(dict.fromkeys(step for item in steps.values() for step in item))
     rows = [["steps before the fit [s]", *fits]]
     rows += [[step, *(f"{steps[name].get(step, 0.0):.2f}" for name in fits)] for step in names]
     return [*rows, ["sum", *(f"{sum(steps[name].values()):.2f}" for name in fits)]]
@@ -76,6 +76,6 @@ def stage_table(fits: dict[str, Run], steps: dict[str, dict[str, float]]) -> lis
     rows += [[stage, *(f"{run.stages.get(stage, 0.0):.2f}" for run in fits.values())] for stage in names]
     alone = {name: [s for stage, s in run.stages.items() if not stage.endswith(BESIDE)] for name, run in fits.items()}
     rests = {name: run.seconds - sum(alone[name]) for name, run in fits.items()}
-    rows.append(["start, reading, figures, writing", *(f"{rest:.2f}" for rest in rests.values())])
-    after = {name: rest - sum(steps[name].values()) for name, rest in rests.items()}
-    return [*rows, ["of these not in the steps above", *(f"{rest:.2f}" for rest in after.values())]]
+    rows.append(["start, reading, figures, writing", *(f"{folder_times:.2f}" for folder_times in rests.values())])
+    after = {name: folder_times - sum(steps[name].values()) for name, folder_times in rests.items()}
+    return [*rows, ["of these not in the steps above", *(f"{folder_times:.2f}" for folder_times in after.values())]]

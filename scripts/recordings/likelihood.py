@@ -35,9 +35,9 @@ def likelihood_tables(simulated: Simulated) -> list[Table]:
         for friction in FRICTIONS:
             say(f"likelihood {likelihood}, {friction}")
             overrides = [f'tables.recordings.likelihood="{likelihood}"', f'friction_model="{friction}"']
-            each = {name: density_costs(described(data[name], folders[name], overrides)) for name in folders}
-            for name, costs in each.items():
-                ratio = f"{costs.value / each['short'].value:.2f}" if name == "long" else ""
+            item = {name: density_costs(described(data[name], folders[name], overrides)) for name in folders}
+            for name, costs in item.items():
+                ratio = f"{costs.value / item['short'].value:.2f}" if name == "long" else ""
                 times = f"{costs.value:.3f}", f"{costs.gradient:.3f}", str(costs.batch), f"{costs.batched:.2f}"
                 rows.append(
                     [

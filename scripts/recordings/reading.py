@@ -40,9 +40,9 @@ def reader(simulated: Simulated, way: str, path: Path) -> Run:
     return measured([str(BASELINES / "read_recordings.py"), way, str(path)], simulated.environment)
 
 
-def inside(run: Run, what: str = "seconds") -> float:
+def inside(run: Run, case: str = "seconds") -> float:
     """What a reading process showed for itself."""
-    return json.loads(run.output)[what]
+    return json.loads(run.output)[case]
 
 
 def large_tables(simulated: Simulated) -> Iterator[Table]:

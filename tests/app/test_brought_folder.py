@@ -41,8 +41,8 @@ def test_a_shipped_data_set_that_is_chosen_file_by_file_is_written_as_it_is(draf
     assert understanding.report == str(bf.check(source))
     assert draft.proposed_name == bf.read(source).description.name.replace(" ", "-")
     draft.write(tmp_path / "kept")
-    kept, brought = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (tmp_path / "kept", source))
-    assert kept == {name: content for name, content in brought.items() if name != "README.md"}
+    saved, brought = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in (tmp_path / "kept", source))
+    assert saved == {name: content for name, content in brought.items() if name != "README.md"}
 
 
 def test_recordings_go_into_the_folder_that_their_cable_toml_names(draft):

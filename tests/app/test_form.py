@@ -58,10 +58,10 @@ def test_an_answer_that_cannot_be_read_is_refused_in_the_words_of_the_terminal()
 
 def test_a_draft_is_understood_as_init_understands_it(draft_of, tmp_path):
     draft = draft_of(forces=TABLE)
-    before = draft.understand()
-    assert [column.meaning for column in before.files[0].columns] == ["input_force", "output_force", "run"]
-    assert (before.files[0].columns[1].first, before.files[0].columns[1].last) == ("15.2", "29.9")
-    assert before.report == before.description == ""
+    initial = draft.understand()
+    assert [column.meaning for column in initial.files[0].columns] == ["input_force", "output_force", "run"]
+    assert (initial.files[0].columns[1].first, initial.files[0].columns[1].last) == ("15.2", "29.9")
+    assert initial.report == initial.description == ""
     after = answer(draft, "By which angle", "180 deg")
     assert after.refusals == ()
     assert "Everything could be read" in after.report

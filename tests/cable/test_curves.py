@@ -83,11 +83,11 @@ def laboratory() -> Laboratory:
 def test_a_line_has_its_angles_at_the_ends_of_the_range_and_is_nowhere_negative():
     curve = LineCurve("sheath_angle", ROUTE)
     values = {"sheath_angle_start": jnp.asarray(1.0), "sheath_angle_end": jnp.asarray(0.2)}
-    at = jnp.asarray([400.0, 500.0, 600.0, 700.0])
-    np.testing.assert_allclose(curve.wrap_angle(values, at), [1.0, 0.6, 0.2, 0.0], atol=1e-15)
-    told = curve.derived(values)
-    np.testing.assert_allclose(told["sheath_angle_middle"], np.rad2deg(0.6))
-    np.testing.assert_allclose(told["sheath_angle_slope"], np.rad2deg(-0.8 / 200.0))
+    points = jnp.asarray([400.0, 500.0, 600.0, 700.0])
+    np.testing.assert_allclose(curve.wrap_angle(values, points), [1.0, 0.6, 0.2, 0.0], atol=1e-15)
+    derived = curve.derived(values)
+    np.testing.assert_allclose(derived["sheath_angle_middle"], np.rad2deg(0.6))
+    np.testing.assert_allclose(derived["sheath_angle_slope"], np.rad2deg(-0.8 / 200.0))
     assert curve.derived_units()["sheath_angle_slope"][0] == "deg/mm"
 
 
@@ -103,8 +103,8 @@ def test_the_logistic_curve_that_is_reported_is_the_one_that_is_fitted(k, s):
 
 def test_a_logistic_curve_without_a_plateau_is_an_exponential():
     z = jnp.linspace(-1.0, 1.0, 9)
-    found = logistic_wrap_angle(z, jnp.asarray(0.2), jnp.asarray(1.3), jnp.asarray(0.0))
-    np.testing.assert_allclose(found, np.exp(0.2 + 1.3 * np.asarray(z)), rtol=1e-14)
+    computed = logistic_wrap_angle(z, jnp.asarray(0.2), jnp.asarray(1.3), jnp.asarray(0.0))
+    np.testing.assert_allclose(computed, np.exp(0.2 + 1.3 * np.asarray(z)), rtol=1e-14)
 
 
 @pytest.mark.parametrize("s", [0.0, 1e-12, 0.5, 1.0])
@@ -118,17 +118,17 @@ def test_derivatives_of_a_logistic_curve_are_finite_however_steep_it_is(k, s):
 # Recovery ---------------------------------------------------------------------------------------------------------
 
 
-def reported(found: LeastSquares, names: tuple[str, ...]) -> list[float]:
-    return [found.estimates[f"sheath_angle_{name}"].value for name in names]
+def reported(solution: LeastSquares, names: tuple[str, ...]) -> list[float]:
+    return [solution.estimates[f"sheath_angle_{name}"].value for name in names]
 
 
 @pytest.mark.parametrize("truth", LINES.values(), ids=LINES)
 def test_a_line_is_recovered_exactly_without_noise_and_within_its_errors_with_it(laboratory, truth):
     exact = laboratory.least_squares(read_off("line", line(*truth)))
     np.testing.assert_allclose(reported(exact, ("start", "end")), truth, rtol=1e-8)
-    found = laboratory.least_squares(read_off("line", line(*truth), scatter=2.0))
+    solution = laboratory.least_squares(read_off("line", line(*truth), scatter=2.0))
     for name, true in zip(("start", "end"), truth, strict=True):
-        estimate = found.estimates[f"sheath_angle_{name}"]
+        estimate = solution.estimates[f"sheath_angle_{name}"]
         assert abs(estimate.value - true) < 3 * estimate.standard_error < 4.0
 
 
@@ -139,9 +139,9 @@ def test_a_logistic_curve_is_recovered_exactly_without_noise_and_within_its_erro
     true = {"a": np.log(np.deg2rad(A * s)), "k": k, "s": s}
     exact = laboratory.least_squares(read_off("logistic", logistic(*truth), least=0.0))
     np.testing.assert_allclose(reported(exact, tuple(true)), list(true.values()), rtol=1e-6, atol=1e-7)
-    found = laboratory.least_squares(read_off("logistic", logistic(*truth), scatter=2.0))
+    solution = laboratory.least_squares(read_off("logistic", logistic(*truth), scatter=2.0))
     for name, value in true.items():
-        estimate = found.estimates[f"sheath_angle_{name}"]
+        estimate = solution.estimates[f"sheath_angle_{name}"]
         assert abs(estimate.value - value) < 3 * estimate.standard_error < 1.5 * max(abs(value), 0.5)
 
 
@@ -228,19 +228,19 @@ def fits(tmp_path_factory) -> dict[str, bf.Fit]:
 )
 def test_the_summary_heads_a_family_s_table_with_its_own_name(fits, name, heading, rows):
     lines = details_text(fits[name]).splitlines()
-    at = lines.index(heading)
-    assert all(line.startswith("  sheath_angle_") for line in lines[at + 1 : at + 1 + rows])
+    index = lines.index(heading)
+    assert all(line.startswith("  sheath_angle_") for line in lines[index + 1 : index + 1 + rows])
     assert sum("median (90 % interval):" in line for line in lines) == 1
 
 
 @pytest.mark.extended
 def test_comparing_the_families_finds_the_shape_of_the_route(fits):
-    found = bf.compare(fits)
-    assert found.best == "gaussian"
-    assert found.verdict("line") == found.verdict("logistic") == "clear"
-    assert len(found.readings) == len(LENGTHS) + 9
-    assert [found.descriptions[name].rpartition(", ")[2] for name in CURVES] == [f"{name} curves" for name in CURVES]
-    assert "The data prefer gaussian over" in comparison_text(found)
+    comparison = bf.compare(fits)
+    assert comparison.best == "gaussian"
+    assert comparison.verdict("line") == comparison.verdict("logistic") == "clear"
+    assert len(comparison.readings) == len(LENGTHS) + 9
+    assert [comparison.descriptions[name].rpartition(", ")[2] for name in CURVES] == [f"{name} curves" for name in CURVES]
+    assert "The data prefer gaussian over" in comparison_text(comparison)
 
 
 @pytest.mark.extended
@@ -259,8 +259,8 @@ def test_the_figure_of_wrap_angles_draws_the_curve_of_each_family(fits):
     assert len(readings) == len(CURVES)
     for fit in fits.values():
         axes, _ = draw(data(fit)).axes  # and the strip of residuals
-        drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
-        np.testing.assert_allclose(drawn["Reading"], readings[0])
+        lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+        np.testing.assert_allclose(lines["Reading"], readings[0])
         assert axes.get_title() == "sheath"
 
 

@@ -53,7 +53,7 @@ def test_a_rope_is_the_play_of_the_preparation_on_the_scale_on_which_friction_is
 
 def test_a_loop_stands_still_between_its_two_ways():
     preload, force, start = np.array([5.0, 20.0]), _forces(0.0), np.array([0.0, 3.0])
-    found = LoopDrive(jnp.asarray(preload), jnp.asarray(EXPONENT)).follow(
+    computed = LoopDrive(jnp.asarray(preload), jnp.asarray(EXPONENT)).follow(
         jnp.asarray(force), jnp.asarray(MOUNTING), jnp.asarray(start)
     )[0]
     for i in range(2):
@@ -61,7 +61,7 @@ def test_a_loop_stands_still_between_its_two_ways():
         lost, growth = 2 * preload[i] * exponent, np.exp(exponent)
         for t, x in enumerate(force[:, i].tolist()):
             y = min(max(y, min(x - lost, x / growth, x * growth)), max(x + lost, x / growth, x * growth))
-            assert found[t, i] == pytest.approx(y, abs=1e-11)
+            assert computed[t, i] == pytest.approx(y, abs=1e-11)
 
 
 @pytest.mark.parametrize("drive", [_rope(), LoopDrive(jnp.array([5.0, 20.0]), jnp.asarray(EXPONENT))], ids=["rope", "loop"])

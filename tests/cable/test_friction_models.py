@@ -76,9 +76,9 @@ def test_with_drag_the_forces_plus_drag_keep_their_ratio():
 def test_the_scale_is_its_definition_and_its_inverse_leads_back(p, drag):
     log_u = np.log((FORCES + drag) / REFERENCE)
     expected = log_u * (1 + p * log_u / 2 + (p * log_u) ** 2 / 6) if p < 1e-4 else np.expm1(p * log_u) / p
-    found = _scale(FORCES, p, drag)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-11)
-    np.testing.assert_allclose(_back(found, p, drag), FORCES, rtol=1e-12)
+    computed = _scale(FORCES, p, drag)
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=3e-11)
+    np.testing.assert_allclose(_back(computed, p, drag), FORCES, rtol=1e-12)
 
 
 def test_scale_and_inverse_run_on_through_the_switch_of_the_series():
@@ -91,12 +91,12 @@ def test_scale_and_inverse_run_on_through_the_switch_of_the_series():
 def test_the_derivative_by_the_load_exponent_runs_on_through_the_switch_of_the_series():
     below, above = jnp.asarray(1e-6 * (1 - 1e-9)), jnp.asarray(1e-6 * (1 + 1e-9))
     scaled = np.log((FORCES + 2.0) / REFERENCE)
-    for function, at, tolerance in (
+    for function, points, tolerance in (
         (_scale, FORCES, 5e-5),
         (_back, scaled, 5e-4),
     ):  # what the series leaves out: p log(u)^3
         slope = jax.jit(jax.jacfwd(function, argnums=1))
-        np.testing.assert_allclose(slope(at, below, 2.0), slope(at, above, 2.0), rtol=0, atol=tolerance)
+        np.testing.assert_allclose(slope(points, below, 2.0), slope(points, above, 2.0), rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize("p", [0.0, 1e-3, 0.3, 1.0])
@@ -109,14 +109,14 @@ def test_the_slope_is_the_derivative_of_the_scale_by_the_force(p):
 @pytest.mark.parametrize("function", [_scale, _back, _slope], ids=["scale", "inverse", "slope"])
 def test_derivatives_at_a_load_exponent_of_exactly_zero_are_finite_and_right(function):
     """By the load exponent and the drag, at p = 0 and D = 0, where the sampler starts from in the limit."""
-    at = np.linspace(-1.0, 1.0, 9) if function is _back else FORCES[10:]
+    points = np.linspace(-1.0, 1.0, 9) if function is _back else FORCES[10:]
     zero, h = jnp.asarray(0.0), 1e-4
-    by_exponent, by_drag = jax.jit(jax.jacfwd(function, argnums=(1, 2)))(at, zero, zero)
-    forward = (-3 * function(at, 0.0, 0.0) + 4 * function(at, h, 0.0) - function(at, 2 * h, 0.0)) / (2 * h)
+    by_exponent, by_drag = jax.jit(jax.jacfwd(function, argnums=(1, 2)))(points, zero, zero)
+    forward = (-3 * function(points, 0.0, 0.0) + 4 * function(points, h, 0.0) - function(points, 2 * h, 0.0)) / (2 * h)
     np.testing.assert_allclose(by_exponent, forward, rtol=1e-5, atol=1e-6)
-    difference = (function(at, 0.0, h) - function(at, 0.0, -h)) / (2 * h)
+    difference = (function(points, 0.0, h) - function(points, 0.0, -h)) / (2 * h)
     np.testing.assert_allclose(by_drag, difference, rtol=1e-6, atol=1e-6)
-    reverse = jax.jit(jax.grad(lambda p, drag: function(at, p, drag).sum(), argnums=(0, 1)))(zero, zero)
+    reverse = jax.jit(jax.grad(lambda p, drag: function(points, p, drag).sum(), argnums=(0, 1)))(zero, zero)
     np.testing.assert_allclose(reverse, [by_exponent.sum(), by_drag.sum()], rtol=1e-10)
 
 
@@ -132,8 +132,8 @@ def test_where_friction_would_hold_more_than_the_force_next_to_nothing_is_left()
 def test_the_rate_factor_is_as_computed_by_hand_and_alike_both_ways():
     speed = np.array([0.0, 10.0, -10.0, 100.0])
     expected = [1.3, 1 + 0.3 / np.e + 0.02, 1 + 0.3 / np.e + 0.02, 1 + 0.3 * np.exp(-100.0) + 0.2]
-    found = jax.jit(rate_factor)(speed, 0.3, 10.0, 0.002)
-    np.testing.assert_allclose(found, expected, rtol=1e-14)
+    computed = jax.jit(rate_factor)(speed, 0.3, 10.0, 0.002)
+    np.testing.assert_allclose(computed, expected, rtol=1e-14)
     by_speed = jax.jit(jax.grad(lambda v: rate_factor(v, jnp.asarray(0.3), jnp.asarray(10.0), jnp.asarray(0.002))))
     assert float(by_speed(jnp.asarray(10.0))) == pytest.approx(-0.3 * 2 / 10 / np.e + 0.002, rel=1e-12)
 
@@ -233,10 +233,10 @@ def _table(rows, velocity=float("nan"), unit="") -> ForceTable:
     stroke, force_in, force_out = (np.array(column) for column in zip(*rows, strict=True))
     n = len(rows)
     origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
-    own = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
+    own_angles = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
     run, names = np.arange(n), tuple(str(i) for i in range(n))
     nowhere, speeds = np.full(n, np.nan), np.full(n, velocity)
-    return ForceTable(nowhere, force_in * 1.0, force_out * 1.0, run, names, stroke, own, origin, speeds, unit)
+    return ForceTable(nowhere, force_in * 1.0, force_out * 1.0, run, names, stroke, own_angles, origin, speeds, unit)
 
 
 def _model(rows, velocity=float("nan"), unit="", **more) -> Model:
@@ -269,15 +269,15 @@ def test_each_option_adds_its_parameters_with_the_reference_in_words():
 
 
 def test_stated_reference_force_and_velocity_come_before_the_data_s():
-    stated = {"reference_force": {"value": 60, "unit": "N"}, "reference_velocity": {"value": 30, "unit": "r/min"}}
-    model = _model([(1, 30.0, 20.0)], 2.0, "rad/s", friction_model="drag+rate-dependent", **stated)
+    settings = {"reference_force": {"value": 60, "unit": "N"}, "reference_velocity": {"value": 30, "unit": "r/min"}}
+    model = _model([(1, 30.0, 20.0)], 2.0, "rad/s", friction_model="drag+rate-dependent", **settings)
     conditions = model.cable.friction.conditions
     assert conditions.reference_force == 60.0 and conditions.reference_speed == pytest.approx(np.pi)
     values = {"drag": 5.0, "stribeck": 0.2, "stribeck_speed": 1.0, "viscous": 0.01}
     expected = (65.0 * np.exp(-0.4) - 5.0) / 60.0  # at the reference speed the exponent is as stated
     efficiency = jax.jit(model.cable.friction.efficiency)
-    found = efficiency({k: jnp.asarray(v) for k, v in values.items()}, jnp.asarray(0.4))
-    assert float(found) == pytest.approx(expected, rel=1e-12)
+    efficiencies = efficiency({k: jnp.asarray(v) for k, v in values.items()}, jnp.asarray(0.4))
+    assert float(efficiencies) == pytest.approx(expected, rel=1e-12)
 
 
 # Held readings ----------------------------------------------------------------------------------------------------
@@ -288,11 +288,11 @@ MORE = {"drag": 3.0, "input_offset": 0.8, "output_offset": -0.5, "gain_error": 0
 SENSORS = {"input_gain_error_sd": 0, "output_gain_error_sd": 0.01, "offset_sd": {"value": 1, "unit": "N"}}
 
 
-def _held(values, what="log_likelihood", rows=HELD, extra=()):
+def _held(values, case="log_likelihood", rows=HELD, extra=()):
     model = _model(rows, friction_model="drag", sensors=SENSORS)
     (term,) = model.terms
     assert isinstance(term, HeldForcesTerm)
-    return np.asarray(jax.jit(getattr(term, what))({k: jnp.asarray(v) for k, v in values.items()}, term.data, *extra))
+    return np.asarray(jax.jit(getattr(term, case))({k: jnp.asarray(v) for k, v in values.items()}, term.data, *extra))
 
 
 def _held_by_hand(values, rows=HELD):
@@ -314,13 +314,13 @@ def test_a_held_reading_has_the_probability_of_the_band_on_the_scale_of_drag_beh
 def test_a_held_reading_is_certain_inside_the_band_a_coin_toss_at_its_edge_and_unlikely_beyond():
     values = VALUES | MORE | {"tau": 0.01, "sigma_F": 0.1}
     limit = values["mu"] * THETA
-    at = np.array([0.0, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2]) * limit
+    points = np.array([0.0, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2]) * limit
     u_in = 50.0 - values["input_offset"] + values["drag"]
-    force_out = (u_in * np.exp(-at) - values["drag"]) * np.exp(-values["gain_error"]) + values["output_offset"]
-    found = np.exp(_held(values, rows=[(0, 50.0, f) for f in force_out]))
-    np.testing.assert_allclose(found[:3], 1.0, atol=1e-6)
-    np.testing.assert_allclose(found[3:5], 0.5, atol=1e-3)
-    assert np.all(found[5:] < 1e-6)
+    force_out = (u_in * np.exp(-points) - values["drag"]) * np.exp(-values["gain_error"]) + values["output_offset"]
+    computed = np.exp(_held(values, rows=[(0, 50.0, f) for f in force_out]))
+    np.testing.assert_allclose(computed[:3], 1.0, atol=1e-6)
+    np.testing.assert_allclose(computed[3:5], 0.5, atol=1e-3)
+    assert np.all(computed[5:] < 1e-6)
 
 
 def test_readings_simulated_inside_the_band_are_inside_it_for_the_likelihood():

@@ -71,17 +71,17 @@ def fitted(tmp_path_factory):
 
 
 def test_coefficient_and_unintended_wrap_angle_are_recovered_exactly_without_noise():
-    found = Laboratory().least_squares(lawful(scatter=0.0))
-    assert found.estimates["mu1"].value == pytest.approx(MU, rel=1e-7)
-    assert found.estimates["wobble_contact_1"].value == pytest.approx(35.0, rel=1e-7)
+    solution = Laboratory().least_squares(lawful(scatter=0.0))
+    assert solution.estimates["mu1"].value == pytest.approx(MU, rel=1e-7)
+    assert solution.estimates["wobble_contact_1"].value == pytest.approx(35.0, rel=1e-7)
 
 
 @pytest.mark.extended
 def test_with_noise_both_are_recovered_within_their_errors_while_the_capstan_equation_alone_is_wrong():
     laboratory = Laboratory()
-    found, plain = (laboratory.least_squares(lawful(law)) for law in ("wobble", "capstan"))
+    solution, plain = (laboratory.least_squares(lawful(law)) for law in ("wobble", "capstan"))
     for name, truth in (("mu1", MU), ("wobble_contact_1", 35.0)):
-        estimate = found.estimates[name]
+        estimate = solution.estimates[name]
         assert abs(estimate.value - truth) < 3 * estimate.standard_error
         assert estimate.standard_error < 0.1 * truth
     assert plain.estimates["mu1"].value > 1.1 * MU  # what the sheath wanders goes into the coefficient
@@ -125,9 +125,9 @@ def test_the_stretch_of_the_rope_asks_the_law_of_its_contact():
 def test_the_law_s_parameter_is_recovered_from_stretch_alone():
     description = elastic_cable(("stretch",), kind="single", contact=[HOUSING | {"law": "wobble"}])
     dataset, values = bench(description, TRUTH | {"wobble_housing": 35.0}, noise=False)
-    found = Laboratory().least_squares(dataset)
-    assert found.estimates["wobble_housing"].value == pytest.approx(35.0, rel=1e-5)
-    assert found.estimates["mu"].value == pytest.approx(values["mu"], rel=1e-5)
+    solution = Laboratory().least_squares(dataset)
+    assert solution.estimates["wobble_housing"].value == pytest.approx(35.0, rel=1e-5)
+    assert solution.estimates["mu"].value == pytest.approx(values["mu"], rel=1e-5)
 
 
 def test_a_rope_stretched_by_the_friction_of_several_contacts_with_such_a_law_is_refused():

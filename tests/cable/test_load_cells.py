@@ -61,8 +61,8 @@ def _bench(table: str) -> tuple[Dataset, dict[str, float]]:
     none = dict.fromkeys((INPUT_OFFSET, OUTPUT_OFFSET, GAIN_ERROR), 0.0)
     if table == "loop":
         return bench(elastic_cable(("loop",), sensors=SENSORS), TRUTH | none, noise=False)
-    stated = {name: value for name, value in none.items() if table == "forces" or name == GAIN_ERROR}
-    return measured(cable(3, ("angles", table), sensors=SENSORS), noise=False, **stated)
+    conditions = {name: value for name, value in none.items() if table == "forces" or name == GAIN_ERROR}
+    return measured(cable(3, ("angles", table), sensors=SENSORS), noise=False, **conditions)
 
 
 @pytest.mark.parametrize("table", ["efficiencies", "forces", "loop"])

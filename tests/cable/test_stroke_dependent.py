@@ -56,6 +56,6 @@ def test_the_difference_is_found_and_without_it_the_model_is_said_not_to_describ
     plain, free = (bf.fit(folder, mcmc=False, friction=model) for model in ("capstan", "stroke-dependent"))
     assert "--friction stroke-dependent" in " ".join(plain.verdict().reasons)
     assert free.verdict().trusted
-    found = free.least_squares.estimates
-    assert abs(found[STROKE_DIFFERENCE].value - DIFFERENCE) < 3 * found[STROKE_DIFFERENCE].standard_error < 0.05
-    assert abs(found["mu"].value - 0.12) < 0.002
+    estimates = free.least_squares.estimates
+    assert abs(estimates[STROKE_DIFFERENCE].value - DIFFERENCE) < 3 * estimates[STROKE_DIFFERENCE].standard_error < 0.05
+    assert abs(estimates["mu"].value - 0.12) < 0.002

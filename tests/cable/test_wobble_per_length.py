@@ -79,8 +79,8 @@ def test_one_length_needs_no_route(tmp_path, forces):
     text = (folder / "cable.toml").read_text()
     (folder / "cable.toml").write_text(text.replace(ROUTE, ""))
     head, *rows = (folder / "t.csv").read_text().splitlines()
-    kept = [row for row in rows if row.startswith("1.4")]
-    (folder / "t.csv").write_text("\n".join([head, *kept]).replace("sheath_length_m,", "").replace("1.4,", "") + "\n")
+    selected_rows = [row for row in rows if row.startswith("1.4")]
+    (folder / "t.csv").write_text("\n".join([head, *selected_rows]).replace("sheath_length_m,", "").replace("1.4,", "") + "\n")
     fit = Laboratory().least_squares(bf.read(folder))
     assert fit.estimates["mu"].value == pytest.approx(MU, rel=1e-4)
     assert fit.estimates["wobble_per_m_sheath"].value == pytest.approx(K * 1.4 / 1.5, rel=1e-3)

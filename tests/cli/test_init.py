@@ -243,15 +243,15 @@ def test_a_coefficient_is_not_called_what_check_would_refuse(typed, replies):
 @pytest.mark.extended
 def test_a_coefficient_may_be_called_what_check_accepts_and_never_what_a_fit_calls_something_else():
     question = coefficient_name_question("What is it called?", "mu1", ())
-    kept = ("mu1", " µ  edge ", "knie_mu", "friction")
-    assert [question.read(name) for name in kept] == ["mu1", "µ edge", "knie_mu", "friction"]
+    names = ("mu1", " µ  edge ", "knie_mu", "friction")
+    assert [question.read(name) for name in names] == ["mu1", "µ edge", "knie_mu", "friction"]
     for name in find_examples():
         if name in {"synthetic-fleet", "on-body-metabolic", "haptic-teleoperation"}:
             continue
         space = build_model(bf.read(find_examples()[name])).space
-        others = [parameter.name for parameter in space.parameters if parameter.role not in {"friction", "curve"}]
-        assert others, name
-        for other in others:
+        remaining = [parameter.name for parameter in space.parameters if parameter.role not in {"friction", "curve"}]
+        assert remaining, name
+        for other in remaining:
             with pytest.raises(UsageError, match="another number"):
                 question.read(other)
 
@@ -331,7 +331,7 @@ def test_in_a_terminal_three_foreign_files_become_a_fit_without_an_editor(foreig
 @in_a_terminal
 @pytest.mark.parametrize("key", ["c", "d"])
 def test_ctrl_c_and_ctrl_d_end_a_dialog_without_a_trace(foreign, key):
-    before = sorted(foreign.rglob("*"))
+    files_at_start = sorted(foreign.rglob("*"))
     console = Console("init", "cable")
     console.answer("Which files did you measure", "")
     console.child.expect("What does it hold")
@@ -339,7 +339,7 @@ def test_ctrl_c_and_ctrl_d_end_a_dialog_without_a_trace(foreign, key):
     console.child.sendcontrol(key)
     console.child.expect("Interrupted.")
     assert console.end() == 130
-    assert sorted(foreign.rglob("*")) == before
+    assert sorted(foreign.rglob("*")) == files_at_start
 
 
 @in_a_terminal

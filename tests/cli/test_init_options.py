@@ -22,8 +22,8 @@ def recording(folder):
     time = np.arange(0, 24, 0.02)
     force = 30 + 20 * np.sin(2 * np.pi * time / 6)
     output, state = np.empty_like(force), force[0]
-    for i, at in enumerate(force):
-        state = output[i] = min(max(state, at * np.exp(-0.3)), at * np.exp(0.3))
+    for i, value in enumerate(force):
+        state = output[i] = min(max(state, value * np.exp(-0.3)), value * np.exp(0.3))
     rng = np.random.default_rng(1)
     rows = (f"{a + 0.05 * rng.normal():.3f},{b + 0.05 * rng.normal():.3f}\n" for a, b in zip(force, output, strict=True))
     (folder / "log.csv").write_text("ai0,ai1\n" + "".join(rows))
@@ -45,8 +45,8 @@ def test_a_table_is_described_by_options_as_fit_reads_it(run, tmp_path):
     assert f"Next: bowdenfit fit {tmp_path / 'cable'}" in out
     written, read = bf.read(tmp_path / "cable"), bf.read(path, columns=COLUMNS, settings=['noise="student"'])
     assert written.description == read.description
-    for one, other in zip(arrays_of(written), arrays_of(read), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for first, other in zip(arrays_of(written), arrays_of(read), strict=True):
+        np.testing.assert_array_equal(first, other)
 
 
 def test_a_recording_is_described_by_options_as_fit_reads_it(run, tmp_path):

@@ -120,13 +120,13 @@ def test_a_loop_that_looks_at_the_flag_ends_by_itself():
         finally:
             ended.append(True)
 
-    before = signal.getsignal(signal.SIGINT)
+    previous_handler = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
             run_interruptibly(loop)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, previous_handler)
         running.requested.clear()
     assert ended
 

@@ -36,8 +36,8 @@ def clean(least_squares_of):
 @pytest.mark.parametrize(("seed", "name"), MISTAKES)
 def test_a_mistake_is_refused_or_not_trusted_or_does_no_harm(tmp_path, clean, seed, name):
     corrupt(DATASETS / name, tmp_path / name, seed)
-    end, why = end_of(tmp_path / name, clean.get(name, {}), mcmc=False)
-    assert end == MISTAKES[seed, name], why
+    end, reason = end_of(tmp_path / name, clean.get(name, {}), mcmc=False)
+    assert end == MISTAKES[seed, name], reason
 
 
 def test_a_mistake_that_no_table_shows_counts_as_wrong(tmp_path, clean):
@@ -50,9 +50,9 @@ def test_a_mistake_that_no_table_shows_counts_as_wrong(tmp_path, clean):
     rows = [line.split(",") for line in lines[start + 1 :]]
     scaled = [",".join([*row[:k], f"{float(row[k]) / 1.08:.6g}", *row[k + 1 :]]) for row in rows]
     path.write_text("\n".join([*lines[: start + 1], *scaled]) + "\n")
-    end, why = end_of(tmp_path / YARN, clean[YARN], mcmc=False)
+    end, reason = end_of(tmp_path / YARN, clean[YARN], mcmc=False)
     assert end == WRONG
-    assert why.startswith("mu ")
+    assert reason.startswith("mu ")
 
 
 def test_every_kind_of_mistake_is_made_in_files_that_a_fit_reads(tmp_path):
@@ -68,10 +68,10 @@ def test_none_of_a_hundred_mistakes_ends_trusted_and_wrong(tmp_path):
     folders = sorted(path.parent for path in DATASETS.glob("*/cable.toml"))
     fits = [bf.fit(folder, seed=1) for folder in folders]
     assert all(fit.verdict().trusted for fit in fits)
-    known, wrong = [answers(fit) for fit in fits], []
+    clean_answers, wrong = [answers(fit) for fit in fits], []
     for seed in range(100):
         which, folder = seed % len(folders), tmp_path / str(seed)
-        what = corrupt(folders[which], folder, seed)
-        end, why = end_of(folder, known[which], mcmc=True)
-        wrong += [f"{seed} {what}: {why}"] if end == WRONG else []
+        corruption = corrupt(folders[which], folder, seed)
+        end, reason = end_of(folder, clean_answers[which], mcmc=True)
+        wrong += [f"{seed} {corruption}: {reason}"] if end == WRONG else []
     assert not wrong

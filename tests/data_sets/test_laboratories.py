@@ -51,8 +51,8 @@ def test_so_it_is_in_five_sessions_of_every_laboratory(tmp_path, name, model):
 @pytest.mark.parametrize("name", [name for name, laboratory in LABORATORIES.items() if laboratory.right])
 def test_intervals_of_the_right_model_hold_the_truth(tmp_path, name):
     """At their rate or more; each fails by chance in one of 1000 runs with other seeds."""
-    found = held(LABORATORIES[name], 100, tmp_path)
-    fitted = found.pop("")
+    coverage = held(LABORATORIES[name], 100, tmp_path)
+    fitted = coverage.pop("")
     assert fitted >= 90
-    for count in found.values():
+    for count in coverage.values():
         assert count >= 0.9 * fitted or binomtest(count, fitted, 0.9).pvalue > 2e-3

@@ -54,13 +54,13 @@ def _one_curve(folder: Path, column: str, limits: tuple[float, float], geometry:
     )
 
 
-def _curve_figures(posterior: LogDensity, found: LeastSquares) -> tuple[float, float, float, float]:
+def _curve_figures(posterior: LogDensity, solution: LeastSquares) -> tuple[float, float, float, float]:
     """A [deg], B [mm], C [mm] and the sum of squares [deg^2], whose standardization is undone."""
     space = posterior.model.space
-    values = space.constrain(jnp.asarray(found.z))
+    values = space.constrain(jnp.asarray(solution.z))
     (curve,) = posterior.model.cable.curves.values()
     unit = float(np.rad2deg(values["sigma_theta"]))
-    return *(float(x) for x in curve.derived(values).values()), found.sum_of_squares * unit**2
+    return *(float(x) for x in curve.derived(values).values()), solution.sum_of_squares * unit**2
 
 
 # Column, lengths [mm]; A, B, C, sum of squares by least squares; the same as printed in the paper.
@@ -77,10 +77,10 @@ CURVE_FITS = [
 def test_least_squares_of_one_curve_with_zeros_gives_the_papers_curve_and_a_smaller_sum_of_squares(
     on_body, column, limits, figures, _, geometry
 ):
-    posterior, found = _fitted(_one_curve(on_body, column, limits, geometry))
-    assert found.converged
-    assert all(found.estimates[name].identified for name in posterior.model.cable.curves[column].names)
-    A, B, C, total = _curve_figures(posterior, found)
+    posterior, solution = _fitted(_one_curve(on_body, column, limits, geometry))
+    assert solution.converged
+    assert all(solution.estimates[name].identified for name in posterior.model.cable.curves[column].names)
+    A, B, C, total = _curve_figures(posterior, solution)
     expected_A, expected_B, expected_C, expected_total = figures
     assert pytest.approx(expected_A, abs=0.05 if expected_A > 1000 else 0.005) == A
     assert pytest.approx(expected_B, abs=0.005) == B
@@ -107,15 +107,15 @@ def test_the_papers_own_coefficients_leave_the_sum_of_squares_it_would_have_had(
 
 def test_without_the_zero_at_510_mm_the_extrusion_curve_has_no_finite_minimum(on_body):
     dataset = _one_curve(on_body, "squeezed_sheath_angle", (430, 500), "continuous")
-    posterior, found = _fitted(dataset)
+    posterior, solution = _fitted(dataset)
     _, b, c = posterior.model.cable.curves["squeezed_sheath_angle"].names
-    assert not found.estimates[c].identified
-    assert np.isnan(found.estimates[c].value) and np.isnan(found.estimates[c].standard_error)
-    assert "no finite minimum" in found.estimates[c].remark
-    e_fold = -dataset.description.route.half_width / found.estimates[b].value
+    assert not solution.estimates[c].identified
+    assert np.isnan(solution.estimates[c].value) and np.isnan(solution.estimates[c].standard_error)
+    assert "no finite minimum" in solution.estimates[c].remark
+    e_fold = -dataset.description.route.half_width / solution.estimates[b].value
     assert e_fold == pytest.approx(37.16, abs=0.005)
-    assert _curve_figures(posterior, found)[-1] == pytest.approx(20.47, abs=0.005)
-    assert np.isinf(_curve_figures(posterior, found)[:3]).all()  # A, B and C: the peak of an exponential
+    assert _curve_figures(posterior, solution)[-1] == pytest.approx(20.47, abs=0.005)
+    assert np.isinf(_curve_figures(posterior, solution)[:3]).all()  # A, B and C: the peak of an exponential
 
 
 def _equation_9(folder: Path, coefficients: dict[str, float]) -> Dataset:
@@ -180,8 +180,8 @@ def test_the_measured_efficiencies_differ_from_equation_9_as_stated_and_by_more_
 
 def test_least_squares_of_the_coefficients_on_the_four_efficiencies(on_body, tmp_path):
     dataset = _equation_9(_with_efficiencies_at(on_body, tmp_path, list(MEASURED)), {})
-    _, found = _fitted(dataset)
-    values = [found.estimates[name].value for name in ("mu1", "mu2", "mu3")]
+    _, solution = _fitted(dataset)
+    values = [solution.estimates[name].value for name in ("mu1", "mu2", "mu3")]
     np.testing.assert_allclose(values, [0.0804, 0.1130, 0.2228], atol=5e-5)
-    residuals = found.readings["efficiency"] - dataset.measurements.table(EfficiencyTable).efficiency
+    residuals = solution.readings["efficiency"] - dataset.measurements.table(EfficiencyTable).efficiency
     assert np.all(np.abs(residuals) < 0.001)

@@ -96,11 +96,11 @@ def test_a_straight_line_through_the_origin_gives_the_printed_coefficient(trials
 def test_the_least_squares_of_the_fit_is_that_straight_line(trials, fit, readme):
     """Weights differ a little from row to row (sensor noise and angle errors), hence not the last digit."""
     mu, error, _ = through_origin(trials["angle"], log_ratio(trials))
-    found = fit.least_squares.estimates["mu"]
-    assert found.identified
-    assert found.value == pytest.approx(mu, abs=1e-4)
-    assert found.standard_error == pytest.approx(error, rel=0.01)
-    assert f"| {found.value:.4f} +- {found.standard_error:.4f} | 0.1769 to 0.1847 |" in readme
+    estimate = fit.least_squares.estimates["mu"]
+    assert estimate.identified
+    assert estimate.value == pytest.approx(mu, abs=1e-4)
+    assert estimate.standard_error == pytest.approx(error, rel=0.01)
+    assert f"| {estimate.value:.4f} +- {estimate.standard_error:.4f} | 0.1769 to 0.1847 |" in readme
 
 
 def test_a_short_chain_gives_the_printed_intervals(fit, readme):
@@ -121,10 +121,10 @@ def with_samples(data: Dataset, n_samples: int, independent: bool) -> Dataset:
     run = np.arange(len(rows)) if independent else rows
     columns = {name: column[rows] for name, column in vars(forces).items() if isinstance(column, np.ndarray)}
     columns |= {"output_force": held.ravel(), "run": run}
-    own = replace(forces.own, angle=forces.own.angle[rows], sd=forces.own.sd[rows])
+    own_angles = replace(forces.own, angle=forces.own.angle[rows], sd=forces.own.sd[rows])
     origin = replace(forces.origin, file=forces.origin.file[rows], row=forces.origin.row[rows])
     names = tuple(str(i) for i in range(run.max() + 1))
-    drawn_out = replace(forces, **columns, run_names=names, own=own, origin=origin)
+    drawn_out = replace(forces, **columns, run_names=names, own=own_angles, origin=origin)
     return replace(data, measurements=data.measurements.with_tables(drawn_out))
 
 
@@ -150,19 +150,19 @@ def test_fitted_as_independent_49_samples_a_trial_make_the_error_seven_times_sma
 def test_samples_that_name_their_run_leave_the_answer_as_it_is(fit):
     """Seeded, so it never fails by chance."""
     long = bowdenfit.fit(with_samples(fit.dataset, 501, independent=False), mcmc=False, seed=1)
-    found, ours = long.least_squares.estimates["mu"], fit.least_squares.estimates["mu"]
-    assert found.value == pytest.approx(ours.value, abs=1e-4)
-    assert found.standard_error == pytest.approx(ours.standard_error, rel=0.01)
+    estimate, ours = long.least_squares.estimates["mu"], fit.least_squares.estimates["mu"]
+    assert estimate.value == pytest.approx(ours.value, abs=1e-4)
+    assert estimate.standard_error == pytest.approx(ours.standard_error, rel=0.01)
 
 
 def test_coefficients_and_residuals_of_the_single_trials_are_as_printed(trials, readme):
     y, angle = log_ratio(trials), trials["angle"]
     mu, _, _ = through_origin(angle, y)
     for nominal in np.unique(NOMINAL):
-        at = nominal == NOMINAL
-        theta = angle[at][0]
-        cells = [f"{nominal}", f"{np.rad2deg(theta):.1f}", *(f"{x:.4f}" for x in y[at] / theta)]
-        cells += [f"{np.mean(y[at] - mu * theta):+.4f}", f"{np.std(y[at], ddof=1):.4f}"]
+        mask = nominal == NOMINAL
+        theta = angle[mask][0]
+        cells = [f"{nominal}", f"{np.rad2deg(theta):.1f}", *(f"{x:.4f}" for x in y[mask] / theta)]
+        cells += [f"{np.mean(y[mask] - mu * theta):+.4f}", f"{np.std(y[mask], ddof=1):.4f}"]
         assert f"| {' | '.join(cells)} |" in readme
 
 
@@ -187,8 +187,8 @@ def test_other_ways_to_read_the_experiment_give_what_is_printed(trials, readme):
     mu, error, scatter = through_origin(np.deg2rad(NOMINAL), y)
     assert f"nominal ones mu is {mu:.4f} +- {error:.4f}" in readme and f"to {100 * scatter:.1f} %" in readme
     for nominal, words in ((225, "without 225 deg mu is {:.4f}"), (270, "without 270 deg {:.4f}")):
-        rest = nominal != NOMINAL
-        assert words.format(through_origin(angle[rest], y[rest])[0]) in readme
+        others_mask = nominal != NOMINAL
+        assert words.format(through_origin(angle[others_mask], y[others_mask])[0]) in readme
     lighter, _, _ = through_origin(angle, np.log(0.8 * 9.81 / trials["held"]))
     assert f"with that load mu would be {lighter:.4f}" in readme
 

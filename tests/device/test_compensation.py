@@ -150,9 +150,9 @@ def test_an_integral_lets_less_gain_be_and_makes_what_is_left_fade():
     one_way = np.stack([0.5 * np.arange(1500) * 1e-3, np.full(1500, 0.5)], axis=1)
     law = replace(controller(gain=1.0, active_zone=np.inf), integral_gain=np.array([0.0, 5.0]))
     left = -simulate_device(plant(), law, HAND, one_way).joint_torque
-    at = [np.mean(left[part], axis=0) for part in (slice(280, 320), slice(680, 720))]
-    assert at[1][0] == pytest.approx(at[0][0], rel=0.03)
-    assert at[1][1] / at[0][1] == pytest.approx(np.exp(-0.4 * 5.0 / 2.0), rel=0.1), "with 1 + K_f over K_i"
+    levels = [np.mean(left[part], axis=0) for part in (slice(280, 320), slice(680, 720))]
+    assert levels[1][0] == pytest.approx(levels[0][0], rel=0.03)
+    assert levels[1][1] / levels[0][1] == pytest.approx(np.exp(-0.4 * 5.0 / 2.0), rel=0.1), "with 1 + K_f over K_i"
 
 
 def test_with_an_integral_a_hand_may_be_found_that_shakes_it():
@@ -200,15 +200,17 @@ def foretold(runs: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_limit_cycle_is_foretold():
-    said, goes_on = foretold(300, 3)
-    assert np.mean(said == goes_on) >= 0.99
-    assert np.all(said[said != goes_on]), "where they differ, counts of the encoder end what the closed form is wary of"
+    predicted, goes_on = foretold(300, 3)
+    assert np.mean(predicted == goes_on) >= 0.99
+    assert np.all(predicted[predicted != goes_on]), (
+        "where they differ, counts of the encoder end what the closed form is wary of"
+    )
 
 
 @pytest.mark.slow
 def test_the_limit_cycle_is_foretold_in_a_thousand_runs():
-    said, goes_on = foretold(1000, 4)
-    assert np.mean(said == goes_on) >= 0.99
+    predicted, goes_on = foretold(1000, 4)
+    assert np.mean(predicted == goes_on) >= 0.99
 
 
 def known_of(readings, noise, draw, n=4000):
@@ -234,10 +236,10 @@ def test_two_hundred_cables_move_by_themselves_as_often_as_was_accepted_and_ofte
     truth, scatter = 0.2 + 0.05 * draw.standard_normal(cables), draw.uniform(0.004, 0.02, cables)
     mounted = truth[:, None] + scatter[:, None] * draw.standard_normal((cables, 7))
     fed = []
-    for one in mounted:
-        drawn = known_of(one[:6] + noise * draw.standard_normal(6), noise, draw)
-        margins = [2 * torque * exponent[:, None] + F_M + 2 * B * DEAD_ZONE for exponent in drawn]
-        usual = [np.median(2 * torque * exponent) + F_M for exponent in drawn]
+    for mounting in mounted:
+        draws = known_of(mounting[:6] + noise * draw.standard_normal(6), noise, draw)
+        margins = [2 * torque * exponent[:, None] + F_M + 2 * B * DEAD_ZONE for exponent in draws]
+        usual = [np.median(2 * torque * exponent) + F_M for exponent in draws]
         fed.append([largest_safe_share(m, np.array([u]), risk) * u for m, u in zip(margins, usual, strict=True)])
     pushed = np.full((cables, 2), 2.0 * DEAD_ZONE)
     start = replace(Motion.at_rest(np.zeros((cables, 2))), motor_speed=pushed, joint_speed=pushed)

@@ -30,20 +30,20 @@ def refused(call):
 def test_quantities_are_read_in_si_units(tmp_path):
     device = read_device(written(tmp_path, 'friction = { value = 0.01, unit = "N*m", sd = 0.002 }',
                                  'friction = { value = 10, unit = "N*mm", sd = 2 }'))  # fmt: skip
-    found = device.needed("an answer", "motor.friction", "controller.sample_time", "controller.dead_zone", "motor.inertia")
-    assert astuple(found["motor.friction"])[:2] == pytest.approx((0.01, 0.002))
-    assert astuple(found["controller.sample_time"])[:2] == pytest.approx((1e-3, 2e-5))
-    assert found["controller.dead_zone"] == Known(0.8)
-    assert found["motor.inertia"].value == 7e-4
+    needed = device.needed("an answer", "motor.friction", "controller.sample_time", "controller.dead_zone", "motor.inertia")
+    assert astuple(needed["motor.friction"])[:2] == pytest.approx((0.01, 0.002))
+    assert astuple(needed["controller.sample_time"])[:2] == pytest.approx((1e-3, 2e-5))
+    assert needed["controller.dead_zone"] == Known(0.8)
+    assert needed["motor.inertia"].value == 7e-4
     assert device.count == pytest.approx(2 * 3.14159265 / 2000)
 
 
 def test_every_example_of_a_key_can_be_read(tmp_path):
     parts = {}
-    for key, known in KEYS.items():
+    for key, expected in KEYS.items():
         part, name = key.split(".")
-        parts.setdefault(part, []).append(f"{name} = {known.example}")
-    lines = [line for part, said in parts.items() for line in (f"[{part}]", *said)]
+        parts.setdefault(part, []).append(f"{name} = {expected.example}")
+    lines = [line for part, text in parts.items() for line in (f"[{part}]", *text)]
     path = tmp_path / "device.toml"
     path.write_text("\n".join(['name = "all of it"', *lines]) + "\n")
     assert read_device(path).known(*KEYS).keys() == KEYS.keys()

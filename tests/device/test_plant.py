@@ -54,9 +54,9 @@ def test_torques_stay_inside_the_loops_band_however_both_ends_move():
     turn = np.random.default_rng(2)
     angles = jnp.asarray(np.cumsum(turn.standard_normal((5000, 2)) * 0.01, axis=0))
 
-    def follow(node, at):
-        node = LOOP.settled_node(node, *at)
-        return node, jnp.stack(LOOP.torques(node, *at))
+    def follow(node, value):
+        node = LOOP.settled_node(node, *value)
+        return node, jnp.stack(LOOP.torques(node, *value))
 
     at_motor, at_joint = jax.lax.scan(follow, jnp.zeros(()), angles)[1].T
     low, high = loop_band(at_motor, LOOP.preload, LOOP.exponent)
@@ -75,15 +75,15 @@ angles = st.floats(-0.3, 0.3)
 @jax.jit
 def stored_by(cable, node, motor, joint):
     """Energy of a cable with its node where it settles and where it was."""
-    where = jnp.stack([cable.settled_node(node, motor, joint), node])
-    return jax.vmap(lambda at: cable.half_energy(motor - at) + cable.half_energy(at - joint))(where)
+    nodes = jnp.stack([cable.settled_node(node, motor, joint), node])
+    return jax.vmap(lambda value: cable.half_energy(motor - value) + cable.half_energy(value - joint))(nodes)
 
 
 @settings(max_examples=200, deadline=None)
 @given(angles, angles, angles, st.floats(0.0, 1.0), st.floats(0.0, 2.0))
 def test_the_node_never_gains_energy(node, motor, joint, preload, exponent):
-    settled, before = stored_by(loop(20.0, preload, exponent), *(jnp.asarray(at) for at in (node, motor, joint)))
-    assert settled <= before + 1e-12
+    settled, initial = stored_by(loop(20.0, preload, exponent), *(jnp.asarray(value) for value in (node, motor, joint)))
+    assert settled <= initial + 1e-12
 
 
 @partial(jax.jit, static_argnames=("seconds", "step"))
@@ -102,34 +102,34 @@ def released(plant, start, seconds, step):
 def test_a_device_that_is_let_go_never_gains_energy(motor, joint, motor_speed, joint_speed):
     start = Motion(*(jnp.asarray(v) for v in (motor, motor_speed, joint, joint_speed, 0.0)))
     plant = replace(PLANT, rope_damping=jnp.asarray(0.002), joint_damping=jnp.asarray(0.001))
-    before = mechanical_energy(plant, settle_node(plant, start))
+    initial = mechanical_energy(plant, settle_node(plant, start))
     after = released(plant, start, 0.5, 1e-4)[1]
     swing = 1e-4 * np.sqrt(20.0 * 2 * (1 / 7e-4 + 1 / 1e-3))  # a step's share of the fastest swing
-    assert float(jnp.max(after)) <= float(before) * (1 + swing) + 1e-12
-    assert float(after[-1]) <= float(before)
+    assert float(jnp.max(after)) <= float(initial) * (1 + swing) + 1e-12
+    assert float(after[-1]) <= float(initial)
 
 
 def test_a_mass_on_a_spring_with_dry_friction_loses_twice_f_over_k_a_half_swing():
     stiffness, mass, friction, step = 20.0, 1e-3, 0.05, 1e-5
 
     def one(state, _):
-        at, speed = state
-        speed = apply_dry_friction(speed - step * stiffness * at / mass, jnp.asarray(step * friction / mass))
-        return (at + step * speed, speed), (at + step * speed, speed)
+        position, speed = state
+        speed = apply_dry_friction(speed - step * stiffness * position / mass, jnp.asarray(step * friction / mass))
+        return (position + step * speed, speed), (position + step * speed, speed)
 
-    at, speed = jax.lax.scan(one, (jnp.asarray(0.1), jnp.asarray(0.0)), None, length=60_000)[1]
+    points, speed = jax.lax.scan(one, (jnp.asarray(0.1), jnp.asarray(0.0)), None, length=60_000)[1]
     turns = np.flatnonzero(np.asarray(speed[:-1]) * np.asarray(speed[1:]) < 0)
-    peaks = np.concatenate([[0.1], np.abs(np.asarray(at)[turns])])
+    peaks = np.concatenate([[0.1], np.abs(np.asarray(points)[turns])])
     np.testing.assert_allclose(-np.diff(peaks)[:15], 2 * friction / stiffness, rtol=1e-3)
-    assert abs(float(at[-1])) <= friction / stiffness, "it comes to rest where friction holds it"
+    assert abs(float(points[-1])) <= friction / stiffness, "it comes to rest where friction holds it"
 
 
 @pytest.mark.extended
 def test_halving_the_step_halves_the_error():
     start = replace(Motion.at_rest(jnp.zeros(())), joint=jnp.asarray(0.08))
     plant = replace(PLANT, rope_damping=jnp.asarray(0.005))
-    at = {n: float(released(plant, start, 0.02, 2e-4 / n)[0].joint[-1]) for n in (1, 2, 4, 64)}
-    error = [abs(at[n] - at[64]) for n in (1, 2, 4)]
+    value = {n: float(released(plant, start, 0.02, 2e-4 / n)[0].joint[-1]) for n in (1, 2, 4, 64)}
+    error = [abs(value[n] - value[64]) for n in (1, 2, 4)]
     assert 1.6 < error[0] / error[1] < 2.5
     assert 1.6 < error[1] / error[2] < 2.5
 

@@ -67,11 +67,11 @@ def here():
 
 
 def test_the_plant_moves_as_mujoco_says_and_otherwise_with_other_friction():
-    expected, found = in_mujoco(T_F), here()
-    assert np.max(np.abs(found[:, 2])) < 0.7 * (2 - T_F / 0.7), "taut, so that friction is a constant torque"
+    expected, computed = in_mujoco(T_F), here()
+    assert np.max(np.abs(computed[:, 2])) < 0.7 * (2 - T_F / 0.7), "taut, so that friction is a constant torque"
     size = np.ptp(expected, axis=0)
     assert np.all(size > [0.05, 0.02, 2 * T_F])
-    away = np.max(np.abs(found - expected), axis=0) / size
+    away = np.max(np.abs(computed - expected), axis=0) / size
     assert np.all(away < 0.02)
-    other = np.max(np.abs(in_mujoco(0.8 * T_F) - found), axis=0) / size
+    other = np.max(np.abs(in_mujoco(0.8 * T_F) - computed), axis=0) / size
     assert np.all(other > 2 * np.max(away)), "a fifth less friction shows"

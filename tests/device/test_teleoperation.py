@@ -46,9 +46,9 @@ def path(sample):
     """Two seconds to and fro in the open, then against the wall."""
     time = np.arange(round(4 / sample)) * sample
     turned = 2 * np.pi
-    at = np.where(time < 2, 0.15 * (np.cos(turned * time) - 1), np.clip(0.6 * (time - 2), 0, 0.6))
-    speed = np.where(time < 2, -0.15 * turned * np.sin(turned * time), np.where(at < 0.6, 0.6, 0.0))
-    return np.stack([at, speed], axis=1)
+    value = np.where(time < 2, 0.15 * (np.cos(turned * time) - 1), np.clip(0.6 * (time - 2), 0, 0.6))
+    speed = np.where(time < 2, -0.15 * turned * np.sin(turned * time), np.where(value < 0.6, 0.6, 0.0))
+    return np.stack([value, speed], axis=1)
 
 
 @lru_cache

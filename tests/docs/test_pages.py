@@ -66,12 +66,12 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         """Note what matters of a tag."""
-        said = dict(attrs)
-        self.names |= {name for name in (said.get("id"), said.get("name")) if name}
-        if tag == "a" and said.get("href"):
-            self.links.append(said["href"])
+        attributes = dict(attrs)
+        self.names |= {name for name in (attributes.get("id"), attributes.get("name")) if name}
+        if tag == "a" and attributes.get("href"):
+            self.links.append(attributes["href"])
         elif tag != "a":
-            self.parts += [said[name] for name in ("src", "href") if said.get(name)]
+            self.parts += [attributes[name] for name in ("src", "href") if attributes.get(name)]
         self.formulas += tag == "math"
 
 
@@ -93,15 +93,15 @@ def test_every_link_inside_the_documentation_leads_to_a_page_and_to_a_place_on_i
 
 
 def test_links_to_the_network_are_well_formed_and_lead_to_known_sites(pages):
-    found = {link for page in pages.values() for link in page.links if "://" in link}
-    for link in found:
+    links = {link for page in pages.values() for link in page.links if "://" in link}
+    for link in links:
         parts = urlsplit(link)
         assert parts.scheme == "https" and parts.port is None and not parts.username, link
         assert re.fullmatch(r"(/[\w.~-]*)*", parts.path) and parts.path[-1:] != "." and not parts.query, link
-    assert {link.rstrip("/") for link in found} == set(LINKS)
+    assert {link.rstrip("/") for link in links} == set(LINKS)
     for link, package in LINKS.items():
         named = metadata(package).get_all("Project-URL") if package else [f"address, {link}"]
-        assert link in {each.partition(", ")[2].rstrip("/") for each in named}, link
+        assert link in {item.partition(", ")[2].rstrip("/") for item in named}, link
 
 
 def test_no_page_needs_a_network(pages):

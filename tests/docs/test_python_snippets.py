@@ -121,13 +121,13 @@ def test_snippets_have_no_error_of_types_and_a_misspelt_keyword_is_one(tmp_path)
     settings = {"typeCheckingMode": "strict", "extraPaths": [str(ROOT)], "reportUnusedExpression": False}  # as notebooks have
     (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings), encoding="utf-8")
     command = [sys.executable, "-m", "basedpyright", "--outputjson", "--pythonpath", sys.executable, "-p", str(tmp_path)]
-    said = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)
-    assert said["summary"]["filesAnalyzed"] >= 2 + 3 + 2  # README and guides, notebooks, and the two that are wrong
-    errors = [each for each in said["generalDiagnostics"] if each["severity"] == "error"]
-    found = [(each["file"].rpartition("/")[2], each["message"]) for each in errors]
-    assert ("misspelt.py", 'No parameter named "sede"') in found
-    assert {file for file, _ in found} == {"misspelt.py", "no_such_name.py"}
-    assert [file for file, _ in found].count("misspelt.py") == 1
+    document = json.loads(subprocess.run(command, capture_output=True, text=True, check=False).stdout)
+    assert document["summary"]["filesAnalyzed"] >= 2 + 3 + 2  # README and guides, notebooks, and the two that are wrong
+    errors = [diagnostic for diagnostic in document["generalDiagnostics"] if diagnostic["severity"] == "error"]
+    complaints = [(error["file"].rpartition("/")[2], error["message"]) for error in errors]
+    assert ("misspelt.py", 'No parameter named "sede"') in complaints
+    assert {file for file, _ in complaints} == {"misspelt.py", "no_such_name.py"}
+    assert [file for file, _ in complaints].count("misspelt.py") == 1
 
 
 def test_a_misspelt_keyword_is_refused_by_name_with_the_nearest():
@@ -142,8 +142,8 @@ def test_help_shows_every_keyword_by_name_and_none_of_its_options():
     functions = {name: getattr(bowdenfit, name) for name in bowdenfit.__all__ if inspect.isroutine(getattr(bowdenfit, name))}
     assert set(functions) >= {"fit", "read", "check", "predict", "calibrate"}
     for name, function in functions.items():
-        said = pydoc.plain(pydoc.render_doc(function))
-        assert "Parameter(" not in said and "Reader(" not in said and "Annotated" not in said and "**reading" not in said, name
+        text = pydoc.plain(pydoc.render_doc(function))
+        assert "Parameter(" not in text and "Reader(" not in text and "Annotated" not in text and "**reading" not in text, name
     for name in ("fit", "read", "check", "identify", "calibrate"):
         assert set(Reading.__annotations__) < set(inspect.signature(functions[name]).parameters)
     assert "seed: int | None = None" in pydoc.plain(pydoc.render_doc(bowdenfit.fit))

@@ -95,16 +95,16 @@ def stands_in_for(words):
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     named = [word for word in words if word.startswith(("./scripts", "scripts/"))]
     assert all((ROOT / name).exists() for name in named), words
-    asked = [word.partition("[")[2].rstrip("]") for word in words if "[" in word]
-    assert all(extra in extras for extra in asked), words
+    request = [word.partition("[")[2].rstrip("]") for word in words if "[" in word]
+    assert all(extra in extras for extra in request), words
     assert named or words[:2] == ("pip", "install"), f"say what the tests should do with {words}"
 
 
 def tried(words, run):
     """Run a command where that is quick, else read what it would work on."""
     verb, (arguments, options) = words[1], understood(words)
-    named = [one for each in arguments for one in (each if isinstance(each, list) else [each])]
-    paths = [one for one in named if isinstance(one, Path)]
+    named = [word for argument in arguments for word in (argument if isinstance(argument, list) else [argument])]
+    paths = [name for name in named if isinstance(name, Path)]
     if verb == "init":
         shutil.rmtree(next(iter(paths or options["example"])), ignore_errors=True)
     elif not all(path.exists() for path in paths):
@@ -143,16 +143,16 @@ def test_a_published_fit_has_no_draws_so_that_its_texts_are_for_reading_alone(ru
 
 @pytest.mark.parametrize("block", TOML, ids=str)
 def test_every_description_is_understood(block, tmp_path):
-    said = tomllib.loads(block.text)
+    document = tomllib.loads(block.text)
     if block.text.startswith("# truths.toml"):
         (tmp_path / "truths.toml").write_text(block.text, encoding="utf-8")
-        assert read_truths(tmp_path / "truths.toml") == said
-    elif "persons" in said:
+        assert read_truths(tmp_path / "truths.toml") == document
+    elif "persons" in document:
         (tmp_path / "metabolic.toml").write_text(block.text, encoding="utf-8")
-        assert read_study(tmp_path)[0].persons == said["persons"]
+        assert read_study(tmp_path)[0].persons == document["persons"]
     else:
-        tables = {} if "tables" in said else {"tables": TABLES}
-        assert parse_description({**CABLE, **tables, **said}).to_json()
+        tables = {} if "tables" in document else {"tables": TABLES}
+        assert parse_description({**CABLE, **tables, **document}).to_json()
 
 
 @pytest.mark.parametrize("block", C, ids=str)
@@ -177,7 +177,7 @@ def test_everything_in_matlab_runs_in_octave(block, reader, tmp_path):
 
 
 @pytest.fixture
-def others():
+def run_other_command():
     """Programs that run beside the reader's commands, as those behind which an & stands; they end with the test."""
     started = []
 
@@ -186,20 +186,20 @@ def others():
         time.sleep(2)  # so that one that the next needs is there
 
     yield start
-    for each in reversed(started):
-        each.terminate()
-        each.wait(60)
+    for process in reversed(started):
+        process.terminate()
+        process.wait(60)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_command_of_a_page_runs_one_after_the_other(page, place, others, tmp_path, monkeypatch, run):
+def test_every_command_of_a_page_runs_one_after_the_other(page, place, run_other_command, tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(place, tmp_path, dirs_exist_ok=True)
     for block in blocks("sh", "console", pages=(page,)):
         for words in block.commands:
             if words[-1] == "&":
-                others(words)
+                run_other_command(words)
             if words[0] != "bowdenfit" or len(words) < 2 or words[1].startswith("-"):
                 continue
             if words[1] == "init":

@@ -99,15 +99,15 @@ def test_usual_habits_do_not_need_the_slow_way(habit, tmp_path, as_if_long):
 @pytest.fixture
 def both_ways(monkeypatch):
     """Read all but the last lines both as those of short files and as those of long ones, and return what each gave."""
-    found, few = [], csv_recording._read_short
+    results, few = [], csv_recording._read_short
 
     def watched(*arguments):
-        found.append((few(*arguments), csv_recording._read_long(*arguments)))
-        return found[-1][0]
+        results.append((few(*arguments), csv_recording._read_long(*arguments)))
+        return results[-1][0]
 
     monkeypatch.setattr(csv_recording, "_LAST_BYTES", 30)
     monkeypatch.setattr(csv_recording, "_read_short", watched)
-    return found
+    return results
 
 
 def check_alike(few, long):
@@ -283,7 +283,7 @@ def test_a_line_that_breaks_off_is_left_out_with_a_remark(cut, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("data", "what"),
+    ("data", "case"),
     [
         (b"", "is empty"),
         (b"\x89HDF\r\n\x1a\n\x00\x00\x00", "not a text file"),
@@ -293,8 +293,8 @@ def test_a_line_that_breaks_off_is_left_out_with_a_remark(cut, tmp_path):
         (b"time,force\n0.1", "breaks off|no rows|no column|empty"),
     ],
 )
-def test_files_without_numbers_are_refused(data, what, tmp_path):
-    with pytest.raises(DatasetError, match=what):
+def test_files_without_numbers_are_refused(data, case, tmp_path):
+    with pytest.raises(DatasetError, match=case):
         read_text(tmp_path, data)
 
 

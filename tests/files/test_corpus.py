@@ -33,9 +33,9 @@ def test_a_file_is_said_to_be_what_it_is_and_its_command_reads_it(run, monkeypat
     monkeypatch.chdir(CORPUS)
     truth = UNDERSTOOD[name]
     code, out, _ = run("check", name)
-    said = " ".join(out.split())
-    assert code == (2 if "cannot be" in said else 0)
-    assert said.startswith(f"{name}: {truth.get('says', 'a ' + truth['kind'])}"), said
+    text = " ".join(out.split())
+    assert code == (2 if "cannot be" in text else 0)
+    assert text.startswith(f"{name}: {truth.get('says', 'a ' + truth['kind'])}"), text
     (table,) = bf.read(Path(name), **command_of(out)[1]).measurements.tables
     if isinstance(table, EfficiencyTable):
         assert [table.efficiency[0], table.efficiency[-1]] == pytest.approx([*truth["first"], *truth["last"]], rel=ANY_DIGITS)
@@ -57,7 +57,7 @@ def test_every_row_of_a_file_is_read_or_named_with_its_reason(name):
     assert len(account.beside) == truth.get("beside", 0)
     if "headings" in truth:
         assert list(account.headings) == truth["headings"]
-        assert {each.why: each.count for each in account.left_out} == truth["unused"]
+        assert {item.why: item.count for item in account.left_out} == truth["unused"]
 
 
 @pytest.mark.parametrize("name", [n if n in FITTED else pytest.param(n, marks=pytest.mark.slow) for n in UNDERSTOOD])
@@ -66,8 +66,8 @@ def test_the_command_that_check_prints_fits_a_file(run, monkeypatch, tmp_path, n
     words, _ = command_of(run("check", name)[1])
     code, _, err = run(*words, "--no-mcmc", "--no-figures", "--seed", 1, "--output", tmp_path / "fit")
     assert code in (0, 3), err
-    found = bf.load(tmp_path / "fit").least_squares.estimates["mu"]
-    assert found.value == pytest.approx(UNDERSTOOD[name]["mu"], rel=0.03)
+    estimate = bf.load(tmp_path / "fit").least_squares.estimates["mu"]
+    assert estimate.value == pytest.approx(UNDERSTOOD[name]["mu"], rel=0.03)
 
 
 def rows_of(path):
@@ -86,7 +86,7 @@ def command_of(text):
     for option, value in zip(words[2::2], words[3::2], strict=True):
         named.setdefault(option, []).append(value)
     keywords = {"--column": "columns", "--channel": "channels", "--wrap-angle": "wrap_angle"}
-    given = {keywords[option]: values for option, values in named.items()}
-    if "wrap_angle" in given:
-        given["wrap_angle"] = (float(given["wrap_angle"][0].removesuffix("deg")), "deg")
-    return words, given
+    options = {keywords[option]: values for option, values in named.items()}
+    if "wrap_angle" in options:
+        options["wrap_angle"] = (float(options["wrap_angle"][0].removesuffix("deg")), "deg")
+    return words, options

@@ -34,21 +34,21 @@ def both(folder, data):
     ("separator", "decimal"), [(",", "."), *((separator, decimal) for separator in ";\t|" for decimal in ".,")]
 )
 def test_tables_and_recordings_share_separators_and_decimal_marks(tmp_path, separator, decimal):
-    for found in both(tmp_path, text_of(separator, decimal).encode()):
-        np.testing.assert_array_equal(found, ROWS)
+    for computed in both(tmp_path, text_of(separator, decimal).encode()):
+        np.testing.assert_array_equal(computed, ROWS)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_tables_and_recordings_share_encodings_and_ends_of_lines(tmp_path, encoding, end):
     text = f"# Prüfstand{end}sep=;{end}" + text_of(";", ",", end=end)
-    for found in both(tmp_path, text.encode(encoding)):
-        np.testing.assert_array_equal(found, ROWS)
+    for computed in both(tmp_path, text.encode(encoding)):
+        np.testing.assert_array_equal(computed, ROWS)
 
 
 def test_a_typographers_minus_is_a_minus_in_both(tmp_path):
-    for found in both(tmp_path, text_of(";", ",", minus="\u2212").encode()):
-        np.testing.assert_array_equal(found, ROWS)
+    for computed in both(tmp_path, text_of(";", ",", minus="\u2212").encode()):
+        np.testing.assert_array_equal(computed, ROWS)
 
 
 @pytest.mark.parametrize("mark", ["n/a", "nan", "#N/A", "---", "overflow", "∞"])

@@ -28,8 +28,8 @@ def table(name):
 
 def test_readings_are_those_of_a_folder():
     data, same = on_body().read(angles=table("angles"), efficiencies=table("efficiencies")), bf.read(ON_BODY)
-    for one, other in zip(data.measurements.tables, same.measurements.tables, strict=True):
-        pd.testing.assert_frame_equal(one.to_frame(), other.to_frame())
+    for first, other in zip(data.measurements.tables, same.measurements.tables, strict=True):
+        pd.testing.assert_frame_equal(first.to_frame(), other.to_frame())
     assert data.description.contact == same.description.contact
 
 

@@ -30,11 +30,11 @@ START = 1_700_000_000 * 10**9
 
 
 def channel(file: ChannelFile, name: str) -> Channel:
-    return next(each for each in file.channels if each.name == name)
+    return next(item for item in file.channels if item.name == name)
 
 
 def names(file: ChannelFile) -> list[str]:
-    return [each.name for each in file.channels]
+    return [item.name for item in file.channels]
 
 
 def refusal(path: Path, read: Callable[[Path], object] = read_channels) -> str:
@@ -43,11 +43,11 @@ def refusal(path: Path, read: Callable[[Path], object] = read_channels) -> str:
     return str(caught.value)
 
 
-def assert_same(found: Channel, values: np.ndarray, time: np.ndarray, unit: str = "") -> None:
-    assert found.values.dtype == np.float64 and found.unit == unit
-    np.testing.assert_array_equal(found.values, values)
-    assert found.time is not None
-    np.testing.assert_array_equal(found.time, time)
+def assert_same(computed: Channel, values: np.ndarray, time: np.ndarray, unit: str = "") -> None:
+    assert computed.values.dtype == np.float64 and computed.unit == unit
+    np.testing.assert_array_equal(computed.values, values)
+    assert computed.time is not None
+    np.testing.assert_array_equal(computed.time, time)
 
 
 def write_mat(path: Path) -> None:
@@ -289,10 +289,10 @@ def test_a_tdms_file_cut_off_keeps_its_whole_samples_and_says_so(
     content = (tmp_path / "a.tdms").read_bytes()
     (tmp_path / "a.tdms").write_bytes(content[: int(share * len(content))])
     file = read_channels(tmp_path / "a.tdms")
-    kept = len(file.channels[0].values)
-    assert 0.7 * share * 2000 < kept < 2000 and "cut off" in file.remarks[0] and str(kept) in file.remarks[0]
-    np.testing.assert_array_equal(channel(file, "bench/F_in").values, FORCE_IN[:kept])
-    np.testing.assert_array_equal(channel(file, "bench/F_out").values, FORCE_OUT[:kept])
+    count = len(file.channels[0].values)
+    assert 0.7 * share * 2000 < count < 2000 and "cut off" in file.remarks[0] and str(count) in file.remarks[0]
+    np.testing.assert_array_equal(channel(file, "bench/F_in").values, FORCE_IN[:count])
+    np.testing.assert_array_equal(channel(file, "bench/F_out").values, FORCE_OUT[:count])
     assert capfd.readouterr().err == ""
 
 
@@ -346,8 +346,8 @@ def test_a_file_cut_off_is_refused_in_one_sentence(tmp_path: Path, name: str, sh
     WRITERS[name](tmp_path / name)
     content = (tmp_path / name).read_bytes()
     (tmp_path / name).write_bytes(content[: int(share * len(content))])
-    said = refusal(tmp_path / name)
-    assert said.startswith(f"{name} is cut off or damaged (") and said.endswith("from the acquisition computer.")
+    message = refusal(tmp_path / name)
+    assert message.startswith(f"{name} is cut off or damaged (") and message.endswith("from the acquisition computer.")
 
 
 def test_a_bag_folder_with_a_cut_file_is_refused(tmp_path: Path) -> None:

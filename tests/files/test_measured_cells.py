@@ -65,7 +65,7 @@ def test_a_column_of_units_alone_is_a_table(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("rows", "what"),
+    ("rows", "case"),
     [
         (("input_force_N,output_force_N", "20 N,3.2 lbf", "40 N,6.4 lbf"), "'3.2 lbf' is in .* than its column, which is in N"),
         (("input_force_N,output_force", "20,15 N", "40,6.4 lbf"), "row 3, .*'6.4 lbf' is in another unit than its column"),
@@ -74,8 +74,8 @@ def test_a_column_of_units_alone_is_a_table(tmp_path):
         (("input_force_N,output_force_N", "20,15 mm", "40,31 mm"), "'15 mm' is in another unit"),
     ],
 )
-def test_cells_that_contradict_their_column_are_refused(tmp_path, rows, what):
-    with pytest.raises(bf.DatasetError, match=what):
+def test_cells_that_contradict_their_column_are_refused(tmp_path, rows, case):
+    with pytest.raises(bf.DatasetError, match=case):
         forces(write(tmp_path, *rows), wrap_angle="180deg")
 
 

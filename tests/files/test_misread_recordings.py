@@ -75,7 +75,7 @@ def clock_recording(tmp_path, times, heading="time", forces="input_force_N,outpu
     """A file of three strokes with these times."""
     force = 30 + 20 * np.sin(np.linspace(0, 6 * np.pi, len(times)))
     output = np.where(np.gradient(force) > 0, 0.7, 1.4) * force
-    rows = [f"{time},{one:.3f},{other:.3f}" for time, one, other in zip(times, force, output, strict=True)]
+    rows = [f"{time},{first:.3f},{other:.3f}" for time, first, other in zip(times, force, output, strict=True)]
     (tmp_path / "log.csv").write_text("\n".join([f"{heading},{forces}", *rows]) + "\n", encoding="utf-8")
     return tmp_path / "log.csv"
 

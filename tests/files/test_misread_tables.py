@@ -94,14 +94,14 @@ def measured_rows():
     return [f"{a},{load + next(noise):.3f},{load * np.exp(-0.002 * a) + next(noise):.3f}" for a, load in settings]
 
 
-@pytest.mark.parametrize(("copied", "where"), [(slice(0, 16), "rows 18 to 33"), (slice(4, 12), "rows 18 to 25")])
-def test_rows_that_were_pasted_again_are_called_copies(tmp_path, run, copied, where):
+@pytest.mark.parametrize(("copied", "location"), [(slice(0, 16), "rows 18 to 33"), (slice(4, 12), "rows 18 to 25")])
+def test_rows_that_were_pasted_again_are_called_copies(tmp_path, run, copied, location):
     rows = measured_rows()
     text = "wrap_angle_deg,input_force_N,output_force_N\n" + "\n".join([*rows, *rows[copied]])
     (tmp_path / "t.csv").write_text(text + "\n")
     _, out, _ = run("check", tmp_path / "t.csv")
     first = f"rows {copied.start + 2} to {copied.stop + 1}"
-    assert f"{where} of t.csv are copies of {first}" in " ".join(out.split()).replace("Rows", "rows")
+    assert f"{location} of t.csv are copies of {first}" in " ".join(out.split()).replace("Rows", "rows")
 
 
 def test_equal_readings_of_a_converter_with_coarse_steps_are_no_copies(tmp_path):
@@ -263,7 +263,7 @@ def test_losses_and_ratios_are_read_as_efficiencies(tmp_path, heading, cells):
 
 
 @pytest.mark.parametrize(
-    ("text", "what"),
+    ("text", "case"),
     [
         ("wrap_angle_deg,loss\n90,20\n180,35\n", "if it is in percent, name the column loss_percent"),
         ("wrap_angle_deg,Loss (N)\n90,2\n180,3\n", "'N' does not measure a ratio"),
@@ -271,8 +271,8 @@ def test_losses_and_ratios_are_read_as_efficiencies(tmp_path, heading, cells):
         ("stroke,wrap_angle_deg,efficiency\npull,90,0.8\nreturn,90,0.81\n", "'return' is not pulling"),
     ],
 )
-def test_efficiencies_that_would_be_misread_are_refused(tmp_path, text, what):
-    with pytest.raises(bf.DatasetError, match=what):
+def test_efficiencies_that_would_be_misread_are_refused(tmp_path, text, case):
+    with pytest.raises(bf.DatasetError, match=case):
         efficiencies(tmp_path, text)
 
 

@@ -70,9 +70,11 @@ def test_a_code_that_no_cell_holds_is_said(tmp_path):
     assert "t.csv: no cell of a number that is read holds the stated missing-value code '-77'." in remarks
 
 
-@pytest.mark.parametrize(("codes", "why"), [(["45", "90"], "every row holds a stated missing-value code"), ([None], "a list")])
-def test_a_code_that_every_row_holds_is_refused(tmp_path, codes, why):
-    with pytest.raises(bf.BowdenfitError, match=why):
+@pytest.mark.parametrize(
+    ("codes", "reason"), [(["45", "90"], "every row holds a stated missing-value code"), ([None], "a list")]
+)
+def test_a_code_that_every_row_holds_is_refused(tmp_path, codes, reason):
+    with pytest.raises(bf.BowdenfitError, match=reason):
         read(tmp_path, missing=codes)
 
 

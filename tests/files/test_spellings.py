@@ -99,30 +99,32 @@ def test_coefficients_do_not_depend_on_the_spelling(tmp_path):
         bf.fit(write(tmp_path, SPELLINGS[i], name=f"{i}.csv"), wrap_angle=(180, "deg"), mcmc=False, seed=1)
         for i in (0, 12, 20, 33)
     ]
-    first, *others = [fit.least_squares.estimates["mu"].value for fit in fits]
-    assert others == [first] * 3
+    first, *remaining = [fit.least_squares.estimates["mu"].value for fit in fits]
+    assert remaining == [first] * 3
 
 
 def test_what_only_a_pair_says_is_remarked_on_with_the_options_that_turn_it_round(tmp_path):
     path = write(tmp_path, ("T1 (N)", "T2 (N)"))
-    (said,) = [each for each in bf.read(path, wrap_angle=(180, "deg")).measurements.remarks if "'T1 (N)' is taken" in each]
-    assert said.endswith("--column input_force='T2 (N)' --column output_force='T1 (N)'.")
+    (message,) = [
+        remark for remark in bf.read(path, wrap_angle=(180, "deg")).measurements.remarks if "'T1 (N)' is taken" in remark
+    ]
+    assert message.endswith("--column input_force='T2 (N)' --column output_force='T1 (N)'.")
     turned = write(tmp_path, ("T1 (N)", "T2 (N)"), FORCE_OUT, FORCE_IN, name="turned.csv")
-    found, _ = forces(turned, columns=["input_force=T2 (N)", "output_force=T1 (N)"])
-    np.testing.assert_array_equal(found, FORCE_IN)
+    computed, _ = forces(turned, columns=["input_force=T2 (N)", "output_force=T1 (N)"])
+    np.testing.assert_array_equal(computed, FORCE_IN)
 
 
 @pytest.mark.parametrize("unit", ["kN", "lbf", "mN"])
 def test_the_unit_of_another_spelling_counts(tmp_path, unit):
     factor = {"kN": 1e3, "lbf": 4.4482216152605, "mN": 1e-3}[unit]
-    found, _ = forces(write(tmp_path, (f"Kraft Eingang [{unit}]", f"Kraft Ausgang ({unit})")))
-    np.testing.assert_allclose(found, FORCE_IN * factor, rtol=1e-12)
+    computed, _ = forces(write(tmp_path, (f"Kraft Eingang [{unit}]", f"Kraft Ausgang ({unit})")))
+    np.testing.assert_allclose(computed, FORCE_IN * factor, rtol=1e-12)
 
 
 @pytest.mark.parametrize("heading", NOT_FORCES)
 def test_what_does_not_say_an_end_of_the_cable_is_taken_for_no_force_of_one(heading):
-    said = parse_heading(heading)
-    assert said is None or said.pair == "said" or "force" not in said.quantity
+    heading_parts = parse_heading(heading)
+    assert heading_parts is None or heading_parts.pair == "said" or "force" not in heading_parts.quantity
 
 
 @pytest.mark.parametrize("headings", [("T1 (N)", "Force (N)"), ("T1 (N)", "F_out (N)"), ("load (N)", "hold (N)")])
@@ -152,14 +154,14 @@ def test_a_unit_that_no_heading_says_is_given_behind_a_colon_and_never_guessed(t
     path = write(tmp_path, ("F_in", "F_out"))
     with pytest.raises(DatasetError, match=r"'F_in' does not state its unit.*--column input_force=F_in:N"):
         forces(path)
-    found, _ = forces(path, columns=["input_force=F_in:kN", "output_force=F_out:kN"])
-    np.testing.assert_array_equal(found, FORCE_IN * 1000)
+    computed, _ = forces(path, columns=["input_force=F_in:kN", "output_force=F_out:kN"])
+    np.testing.assert_array_equal(computed, FORCE_IN * 1000)
 
 
 def test_a_column_may_have_a_colon_in_its_heading(tmp_path):
     path = write(tmp_path, ("cell 1: N", "cell 2: N"))
-    found, _ = forces(path, columns=["input_force=cell 1: N:N", "output_force=cell 2: N:N"])
-    np.testing.assert_array_equal(found, FORCE_IN)
+    computed, _ = forces(path, columns=["input_force=cell 1: N:N", "output_force=cell 2: N:N"])
+    np.testing.assert_array_equal(computed, FORCE_IN)
 
 
 def test_of_several_tables_the_one_must_be_named(on_body):
@@ -184,8 +186,8 @@ def test_a_column_that_cannot_be_is_refused_in_a_sentence(tmp_path, text, says):
 
 
 def test_no_word_says_two_things():
-    words = [word for said in spellings._WORDS.values() for word in said.split()]
-    names = [name for said in spellings._NAMES.values() for name in said.split("|")]
+    words = [word for sentence in spellings._WORDS.values() for word in sentence.split()]
+    names = [name for sentence in spellings._NAMES.values() for name in sentence.split("|")]
     assert len(words) == len(set(words))
     assert len(names) == len(set(names))
     assert not {*names} & {*spellings._GUESSES}

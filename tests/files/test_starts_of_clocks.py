@@ -16,7 +16,7 @@ def start(path):
 
 
 def csv(path, clock, heading):
-    path.write_text("\n".join([f"{heading},input_force_N", *(f"{at},{20 + i}" for i, at in enumerate(clock))]) + "\n")
+    path.write_text("\n".join([f"{heading},input_force_N", *(f"{time},{20 + i}" for i, time in enumerate(clock))]) + "\n")
     return path
 
 

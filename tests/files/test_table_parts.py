@@ -25,7 +25,7 @@ def numbers(table, columns=2):
 
 
 def reasons(table):
-    return {each.why: each.ranges for each in table.account.left_out}
+    return {item.why: item.ranges for item in table.account.left_out}
 
 
 CLEAN = [[20.5, 15.25], [40.25, 30.5], [61.0, 45.25], [80.5, 61.0]]
@@ -65,7 +65,7 @@ def test_a_table_is_read_whatever_stands_around_it_and_every_row_is_accounted_fo
     lines, left_out = WHOLE[case]
     table = read(tmp_path, lines, end)
     assert numbers(table) == CLEAN
-    assert {why: rows for why, rows in reasons(table).items() if why != "blank"} == left_out
+    assert {reason: rows for reason, rows in reasons(table).items() if reason != "blank"} == left_out
 
 
 def test_what_is_not_used_is_said_with_its_rows_and_its_words(tmp_path):
@@ -92,10 +92,10 @@ def test_units_in_a_row_of_their_own_and_two_rows_of_headings_are_joined(tmp_pat
 )
 def test_a_bad_cell_in_the_body_is_named_and_never_becomes_a_heading(tmp_path, row, column, value):
     lines = [*TABLE[: row - 1], value, *TABLE[row:]]
-    with pytest.raises(DatasetError) as said:
+    with pytest.raises(DatasetError) as error:
         numbers(read(tmp_path, lines))
     wrong = next(cell for cell in value.split(";") if not cell.replace(".", "").isdigit())
-    assert str(said.value).startswith(f"table.csv, row {row}, column '{column}': '{wrong}' is not a number")
+    assert str(error.value).startswith(f"table.csv, row {row}, column '{column}': '{wrong}' is not a number")
 
 
 def test_a_row_of_words_among_readings_is_named_as_one_without_numbers(tmp_path):
@@ -166,10 +166,10 @@ def test_a_recording_is_read_whatever_stands_around_it_and_every_row_is_accounte
     lines, left_out = AROUND[case]
     (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     file = read_channels(tmp_path / "run.csv")
-    found = [(channel.name, channel.unit, len(channel.values)) for channel in file.channels]
-    assert found == [("Time", "s", 30), ("F_in", "N", 30), ("F_out", "N", 30)]
+    channels = [(channel.name, channel.unit, len(channel.values)) for channel in file.channels]
+    assert channels == [("Time", "s", 30), ("F_in", "N", 30), ("F_out", "N", 30)]
     assert file.account.rows == file.account.accounted == len(lines)
-    assert [each.why for each in file.account.left_out] == left_out
+    assert [item.why for item in file.account.left_out] == left_out
 
 
 def test_long_recordings_with_blank_rows_are_accounted_for(tmp_path):

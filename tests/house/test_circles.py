@@ -12,7 +12,7 @@ def modules() -> dict[str, Path]:
     return {".".join(p.parts).removesuffix(".__init__"): path for p, path in paths.items()}
 
 
-def imported(path: Path, known: dict[str, Path]) -> set[str]:
+def imported(path: Path, modules_by_name: dict[str, Path]) -> set[str]:
     """Names of the package's files that a file imports, anywhere in it."""
     result: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -21,8 +21,8 @@ def imported(path: Path, known: dict[str, Path]) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path} imports by a relative name"
             # A name may be a file of its own; otherwise it is something inside the file.
-            result |= {name if (name := f"{node.module}.{a.name}") in known else str(node.module) for a in node.names}
-    return result & set(known)
+            result |= {name if (name := f"{node.module}.{a.name}") in modules_by_name else str(node.module) for a in node.names}
+    return result & set(modules_by_name)
 
 
 def circles(arrows: dict[str, set[str]]) -> list[set[str]]:
@@ -50,6 +50,6 @@ def test_circles_are_found():
 
 
 def test_no_files_import_each_other():
-    known = modules()
-    arrows = {name: imported(path, known) for name, path in known.items()}
+    modules_by_name = modules()
+    arrows = {name: imported(path, modules_by_name) for name, path in modules_by_name.items()}
     assert [sorted(group) for group in circles(arrows)] == []

@@ -94,8 +94,8 @@ def test_importing_changes_no_global_setting():
 def _law(name: str) -> tuple[ContactLaw, dict[str, jax.Array]]:
     """A law of a contact, with values of its coefficient and of its own parameters."""
     law = load_class(CONTACT_LAWS[name])("free sheath", "mu")
-    own = {p.name: p.prior.constrain(jnp.array(0.4)) for p in law.parameters(DEFAULTS)}
-    return law, {"mu": jnp.array(0.12), **own}
+    own_values = {p.name: p.prior.constrain(jnp.array(0.4)) for p in law.parameters(DEFAULTS)}
+    return law, {"mu": jnp.array(0.12), **own_values}
 
 
 @pytest.mark.parametrize("name", CONTACT_LAWS)
@@ -113,9 +113,9 @@ def test_the_capstan_equation_loses_nothing_without_wrap():
 @pytest.mark.parametrize("name", CONTACT_LAWS)
 def test_the_slope_of_a_contact_law_is_its_derivative(name):
     law, values = _law(name)
-    at, step = jnp.array([0.1, 1.0, 4.0]), 1e-5
-    difference = (law.exponent(values, at + step) - law.exponent(values, at - step)) / (2 * step)
-    np.testing.assert_allclose(law.slope(values, at), difference, rtol=1e-9)
+    points, step = jnp.array([0.1, 1.0, 4.0]), 1e-5
+    difference = (law.exponent(values, points + step) - law.exponent(values, points - step)) / (2 * step)
+    np.testing.assert_allclose(law.slope(values, points), difference, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", CONTACT_LAWS)

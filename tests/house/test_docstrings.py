@@ -12,8 +12,8 @@ _ENTRY = re.compile(r" {4}(?P<names>\*{0,2}\w+(?:, \w+)*): ")
 
 def documented(docstring: str) -> set[str]:
     """Names under `Args:` in a docstring."""
-    _, found, below = docstring.partition("Args:\n")
-    block = re.split(r"\n(?=\S)", below)[0] if found else ""
+    _, computed, below = docstring.partition("Args:\n")
+    block = re.split(r"\n(?=\S)", below)[0] if computed else ""
     entries = (_ENTRY.match(line) for line in block.splitlines())
     return {name.strip(" *") for entry in entries if entry for name in entry["names"].split(",")}
 

@@ -108,7 +108,7 @@ def test_a_new_curve_family_is_a_class_and_a_line(monkeypatch, tmp_path):
     length = np.linspace(400.0, 500.0, 11)
     angle = 120.0 * ((length - 400.0) / 100.0) ** 2 + np.random.default_rng(3).standard_normal(11)
     (tmp_path / "cable.toml").write_text(ROUTED)
-    rows = [f"{at:g},{reading:.3f}" for at, reading in zip(length, np.abs(angle), strict=True)]
+    rows = [f"{value:g},{reading:.3f}" for value, reading in zip(length, np.abs(angle), strict=True)]
     (tmp_path / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *rows]))
     fit = bf.fit(tmp_path, mcmc=False)
     estimate = fit.least_squares.estimates["sheath_angle_end"]
@@ -131,9 +131,9 @@ def test_a_new_file_format_is_a_module_and_a_line(monkeypatch, tmp_path):
     heads, *rows = source.read_text().splitlines()
     units = {"time_s": "time:s", "input_force_N": "input_force:N", "output_force_N": "output_force:N"}
     path = tmp_path / "pull.bars"
-    kept = [i for i, head in enumerate(heads.split(",")) if head in units]
+    indices = [i for i, head in enumerate(heads.split(",")) if head in units]
     lines = [[units[head] for head in heads.split(",") if head in units]]
-    lines += [[row.split(",")[i] or "nan" for i in kept] for row in rows]
+    lines += [[row.split(",")[i] or "nan" for i in indices] for row in rows]
     path.write_text("\n".join("|".join(line) for line in lines))
     fit = partial(bf.fit, wrap_angle=(180.0, "deg"), mcmc=False)
     assert fit(path).least_squares.estimates["mu"].value == pytest.approx(

@@ -21,12 +21,14 @@ def test_the_conda_recipe_asks_for_what_the_project_does():
     assert (recipe["package"]["name"], recipe["package"]["version"]) == (PROJECT["name"], PROJECT["version"])
     assert recipe["build"]["entry_points"] == [f"{name} = {target}" for name, target in PROJECT["scripts"].items()]
     assert (recipe["about"]["license"], recipe["source"]["path"]) == (PROJECT["license"], "../../..")
-    stated = dict(line.partition(" ")[::2] for line in recipe["requirements"]["run"])
-    assert stated.pop("python") == PROJECT["requires-python"]
-    assert {stated.pop(name) for name in OF_EXTRAS} == {""}
+    stated_value = dict(line.partition(" ")[::2] for line in recipe["requirements"]["run"])
+    assert stated_value.pop("python") == PROJECT["requires-python"]
+    assert {stated_value.pop(name) for name in OF_EXTRAS} == {""}
     wanted = [Requirement(text) for text in PROJECT["dependencies"]]
-    names = [canonicalize_name(one.name) for one in wanted]
-    assert stated == {OF_CONDA.get(name, name): str(one.specifier) for name, one in zip(names, wanted, strict=True)}
+    names = [canonicalize_name(requirement.name) for requirement in wanted]
+    assert stated_value == {
+        OF_CONDA.get(name, name): str(requirement.specifier) for name, requirement in zip(names, wanted, strict=True)
+    }
 
 
 def test_the_image_copies_what_is_there_and_runs_without_root():

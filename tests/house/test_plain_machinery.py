@@ -20,13 +20,13 @@ TRICKS = {
 }
 
 
-@pytest.mark.parametrize("what", TRICKS)
-def test_no_file_of_the_package(what):
+@pytest.mark.parametrize("case", TRICKS)
+def test_no_file_of_the_package(case):
     lines = [
         f"{path.relative_to(PACKAGE)}:{number}: {line.strip()}"
         for path in sorted(PACKAGE.rglob("*.py"))
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
-        if re.search(TRICKS[what], line)
+        if re.search(TRICKS[case], line)
     ]
     assert lines == []
 

@@ -175,12 +175,12 @@ def reachable(value: Any, name: str, seen: dict[int, Any]) -> Iterator[tuple[str
 def look_inside(value: Any, name: str) -> int:
     """Asserts that all that can be reached from there is short in a notebook; how much that is."""
     seen: dict[int, Any] = {}
-    for where, item in reachable(value, name, seen):
+    for location, item in reachable(value, name, seen):
         ours = type(item).__module__.startswith("bowdenfit")
-        assert len(pretty(item)) <= MOST_IN_A_NOTEBOOK, f"{where}: {pretty(item)[:300]}"
-        assert not ours or len(repr(item).splitlines()) <= MOST_LINES, f"{where}: {item!r}"
+        assert len(pretty(item)) <= MOST_IN_A_NOTEBOOK, f"{location}: {pretty(item)[:300]}"
+        assert not ours or len(repr(item).splitlines()) <= MOST_LINES, f"{location}: {item!r}"
         if isinstance(item, Display):
-            assert item._repr_html_() and (where.endswith("elastic") or "units" in item.to_frame().attrs), where
+            assert item._repr_html_() and (location.endswith("elastic") or "units" in item.to_frame().attrs), location
     return len(seen)
 
 
@@ -229,11 +229,11 @@ def test_what_a_fit_gives_is_short_and_begins_with_the_answer(fit):
 
 
 def test_what_the_verbs_answer_is_short_and_begins_with_the_answer(fit, answers, on_body, tmp_path):
-    others = (
+    remaining = (
         bf.predict(fit, [455]), bf.check(on_body), bf.read(on_body), fit.efficiency([455, 465.5]),
         bf.plot(fit, tmp_path, figures=["efficiency"]),
     )  # fmt: skip
-    for answer in (*answers.values(), *others):
+    for answer in (*answers.values(), *remaining):
         look_at(answer)
     assert (
         bf.check(on_body)._repr_html_().startswith("<h4>On-body knee exoskeleton</h4><p><b>Everything could be read.")

@@ -44,15 +44,15 @@ def installed(wheel, tmp_path_factory):
 
     def call(command, folder):
         if command[-1] == "&":
-            beside.append(subprocess.Popen(["python", "-m", *command[:-1]], cwd=folder, env=environment, **silent))
+            processes.append(subprocess.Popen(["python", "-m", *command[:-1]], cwd=folder, env=environment, **silent))
             time.sleep(5)  # so that one that the next needs is there
             return None
         how = {"capture_output": True, "text": True, "timeout": 600, "check": False, "stdin": subprocess.DEVNULL}
         return subprocess.run(command, cwd=folder, env=environment, **how)
 
-    beside, silent = [], dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    processes, silent = [], dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     yield call
-    for process in reversed(beside):
+    for process in reversed(processes):
         process.terminate()
         process.wait(60)
 
@@ -68,8 +68,8 @@ def test_the_wheel_holds_every_data_set_and_is_small(wheel):
 
 
 def test_the_program_is_that_of_the_wheel(installed, tmp_path):
-    where = installed(["python", "-c", "import bowdenfit; print(bowdenfit.__file__)"], tmp_path).stdout
-    assert str(ROOT) not in where and "site-packages" in where
+    folder = installed(["python", "-c", "import bowdenfit; print(bowdenfit.__file__)"], tmp_path).stdout
+    assert str(ROOT) not in folder and "site-packages" in folder
 
 
 def test_every_command_of_the_readme_works_in_an_empty_folder(installed, tmp_path):

@@ -65,9 +65,9 @@ def test_what_a_cable_draws_does_not_depend_on_what_else_is_fitted(programs):
     count = 3 if programs.posterior.model.description.name.startswith("On-body") else 17
     data, seeds = several(programs.posterior, count), list(range(count))
     together = fit_batch(programs.posterior, data, seeds, programs=programs)
-    for where in ([count - 1], list(range(count - 1, -1, -2))):
-        apart = fit_batch(programs.posterior, [data[i] for i in where], [seeds[i] for i in where], programs=programs)
-        for i, fit in zip(where, apart, strict=True):
+    for rows in ([count - 1], list(range(count - 1, -1, -2))):
+        apart = fit_batch(programs.posterior, [data[i] for i in rows], [seeds[i] for i in rows], programs=programs)
+        for i, fit in zip(rows, apart, strict=True):
             assert fit.engine == together[i].engine
             np.testing.assert_array_equal(fit.z, together[i].z)
 
@@ -97,7 +97,9 @@ def test_small_scatters_are_drawn_as_often_as_quadrature_says():
     posterior = LogDensity(build_model(of_rows(RIDGE @ np.array([0.1, 0.15, 0.12]), RIDGE)))
     levels = np.array([0.02, 0.05, 0.5, 0.95])
     fits = fit_batch(posterior, [posterior.data] * 16, range(16), RANK_SETTINGS)
-    shares = np.array([[np.mean(fit.z[:, -1] < at) for at in quantiles_of_scatter(posterior, levels)] for fit in fits])
+    shares = np.array(
+        [[np.mean(fit.z[:, -1] < scatter) for scatter in quantiles_of_scatter(posterior, levels)] for fit in fits]
+    )
     errors = shares.std(axis=0, ddof=1) / np.sqrt(len(fits))
     assert not any(fit.reasons for fit in fits)
     assert errors[0] < 0.002
@@ -112,12 +114,12 @@ def quantiles_of_scatter(posterior: LogDensity, levels: np.ndarray) -> np.ndarra
     grid, errors = np.linspace(-5, 5, 401), np.random.default_rng(0).standard_normal((20_000, 3))
     loss, density = RIDGE @ np.array([0.1, 0.15, 0.12]), []
     for scatter in np.asarray(tau.constrain(jnp.asarray(grid))):
-        found = (loss + scatter * errors) @ np.linalg.inv(RIDGE).T
-        positive = np.where(found > 0, found, 1.0)
+        computed = (loss + scatter * errors) @ np.linalg.inv(RIDGE).T
+        positive = np.where(computed > 0, computed, 1.0)
         z = np.log(positive / mu.median) / mu.log_sd
-        density.append(np.mean(np.all(found > 0, axis=1) * np.exp(-0.5 * np.sum(z**2, axis=1)) / positive.prod(axis=1)))
-    at = np.array(density) * np.exp(-(grid**2) / 2)
-    return np.interp(levels, (np.cumsum(at) - at / 2) / at.sum(), grid)
+        density.append(np.mean(np.all(computed > 0, axis=1) * np.exp(-0.5 * np.sum(z**2, axis=1)) / positive.prod(axis=1)))
+    points = np.array(density) * np.exp(-(grid**2) / 2)
+    return np.interp(levels, (np.cumsum(points) - points / 2) / points.sum(), grid)
 
 
 @pytest.mark.parametrize("name", [YARN, *(pytest.param(n, marks=pytest.mark.slow) for n in DATA_SETS if n != YARN)])

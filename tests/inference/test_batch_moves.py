@@ -37,12 +37,12 @@ def states(moves, seed: int, rounds: int, width: float = 1.0, frames=IN_Z) -> np
     """Stored states of ensembles started in the target or around it, (state, ensemble, walker, dimension)."""
     with jax.enable_x64(True):
         start = width * draw_t(np.random.default_rng(seed), ENSEMBLES * WALKERS).reshape(ENSEMBLES, WALKERS, -1)
-        z, found, numbers = start, [], np.zeros((), np.uint32)
+        z, results, numbers = start, [], np.zeros((), np.uint32)
         one_round = compile_program(walker_round(log_t, moves, frames), numbers, numbers, z, None)
         for number in range(rounds):
             path = one_round(np.uint32(seed), np.uint32(number), z, None)
-            z, found = path[-1], [*found, np.asarray(path)]
-    return np.concatenate(found)
+            z, results = path[-1], [*results, np.asarray(path)]
+    return np.concatenate(results)
 
 
 def test_the_moves_of_a_batch_leave_a_heavy_tailed_target_as_it_is():
@@ -81,5 +81,5 @@ def test_coefficients_given_everything_else_have_a_way_back_and_the_volume_of_th
         _, back, volume = both_of(w, False, data)
         np.testing.assert_allclose(back, z, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(of_z, volume, rtol=1e-6, atol=1e-6)
-        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda one: given_others.map_point(one, False, data)[1])))(w)
+        slopes = jax.jit(jax.vmap(jax.jacfwd(lambda first: given_others.map_point(first, False, data)[1])))(w)
         np.testing.assert_allclose(volume, np.linalg.slogdet(slopes)[1], rtol=1e-6, atol=1e-6)

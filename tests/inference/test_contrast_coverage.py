@@ -26,21 +26,26 @@ LEAST = 0.0025
 
 def _table(folder, laboratory, seed):
     """A table of one bench in a folder; the true difference of the two coefficients."""
-    load, mountings, loads, beside = LABORATORIES[laboratory]
+    load, mountings, loads, extra = LABORATORIES[laboratory]
     generator = np.random.default_rng([seed, len(laboratory)])
     mu, difference, tau = generator.uniform(0.06, 0.2), generator.uniform(-0.04, 0.1), np.exp(generator.uniform(-5.0, -2.7))
     lines = ["run,group,wrap_angle_deg,stroke,input_force_N,output_force_N"]
     for group, coefficient in (("new", mu), ("old", mu + difference)):
         bends = np.tile([90.0, 180.0], mountings // 2)
-        at = [load * generator.choice([0.5, 1.0, 2.0])] if loads is None else [load * each for each in loads]
+        cell_loads = (
+            [load * generator.choice([0.5, 1.0, 2.0])] if loads is None else [load * load_choice for load_choice in loads]
+        )
         strokes, noise = ((1,), 0.005 * load) if loads is None else ((1, -1), 0.01 * load)
         exponents = coefficient * np.deg2rad(bends)
-        rows = pull(generator, bends, exponents, at, strokes=strokes, noise=(noise, noise), scatter=tau)
+        rows = pull(generator, bends, exponents, cell_loads, strokes=strokes, noise=(noise, noise), scatter=tau)
         cells = zip(rows.label, rows.place, rows.stroke, rows.force_in, rows.force_out, strict=True)
-        lines += [f"{label},{group},{at:g},{stroke:+d},{f_in:.8g},{f_out:.8g}" for label, at, stroke, f_in, f_out in cells]
+        lines += [
+            f"{label},{group},{load_level:g},{stroke:+d},{f_in:.8g},{f_out:.8g}"
+            for label, load_level, stroke, f_in, f_out in cells
+        ]
     folder.mkdir(parents=True)
     (folder / "cable.toml").write_text(
-        'friction_model = "by-group"\n' + BENDS.replace('"forces.csv"', f'"forces.csv"{beside}')
+        'friction_model = "by-group"\n' + BENDS.replace('"forces.csv"', f'"forces.csv"{extra}')
     )
     (folder / "forces.csv").write_text("\n".join(lines) + "\n")
     return difference

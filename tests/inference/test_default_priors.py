@@ -90,11 +90,11 @@ def share_of_coefficients_held(log_prior, low: float, high: float, replications:
     for _ in range(replications):
         truth = np.exp(rng.uniform(np.log(low), np.log(high), 3))
         middle = np.linalg.lstsq(BENDS, BENDS @ truth + 0.03 * rng.standard_normal(len(BENDS)))[0]
-        drawn = rng.standard_normal((30_000, 3))
-        mu = middle + drawn @ root.T
+        draws = rng.standard_normal((30_000, 3))
+        mu = middle + draws @ root.T
         positive = (mu > 0).all(axis=1)
-        drawn, mu = drawn[positive], mu[positive]
-        log_weight = log_prior(np.log(mu)).sum(axis=1) - (2**2 - 1) / 2 * np.sum(drawn**2, axis=1)
+        draws, mu = draws[positive], mu[positive]
+        log_weight = log_prior(np.log(mu)).sum(axis=1) - (2**2 - 1) / 2 * np.sum(draws**2, axis=1)
         weight = np.exp(log_weight - log_weight.max())
         assert weight.sum() ** 2 > 30 * (weight @ weight)
         held.append(np.abs(weight @ (mu < truth) / weight.sum() - 0.5) < 0.45)
@@ -164,39 +164,39 @@ def draws_of(bells: Bells, priors, steps: int = 1500, walkers: int = 32, seed: i
     ], axis=-1)  # fmt: skip
     z = start[:, None, :] + 0.05 * rng.standard_normal((n, walkers, 4))
 
-    def density(at):
+    def density(point):
         with np.errstate(all="ignore"):
-            total = bells.log_density(*values_of(at, bells, priors)) - np.sum(at**2, axis=-1) / 2
+            total = bells.log_density(*values_of(point, bells, priors)) - np.sum(point**2, axis=-1) / 2
         return np.where(np.isfinite(total), total, -np.inf)
 
-    log_density, half, kept = density(z), walkers // 2, []
+    log_density, half, history = density(z), walkers // 2, []
     for step in range(steps):
-        for mine, other in ((slice(0, half), slice(half, walkers)), (slice(half, walkers), slice(0, half))):
+        for rows, other in ((slice(0, half), slice(half, walkers)), (slice(half, walkers), slice(0, half))):
             first = rng.integers(0, half, (n, half))
             second = (first + rng.integers(1, half, (n, half))) % half
             apart = [np.take_along_axis(z[:, other], i[..., None], axis=1) for i in (first, second)]
             reach = 1.0 if rng.uniform() < 0.1 else 2.38 / np.sqrt(8)
-            trial = z[:, mine] + reach * (apart[0] - apart[1]) + 1e-5 * rng.standard_normal((n, half, 4))
-            found = density(trial)
-            better = np.log(rng.uniform(size=(n, half))) < found - log_density[:, mine]
-            z[:, mine] = np.where(better[..., None], trial, z[:, mine])
-            log_density[:, mine] = np.where(better, found, log_density[:, mine])
+            trial = z[:, rows] + reach * (apart[0] - apart[1]) + 1e-5 * rng.standard_normal((n, half, 4))
+            computed = density(trial)
+            better = np.log(rng.uniform(size=(n, half))) < computed - log_density[:, rows]
+            z[:, rows] = np.where(better[..., None], trial, z[:, rows])
+            log_density[:, rows] = np.where(better, computed, log_density[:, rows])
         if step >= steps // 3 and step % 5 == 0:
-            kept.append(z.copy())
-    return values_of(np.concatenate(kept, axis=1), bells, priors)
+            history.append(z.copy())
+    return values_of(np.concatenate(history, axis=1), bells, priors)
 
 
 def held_of_bells(width: float, n: int, priors) -> dict[str, float]:
     """How often 90 % intervals hold: of slope, curvature, noise, and of the angle near the middle and near an end."""
     bells = Bells(width, n)
-    true, found = bells.truth.T, draws_of(bells, priors)
+    true, drawn_values = bells.truth.T, draws_of(bells, priors)
 
     def quantities(a, b, c, noise):
         logs = {f"angle at {x:g}": a + b * x - c * x**2 for x in (-0.9, 0.45)}
         return {"slope": b, "curvature": c, "noise": noise} | logs
 
     held = {}
-    for name, draws in quantities(*found).items():
+    for name, draws in quantities(*drawn_values).items():
         low, high = np.quantile(draws, (0.05, 0.95), axis=1)
         truth = quantities(*true)[name]
         held[name] = float(np.mean((low < truth) & (truth < high)))

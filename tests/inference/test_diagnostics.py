@@ -31,9 +31,9 @@ def paths(remembered, length, seed):
 def test_effective_draws_of_walkers_are_as_many_as_there_are(remembered, length):
     """Of 20 seeds each, 200 ratios, the least was 0.87 and the largest 1.10; the seed here is fixed."""
     z, worth = paths(remembered, length, 1)
-    found = diagnose(z, ENSEMBLES)
-    assert 0.85 < found.ess_bulk / worth < 1.15
-    assert found.mcse_mean == pytest.approx(1 / np.sqrt(worth), rel=0.1)
+    diagnostics = diagnose(z, ENSEMBLES)
+    assert 0.85 < diagnostics.ess_bulk / worth < 1.15
+    assert diagnostics.mcse_mean == pytest.approx(1 / np.sqrt(worth), rel=0.1)
 
 
 def test_walkers_taken_for_chains_would_pass_for_more_than_they_are():
@@ -50,9 +50,9 @@ def kinked(z):
 @pytest.mark.parametrize("change", [np.asarray, kinked, np.exp], ids=["normal", "with ties", "skewed"])
 def test_rank_normalized_diagnostics_are_those_of_arviz(change):
     draws, axes = change(paths(0.5, 20, 1)[0]), {"chain_axis": 0, "draw_axis": 1}
-    found, ensembles = diagnose(draws, ENSEMBLES), np.repeat(np.arange(ENSEMBLES), WALKERS)
-    assert found.r_hat == array_stats.rhat_nested(draws, superchain_ids=ensembles, method="rank", **axes)
-    assert found.ess_bulk == array_stats.ess(as_chains(draws, ENSEMBLES), method="bulk", **axes)
+    diagnostics, ensembles = diagnose(draws, ENSEMBLES), np.repeat(np.arange(ENSEMBLES), WALKERS)
+    assert diagnostics.r_hat == array_stats.rhat_nested(draws, superchain_ids=ensembles, method="rank", **axes)
+    assert diagnostics.ess_bulk == array_stats.ess(as_chains(draws, ENSEMBLES), method="bulk", **axes)
 
 
 HALF = 14  # of the draws of each of fifty walkers
@@ -74,8 +74,8 @@ def test_a_drift_is_told_from_chance(drift):
     """
     change, least, most = DRIFTS[drift]
     generator = np.random.default_rng(7)
-    found = [diagnose(change(generator.standard_normal((50, 2 * HALF))), 2).drift for _ in range(300)]
-    assert least <= np.mean(np.array(found) > MAXIMUM_DRIFT) <= most
+    diagnostics = [diagnose(change(generator.standard_normal((50, 2 * HALF))), 2).drift for _ in range(300)]
+    assert least <= np.mean(np.array(diagnostics) > MAXIMUM_DRIFT) <= most
 
 
 def test_one_draw_elsewhere_of_an_optimum_at_an_end_is_no_drift():
@@ -86,11 +86,11 @@ def test_one_draw_elsewhere_of_an_optimum_at_an_end_is_no_drift():
 
 
 def test_what_keeps_draws_from_being_trusted_is_said_in_plain_words():
-    said = describe_convergence_shortfalls({"mu1": Diagnostics(1.037, 812.3, 640.0, 0.01, 0.12)}, 1.01, 1000)
-    assert said == (
+    message = describe_convergence_shortfalls({"mu1": Diagnostics(1.037, 812.3, 640.0, 0.01, 0.12)}, 1.01, 1000)
+    assert message == (
         "mu1 spreads 3.7 % wider over all chains than within one (R-hat minus 1), and the limit is 1.0 %",
         "mu1 still drifts during sampling, by 12 % of its spread",
         "the effective sample size of the tails of mu1 is 640 (independent draws), and should be at least 1000",
     )
-    assert not jargon(". ".join(said))
+    assert not jargon(". ".join(message))
     assert describe_convergence_shortfalls({"mu1": Diagnostics(1.0099, 1000.0, 1000.0, 0.01, 0.07)}, 1.01, 1000) == ()

@@ -54,9 +54,9 @@ def recovered(folder, seeds):
     held, errors = {"mu": 0, "end_spring": 0}, {"mu": [], "end_spring": []}
     for seed in seeds:
         truth, bend, motion, force = simulated(seed)
-        found = bf.fit(write(folder / str(seed), motion, force, bend), mcmc=False)
+        fit = bf.fit(write(folder / str(seed), motion, force, bend), mcmc=False)
         for name in held:
-            estimate = found.least_squares.estimates[name]
+            estimate = fit.least_squares.estimates[name]
             held[name] += estimate.lower <= truth[name] <= estimate.upper
             errors[name].append(abs(np.log(estimate.value / truth[name])) if estimate.value > 0 else np.nan)
     return held, errors
@@ -81,28 +81,28 @@ def test_friction_and_spring_of_twenty_catheters_are_recovered(tmp_path):
 def test_a_free_spring_and_no_closed_loop_is_not_identified(tmp_path):
     force = Catheter(0.75, 0.5, 8.0).pulled(PULL)
     noise = 0.02 * np.random.default_rng(3).standard_normal(len(PULL))
-    found = bf.fit(write(tmp_path / "a", PULL, force + noise), mcmc=False)
-    assert "do not determine mu" in found.verdict().troubles[NOT_IDENTIFIABLE][0]
+    fit = bf.fit(write(tmp_path / "a", PULL, force + noise), mcmc=False)
+    assert "do not determine mu" in fit.verdict().troubles[NOT_IDENTIFIABLE][0]
 
 
 def test_the_same_pull_tells_friction_where_spring_and_rope_are_known(tmp_path):
     force = Catheter(0.75, 0.5, 8.0).pulled(PULL)
     noise = 0.02 * np.random.default_rng(4).standard_normal(len(PULL))
-    known = ("prior.end_spring.fixed=0.5", "prior.rope_stiffness.fixed=8")
-    found = bf.fit(write(tmp_path / "a", PULL, force + noise), mcmc=False, settings=known)
-    estimate = found.least_squares.estimates["mu"]
+    settings = ("prior.end_spring.fixed=0.5", "prior.rope_stiffness.fixed=8")
+    fit = bf.fit(write(tmp_path / "a", PULL, force + noise), mcmc=False, settings=settings)
+    estimate = fit.least_squares.estimates["mu"]
     assert abs(estimate.value - 0.75 / (2 * np.pi)) < 3 * estimate.standard_error < 0.05
-    assert NOT_IDENTIFIABLE not in found.verdict().troubles
+    assert NOT_IDENTIFIABLE not in fit.verdict().troubles
 
 
 def test_a_stop_tells_friction_and_the_stiffness_of_the_rope(tmp_path):
     motion = cycles(5.0, 20.0, 31)
     force = Catheter(0.5, np.inf, 3.0, 10.0).pulled(motion) + 0.1 * np.random.default_rng(5).standard_normal(len(motion))
-    found = bf.fit(write(tmp_path / "a", motion, force, 200.0, ', end = "stop"'), mcmc=False)
-    estimates = found.least_squares.estimates
+    fit = bf.fit(write(tmp_path / "a", motion, force, 200.0, ', end = "stop"'), mcmc=False)
+    estimates = fit.least_squares.estimates
     for name, truth in (("mu", 0.5 / np.deg2rad(200)), ("rope_stiffness", 3.0), ("displacement_zero", 10.0)):
         assert abs(estimates[name].value - truth) < 4 * estimates[name].standard_error < 0.3 * truth
-    assert found.verdict().trusted
+    assert fit.verdict().trusted
 
 
 def test_an_offset_of_the_load_cell_is_found_and_not_taken_for_friction(tmp_path):
@@ -118,5 +118,5 @@ def test_a_spring_that_hardens_is_not_described(tmp_path):
     motion = cycles(2.0, 30.0, 25)
     noise = 0.02 * np.random.default_rng(7).standard_normal(len(motion))
     force = Catheter(0.75, 0.5, 8.0).pulled(motion) * (1 + 0.5 * (motion / 30) ** 2)
-    found = bf.fit(write(tmp_path / "a", motion, force + noise), mcmc=False)
-    assert NOT_DESCRIBED in found.verdict().troubles
+    fit = bf.fit(write(tmp_path / "a", motion, force + noise), mcmc=False)
+    assert NOT_DESCRIBED in fit.verdict().troubles

@@ -79,7 +79,7 @@ def cable_with(tables, **more):
 
 def estimates_of(tables, design, truth, seeds):
     """Least-squares estimates and true values [shown units] of several seeds, and the last data set."""
-    objective, found = None, []
+    objective, results = None, []
     for seed in seeds:
         data, values = measured(cable_with(tables), seed, design=make_design(**design), once=True, **(TRUTH | truth))
         posterior = LogDensity(build_model(data))
@@ -87,8 +87,8 @@ def estimates_of(tables, design, truth, seeds):
         start = find_maximum_posterior(posterior, objective).z
         estimates = fit_least_squares(posterior, objective, start, intervals=False).estimates
         true = {p.name: values[p.name] * p.shown_scale for p in posterior.model.space.free}
-        found.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
-    return found, data
+        results.append({name: (estimate, true[name]) for name, estimate in estimates.items()})
+    return results, data
 
 
 USUAL = ("one wrap angle",)
@@ -98,8 +98,8 @@ USUAL = ("one wrap angle",)
 @pytest.mark.parametrize("seeds", [(0,), pytest.param((1, 2), marks=pytest.mark.slow)], ids=["a seed", "others"])
 def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_small(case, seeds):
     tables, design, truth, untold, warning = CASES[case]
-    found, data = estimates_of(tables, design, truth, seeds)
-    for estimates in found:
+    computed, data = estimates_of(tables, design, truth, seeds)
+    for estimates in computed:
         for name, (estimate, true) in estimates.items():
             if not estimate.identified:
                 assert np.isnan(estimate.value)
@@ -109,14 +109,14 @@ def test_what_the_data_cannot_tell_is_not_identified_and_no_error_bar_is_too_sma
             if name in untold:
                 assert estimate.standard_error > abs(estimate.value), (name, estimate, true)
     if case == "a single load":
-        assert not any(estimates["stiffness"][0].identified for estimates in found)
+        assert not any(estimates["stiffness"][0].identified for estimates in computed)
     if warning is not None:
-        assert any(warning in said for said in collect_warnings(data)), collect_warnings(data)
+        assert any(warning in sentence for sentence in collect_warnings(data)), collect_warnings(data)
 
 
 def test_good_tables_leave_nothing_unidentified():
-    found, data = estimates_of(("stretch",), stretched(LOADS, unloading=True), {}, seeds=(0,))
-    assert all(estimate.identified for estimates in found for estimate, _ in estimates.values())
+    computed, data = estimates_of(("stretch",), stretched(LOADS, unloading=True), {}, seeds=(0,))
+    assert all(estimate.identified for estimates in computed for estimate, _ in estimates.values())
     assert collect_warnings(data) == []
 
 
@@ -147,14 +147,14 @@ def test_free_motion_tells_the_product_of_friction_and_preload_and_says_so():
 def test_a_preload_whose_wrap_angle_is_given_but_not_used_is_warned_of():
     description = cable_with(("loop",), preload={"wrap_angle": {"value": 90, "unit": "deg"}})
     data, _ = measured(description, 0, design=make_design(**FREE), once=True, **TRUTH)
-    assert any('model = "stretch"' in said for said in collect_warnings(data))
+    assert any('model = "stretch"' in sentence for sentence in collect_warnings(data))
 
 
 def test_a_rival_counts_only_where_it_fits_as_well_and_lies_outside_the_error():
     residuals = np.array([1.0, -1.0, 1.0, -1.0, 0.5, -0.5])
-    found = {"residuals": {"a": residuals}}
+    computed = {"residuals": {"a": residuals}}
     near, far = ({"residuals": {"a": residuals * factor}} for factor in (1.1, 5.0))
-    assert find_rivals(found, [near, far], np.ones(6), 2) == [near]
+    assert find_rivals(computed, [near, far], np.ones(6), 2) == [near]
     assert range_of_minima(10.0, 1.0, [13.0, 7.0]) is None
     assert range_of_minima(10.0, 1.0, [13.0, 1.0]) == (1.0, 13.0)
     assert range_of_minima(10.0, 0.0, [10.0]) is None

@@ -111,12 +111,12 @@ def among_slow(*case: Any) -> Any:
 def test_least_squares_recovers_known_parameters_from_noise_free_tables(laboratory, description, truth):
     """To 1e-6, whatever the prior medians are; a coefficient that no table depends on is said not to be determined."""
     dataset, values = bench(description, truth, noise=False, once=True)
-    found, parameters = laboratory.least_squares(written(dataset)), build_model(dataset).space.parameters
-    assert found.converged
+    solution, parameters = laboratory.least_squares(written(dataset)), build_model(dataset).space.parameters
+    assert solution.converged
     for p in parameters:
         if p.role == "noise":
             continue
-        estimate = found.estimates[p.name]
+        estimate = solution.estimates[p.name]
         if p.name == "mu" and description is STRETCH_ALONE:
             assert not estimate.identified
         else:
@@ -149,7 +149,7 @@ def test_over_two_hundred_loops_ranks_are_uniform():
     laboratory = Laboratory(sampler=QUICK)
     ranks = laboratory.ranks(plausible(), make_design(**SHORT), range(1000, 1200))
     p = list(p_values(ranks).values())
-    p += [stats.kstest([each[name] for each in ranks], "uniform").pvalue for name in ranks[0]]
+    p += [stats.kstest([rank[name] for rank in ranks], "uniform").pvalue for name in ranks[0]]
     assert min(p) * len(p) > 0.001, (table(ranks), p)
 
 
@@ -230,16 +230,16 @@ def test_a_stretch_table_leaves_the_density_of_the_other_parameters_as_it_was(st
     generator, added = np.random.default_rng(4), [i for name, i in index.items() if name not in names]
     z, on_body = np.tile(generator.standard_normal(len(index)) / 2, (3, 1)), generator.standard_normal((3, len(names))) / 2
     z[:, [index[name] for name in names]] = on_body
-    (here, before), (there, after) = (
-        over_rows(lambda z, data, p=p: (p.log_likelihoods(z, data), p.log_density(z, data)), at, p.data)
-        for p, at in ((alone, on_body), (joined, z))
+    (middle, initial), (there, after) = (
+        over_rows(lambda z, data, p=p: (p.log_likelihoods(z, data), p.log_density(z, data)), point, p.data)
+        for p, point in ((alone, on_body), (joined, z))
     )
-    assert set(there) - set(here) == {"stretch"}
-    for term, values in here.items():
+    assert set(there) - set(middle) == {"stretch"}
+    for term, values in middle.items():
         np.testing.assert_array_equal(there[term], values)
     part = np.sum(there["stretch"], axis=1) + np.sum(stats.norm.logpdf(z[:, added]), axis=1)
     np.testing.assert_array_equal(there["stretch"], there["stretch"][[0, 0, 0]])
-    np.testing.assert_allclose(after, before + part, rtol=1e-14)
+    np.testing.assert_allclose(after, initial + part, rtol=1e-14)
     slope = jax.jit(jax.grad(lambda z: jnp.sum(joined.log_likelihoods(z, arrays(joined.data))["stretch"])))(jnp.asarray(z[0]))
     assert {name for name, i in index.items() if slope[i] == 0} == set(names)
 
@@ -248,12 +248,12 @@ def test_a_stretch_table_leaves_the_density_of_the_other_parameters_as_it_was(st
 def test_a_stretch_table_leaves_the_coefficients_of_the_other_tables_as_they_were(laboratory, stretched_on_body):
     """Least squares: to 1e-9; unless the rope is said to slide with one of them while it is stretched."""
     alone, joined = stretched_on_body
-    before, after, shared = (laboratory.least_squares(d).estimates for d in (alone, joined(None), joined("mu1")))
+    initial, after, shared = (laboratory.least_squares(d).estimates for d in (alone, joined(None), joined("mu1")))
     for name in ON_BODY:
-        assert after[name].value == pytest.approx(before[name].value, rel=1e-9), name
-        assert after[name].standard_error == pytest.approx(before[name].standard_error, rel=1e-6), name
-    assert abs(shared["mu1"].value / before["mu1"].value - 1) > 1e-3
-    assert shared["mu1"].standard_error < 0.5 * before["mu1"].standard_error
+        assert after[name].value == pytest.approx(initial[name].value, rel=1e-9), name
+        assert after[name].standard_error == pytest.approx(initial[name].standard_error, rel=1e-6), name
+    assert abs(shared["mu1"].value / initial["mu1"].value - 1) > 1e-3
+    assert shared["mu1"].standard_error < 0.5 * initial["mu1"].standard_error
 
 
 MIXED = ("angles", "efficiencies", "forces", "stretch", "preload")
@@ -290,8 +290,8 @@ def test_any_mixture_of_tables_makes_one_posterior_that_is_the_sum_of_its_parts(
         values = posterior.model.space.constrain(z)
         return sum(jnp.sum(t.log_likelihood(values, d)) for t, d in zip(parts, data, strict=True))
 
-    told = over_rows(summed, z[None], tuple(t.data for t in parts))[0]
-    total = float(told + np.sum(stats.norm.logpdf(z)))
+    log_likelihood = over_rows(summed, z[None], tuple(t.data for t in parts))[0]
+    total = float(log_likelihood + np.sum(stats.norm.logpdf(z)))
     density = float(over_rows(posterior.log_density, z[None], posterior.data)[0])
     assert np.isfinite(density)
     assert density == pytest.approx(total, rel=1e-12)

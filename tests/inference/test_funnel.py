@@ -84,8 +84,8 @@ class Funnel:
         generator = np.random.default_rng(seed)
         tau = self.quantile_of_tau(generator.uniform(size=(ENSEMBLES, WALKERS)))
         mean, root = self.given_tau(tau)
-        own = mean + (root @ generator.standard_normal((ENSEMBLES, WALKERS, COUNT, 1)))[..., 0]
-        return np.concatenate([own, tau[..., None]], axis=-1)
+        samples = mean + (root @ generator.standard_normal((ENSEMBLES, WALKERS, COUNT, 1)))[..., 0]
+        return np.concatenate([samples, tau[..., None]], axis=-1)
 
     def p_value(self, states: np.ndarray) -> float:
         """Of the shares below known quantiles of tau, and of the coefficients made standard normal at their tau; of the
@@ -204,16 +204,16 @@ def test_a_sampling_that_is_resumed_turns_to_it_where_one_in_one_go_does(interru
     path = tmp_path / "parts"
     start_checkpoint(path, {})
     narrow.sampled(settings=lasting(interrupted), programs=surprised, checkpoint=path)
-    rest = narrow.sampled(settings=lasting(1300), programs=surprised, checkpoint=path, resume=True)
-    np.testing.assert_array_equal(rest, whole)
+    remainder = narrow.sampled(settings=lasting(1300), programs=surprised, checkpoint=path, resume=True)
+    np.testing.assert_array_equal(remainder, whole)
 
 
 def test_the_way_along_the_ridge_and_back_are_inverse(narrow):
     posterior = narrow.posterior
     frame, z = jax.jit(ridge_map(Conditional(posterior))), jnp.asarray(narrow.draw(1)[0])
-    w, given, volume = frame(z, True, posterior.data)
-    kept, back, same = frame(w, False, posterior.data)
-    np.testing.assert_array_equal(given, z)
-    np.testing.assert_array_equal(kept, w)
+    w, point, volume = frame(z, True, posterior.data)
+    saved, back, same = frame(w, False, posterior.data)
+    np.testing.assert_array_equal(point, z)
+    np.testing.assert_array_equal(saved, w)
     np.testing.assert_allclose(back, z, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(same, volume, rtol=1e-9)

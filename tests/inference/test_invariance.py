@@ -143,18 +143,18 @@ PLAIN = {
 def sorted_tables(data):
     """All numbers of a data set, rows in a fixed order."""
     angles, forces = data.measurements.table(AngleTable), data.measurements.table(ForceTable)
-    one = np.nan_to_num(np.column_stack([angles.route, angles.angle, angles.limit]), nan=-1.0)
+    columns = np.nan_to_num(np.column_stack([angles.route, angles.angle, angles.limit]), nan=-1.0)
     names = np.array([ord(name) for name in forces.run_names])[forces.run]
     two = np.column_stack([forces.route, names, forces.stroke, forces.input_force, forces.output_force])
-    return [table[np.lexsort(np.round(table.T[::-1], 9))] for table in (one, two)]
+    return [table[np.lexsort(np.round(table.T[::-1], 9))] for table in (columns, two)]
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(spellings())
 def test_tables_are_the_same_however_they_are_written(tmp_path_factory, on_body, spelling):
     plain, other = (dataset(tmp_path_factory.mktemp("spelling"), s, on_body) for s in (PLAIN, spelling))
-    for expected, found in zip(sorted_tables(plain), sorted_tables(other), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    for expected, computed in zip(sorted_tables(plain), sorted_tables(other), strict=True):
+        np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-12)
 
 
 ODD = PLAIN | {

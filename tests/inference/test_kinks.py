@@ -38,46 +38,49 @@ def test_where_the_solver_is_stuck_no_interval_is_given_and_the_fit_is_not_trust
     assert np.isnan([estimate.lower, estimate.upper]).all()
     assert not fit.converged
     assert "stuck at a kink" in fit.reasons[0] and "sampling gets past kinks" in fit.reasons[0]
-    said, short = (" ".join(text.split()) for text in (details_text(fit), str(fit)))
+    message, short = (" ".join(text.split()) for text in (details_text(fit), str(fit)))
     assert "no minimum that can be trusted, and the numbers may be far off. Fit again without --no-mcmc" in short
-    assert "mu and preload have no profile interval, since the solver is stuck at kinks" in said and "without --no-mcmc" in said
+    assert (
+        "mu and preload have no profile interval, since the solver is stuck at kinks" in message
+        and "without --no-mcmc" in message
+    )
 
 
 def test_a_loop_whose_sum_of_squares_is_smooth_has_all_its_intervals():
     fit = bf.fit(loop(ALONE, 7), mcmc=False, seed=1)
     assert fit.converged
-    known = [e for e in fit.least_squares.estimates.values() if e.identified]
-    assert known and all(e.lower < e.value < e.upper for e in known)
+    identified = [e for e in fit.least_squares.estimates.values() if e.identified]
+    assert identified and all(e.lower < e.value < e.upper for e in identified)
 
 
 def rises(tables: tuple[str, ...], seed: int) -> list[tuple[float, float]]:
     """By how much the sum of squares is larger at each limit that is given, as the limit has it and from other starts."""
     posterior = LogDensity(build_model(loop(tables, seed)))
     objective, space = make_objective(posterior), posterior.model.space
-    found = fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
-    problem, rng, asked = Problem(posterior, objective), np.random.default_rng(seed), []
+    solution = fit_least_squares(posterior, objective, find_maximum_posterior(posterior, objective).z)
+    problem, rng, requests = Problem(posterior, objective), np.random.default_rng(seed), []
 
     def rise(start, this, pin):
-        return sum_of_squares(problem.solve(start, this, pin, QUICK)) - found.sum_of_squares
+        return sum_of_squares(problem.solve(start, this, pin, QUICK)) - solution.sum_of_squares
 
     for i, parameter in enumerate(space.free):
-        estimate = found.estimates.get(parameter.name)
+        estimate = solution.estimates.get(parameter.name)
         for limit in (estimate.lower, estimate.upper) if estimate else ():
             if np.isfinite(limit):
                 this = np.arange(space.size) == i
                 pin = np.where(this, z_at(parameter.prior, limit / parameter.shown_scale), 0.0)
-                starts = (found.z + rng.normal(0, scale, space.size) for scale in (0.1, 0.5, 1.5) * 2)
-                asked.append((rise(found.z, this, pin), float(np.nanmin([rise(z, this, pin) for z in starts]))))
-    return asked
+                starts = (solution.z + rng.normal(0, scale, space.size) for scale in (0.1, 0.5, 1.5) * 2)
+                requests.append((rise(solution.z, this, pin), float(np.nanmin([rise(z, this, pin) for z in starts]))))
+    return requests
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seeds", [(1,), pytest.param((1, 8, 10), marks=pytest.mark.slow)], ids=["a loop", "three"])
 def test_other_starts_find_no_lower_sum_of_squares_at_the_limits_that_are_given(seeds):
     """There a limit lies too near the estimate: 4 of 16 did of these loops while nobody asked whether the solver was stuck."""
-    asked = [each for seed in seeds for each in rises(WITH_PRELOAD, seed)]
-    assert asked
-    assert all(other > 0.8 * own for own, other in asked), asked
+    requests = [item for seed in seeds for item in rises(WITH_PRELOAD, seed)]
+    assert requests
+    assert all(other > 0.8 * own_values for own_values, other in requests), requests
 
 
 def test_a_minimum_from_which_a_profile_leads_to_a_lower_one_is_left(monkeypatch):

@@ -43,8 +43,8 @@ def forces(folder, seed, *, places=(180.0,) * 3, loads=LOADS, noise=0.4, asymmet
     """Three mountings of one bend, and what is wrong with them."""
     generator = np.random.default_rng(seed)
     loss = 0.12 * np.deg2rad(np.array(places))
-    given = {"repeats": 5, "scatter": 0.02, "noise": (0.0, 0.0)} | bench
-    rows = hand_bench.pull(generator, places, loss, loads, **given)
+    options = {"repeats": 5, "scatter": 0.02, "noise": (0.0, 0.0)} | bench
+    rows = hand_bench.pull(generator, places, loss, loads, **options)
     wrong = 1 - asymmetry / 2 * rows.stroke + drift * (np.linspace(0, 1, len(rows.stroke)) - 0.5)
     ratio = np.log(rows.force_in / rows.force_out) * wrong
     out = rows.force_in * np.exp(-ratio)
@@ -61,7 +61,9 @@ def route(folder, seed, shape, curve, n=25):
     loss = 0.15 * np.deg2rad(ROUTES[shape]((places - 490) / 60))
     rows = hand_bench.pull(generator, places, loss, (40, 80), repeats=3, noise=(0.3, 0.3), scatter=0.01)
     hand_bench.write(folder, rows, ROUTE.replace("gaussian", curve), "cable_length_mm")
-    cells = [f"{at:g},{angle:.2f}" if angle >= 5 else f"{at:g},<5" for at, angle in zip(lengths, angles, strict=True)]
+    cells = [
+        f"{length:g},{angle:.2f}" if angle >= 5 else f"{length:g},<5" for length, angle in zip(lengths, angles, strict=True)
+    ]
     (folder / "angles.csv").write_text("\n".join(["cable_length_mm,sheath_angle_deg", *cells]) + "\n")
     return folder
 
@@ -106,8 +108,8 @@ HEALTHY = {
 
 def alarms(judge, make, tmp_path, count, friction=None):
     """How many of so many benches are said not to be described."""
-    said = [any(d.is_noticeable for d in judge(make(tmp_path, seed), friction)) for seed in range(count)]
-    return int(np.sum(said))
+    message = [any(d.is_noticeable for d in judge(make(tmp_path, seed), friction)) for seed in range(count)]
+    return int(np.sum(message))
 
 
 @pytest.mark.parametrize("bench", some_slow(HEALTHY, ["three mountings"]))
@@ -132,25 +134,25 @@ def test_at_most_one_healthy_bench_in_a_hundred_raises_an_alarm(tmp_path, judge,
 AGAIN = {"loop and stretch": ("synthetic-haptic-loop", {}), "recordings": ("synthetic-recordings", {"sigma_block": 0.3})}
 
 
-def alarms_again(judge, what, count):
+def alarms_again(judge, case, count):
     """How many of a data set's tables measured again are said not to be described."""
-    name, values = AGAIN[what]
+    name, values = AGAIN[case]
     made = measured_again(ROOT / "datasets" / name, count, **values)
     return int(np.sum([any(d.is_noticeable for d in judge.of(data)) for data in made]))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["recordings", pytest.param("loop and stretch", marks=pytest.mark.slow)])
-def test_healthy_recordings_loops_and_stretch_raise_no_alarm(judge, what):
+@pytest.mark.parametrize("case", ["recordings", pytest.param("loop and stretch", marks=pytest.mark.slow)])
+def test_healthy_recordings_loops_and_stretch_raise_no_alarm(judge, case):
     """More than one of eight does in 3 of 10 000 runs of this test with other seeds."""
-    assert alarms_again(judge, what, 8) <= 1
+    assert alarms_again(judge, case, 8) <= 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", AGAIN)
-def test_at_most_one_healthy_recording_or_loop_in_a_hundred_raises_an_alarm(judge, what):
+@pytest.mark.parametrize("case", AGAIN)
+def test_at_most_one_healthy_recording_or_loop_in_a_hundred_raises_an_alarm(judge, case):
     """As for forces; it found none of 500 recordings."""
-    assert alarms_again(judge, what, 500) <= 5
+    assert alarms_again(judge, case, 500) <= 5
 
 
 @pytest.mark.slow
@@ -249,21 +251,21 @@ def test_the_verdict_names_the_curve_that_would_fit(tmp_path):
 
 def test_chances_are_corrected_for_how_many_were_asked_about(tmp_path, judge):
     assert FALSE_ALARM < 0.01
-    found = judge(forces(tmp_path, 3))
-    assert len(found) > 3 and all(0 <= d.p_value <= 1 for d in found)
-    assert [d.p_value for d in found] == sorted(d.p_value for d in found)
+    departures = judge(forces(tmp_path, 3))
+    assert len(departures) > 3 and all(0 <= d.p_value <= 1 for d in departures)
+    assert [d.p_value for d in departures] == sorted(d.p_value for d in departures)
 
 
 def test_a_slipped_angle_stands_out_of_least_squares_and_healthy_ones_do_not(tmp_path):
     """Three healthy routes have one in 9 of 1000 runs of this test with other seeds."""
     healthy = [bf.fit(route(tmp_path, seed, "gaussian", "gaussian"), mcmc=False).least_squares for seed in range(3)]
-    assert sum(bool(each.far_readings) for each in healthy) == 0
+    assert sum(bool(item.far_readings) for item in healthy) == 0
     folder = route(tmp_path, 5, "gaussian", "gaussian")
     rows = (folder / "angles.csv").read_text().splitlines()
     length, angle = rows[9].split(",")
     rows[9] = f"{length},{float(angle) / 2:.2f}"
     (folder / "angles.csv").write_text("\n".join(rows) + "\n")
     slipped = bf.fit(folder, mcmc=False)
-    assert [each.label for each in slipped.least_squares.far_readings] == [f"sheath_angle at {length} mm"]
+    assert [item.label for item in slipped.least_squares.far_readings] == [f"sheath_angle at {length} mm"]
     assert f"sheath_angle at {length} mm: chance alone deviates as much" in " ".join(slipped.verdict().reasons)
     assert bf.fit(folder, mcmc=False, noise="student").verdict().trusted

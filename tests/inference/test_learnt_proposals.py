@@ -35,8 +35,8 @@ def test_draws_of_student_ts_are_of_their_density():
     rows, other = TWO.draw(np.random.default_rng(2), 40_000), np.random.default_rng(3)
     part = other.choice(2, 40_000, p=TWO.share)
     both = [stats.multivariate_t(c, r @ r.T, df=5) for c, r in zip(CENTERS, ROOTS, strict=True)]
-    drawn = np.array([one.rvs(40_000, random_state=other) for one in both])
-    along = drawn[part, np.arange(40_000)] @ np.ones(3)
+    draws = np.array([distribution.rvs(40_000, random_state=other) for distribution in both])
+    along = draws[part, np.arange(40_000)] @ np.ones(3)
     for level in (0.25, 0.5, 0.75):
         share = np.mean(rows.sum(axis=1) < np.quantile(along, level))
         assert abs(share - level) < 4 * np.sqrt(2 * level * (1 - level) / 40_000)
@@ -44,9 +44,9 @@ def test_draws_of_student_ts_are_of_their_density():
 
 def test_student_ts_move_to_where_draws_are():
     rows = TWO.draw(np.random.default_rng(4), 8000)
-    begun = start_mixture(rows, 2)
-    moved = begun.refine(rows).refine(rows).refine(rows)
-    gains = [np.mean(each.log_density(rows)) for each in (begun, moved, TWO)]
+    mixture = start_mixture(rows, 2)
+    moved = mixture.refine(rows).refine(rows).refine(rows)
+    gains = [np.mean(item.log_density(rows)) for item in (mixture, moved, TWO)]
     assert gains[0] < gains[1]
     assert abs(gains[1] - gains[2]) < 0.02
     wide = moved.with_wide_component(rows, 3.0, 0.25)
@@ -64,48 +64,56 @@ def bent():
         programs = BatchPrograms(posterior, RANK_SETTINGS)
         places = programs.evaluate_points
 
-    def evaluate(given: np.ndarray, is_z: np.ndarray) -> ProposedPoints:
+    def evaluate(arguments: np.ndarray, is_z: np.ndarray) -> ProposedPoints:
         with jax.enable_x64(True):
-            return ProposedPoints(*map(np.asarray, places(given, is_z, posterior.data)))
+            return ProposedPoints(*map(np.asarray, places(arguments, is_z, posterior.data)))
 
     size = posterior.model.space.size
     students = StudentMixture(np.zeros((1, size)), 1.5 * np.eye(size)[None], np.ones(1))
     return evaluate, MaximaProposal(students), programs.friction
 
 
-def sum_of_first(evaluate, found: LearntProposal, density) -> tuple[float, float]:
+def sum_of_first(evaluate, proposal: LearntProposal, density) -> tuple[float, float]:
     """Of the first proposal's density, from draws of what is learnt, by what is said to be their density; and its error.
 
     No ratio is above 10, because a tenth of what is learnt is the first proposal.
     """
     generator, ratios = np.random.default_rng(5), []
     for _ in range(40):
-        at = evaluate(*found.draw(generator, BLOCK))
-        ratios.append(np.where(np.isfinite(at.log_density), np.exp(found.first.log_density(at) - density(at)), 0.0))
+        evaluated = evaluate(*proposal.draw(generator, BLOCK))
+        ratios.append(
+            np.where(
+                np.isfinite(evaluated.log_density), np.exp(proposal.first.log_density(evaluated) - density(evaluated)), 0.0
+            )
+        )
     every = np.concatenate(ratios)
     return float(every.mean()), float(every.std() / np.sqrt(len(every)))
 
 
 def proposal_of(bent) -> LearntProposal:
     evaluate, first, friction = bent
-    at = evaluate(*first.draw(np.random.default_rng(6), BLOCK))
-    weights = np.exp(at.log_density - first.log_density(at) - np.max(at.log_density - first.log_density(at)))
+    evaluated = evaluate(*first.draw(np.random.default_rng(6), BLOCK))
+    weights = np.exp(
+        evaluated.log_density - first.log_density(evaluated) - np.max(evaluated.log_density - first.log_density(evaluated))
+    )
     return learn_proposal(
-        first, at.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction
+        first, evaluated.w[np.random.default_rng(7).choice(BLOCK, BLOCK, p=weights / weights.sum())], friction
     )
 
 
 def test_what_is_learnt_is_drawn_with_its_density(bent):
     """The sum over all z is 1; 4 errors off once in 16,000 seeds."""
-    found = proposal_of(bent)
-    total, error = sum_of_first(bent[0], found, found.log_density)
+    proposal = proposal_of(bent)
+    total, error = sum_of_first(bent[0], proposal, proposal.log_density)
     assert error < 0.02
     assert abs(total - 1) < 4 * error
 
 
 def test_the_same_test_sees_that_a_volume_is_forgotten(bent):
-    found = proposal_of(bent)
-    total, error = sum_of_first(bent[0], found, lambda at: found.log_density(at._replace(log_volume=np.zeros(BLOCK))))
+    proposal = proposal_of(bent)
+    total, error = sum_of_first(
+        bent[0], proposal, lambda point: proposal.log_density(point._replace(log_volume=np.zeros(BLOCK)))
+    )
     assert abs(total - 1) > 8 * error
 
 
@@ -113,8 +121,10 @@ def test_what_is_learnt_is_nearer_than_what_is_about_the_maxima(bent):
     evaluate, first, _ = bent
 
     def worth(proposal):
-        at = evaluate(*proposal.draw(np.random.default_rng(8), BLOCK))
-        log_weights = np.where(np.isfinite(at.log_density), at.log_density - proposal.log_density(at), -np.inf)
+        evaluated = evaluate(*proposal.draw(np.random.default_rng(8), BLOCK))
+        log_weights = np.where(
+            np.isfinite(evaluated.log_density), evaluated.log_density - proposal.log_density(evaluated), -np.inf
+        )
         weights = np.exp(log_weights - log_weights.max())
         return weights.sum() ** 2 / np.sum(weights**2)
 
@@ -127,8 +137,8 @@ def test_programs_serve_data_of_the_same_priors_and_of_no_others():
     assert _compilation_key(first) == _compilation_key(again)
     _ = first.model.space.index  # what is worked out once and kept is no part of it
     assert _compilation_key(first) == _compilation_key(again)
-    (mu, *others), space = again.model.space.parameters, again.model.space
+    (mu, *remaining), space = again.model.space.parameters, again.model.space
     wider = replace(mu, prior=replace(mu.prior, log_sd=2 * PriorDefaults().friction.log_sd))
     assert _compilation_key(
-        replace(again, model=replace(again.model, space=replace(space, parameters=(wider, *others))))
+        replace(again, model=replace(again.model, space=replace(space, parameters=(wider, *remaining))))
     ) != _compilation_key(first)

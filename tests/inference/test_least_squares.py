@@ -42,22 +42,22 @@ def plain() -> tuple[LogDensity, Objective, LeastSquares]:
 @pytest.mark.parametrize(("n_contacts", "tables"), [(2, "forces"), (3, "efficiencies"), (4, "forces"), (5, "forces")])
 def test_data_without_noise_return_the_truth_to_six_digits(n_contacts, tables):
     dataset, truth = measured(cable(n_contacts, ("angles", tables)), noise=False, once=True)
-    posterior, found = fitted(dataset)
-    assert found.converged
+    posterior, solution = fitted(dataset)
+    assert solution.converged
     estimated = {
-        p.name: found.estimates[p.name].value / p.shown_scale for p in posterior.model.space.free if p.role != "noise"
+        p.name: solution.estimates[p.name].value / p.shown_scale for p in posterior.model.space.free if p.role != "noise"
     }
     assert (
         len(estimated) == {2: 2 + 6, 3: 3 + 6, 4: 3 + 9, 5: 4 + 9}[n_contacts]
     )  # two free sheaths share a coefficient
     for name, value in estimated.items():
         assert value == pytest.approx(truth[name], rel=1e-6), name
-    assert found.sum_of_squares < 1e-12
+    assert solution.sum_of_squares < 1e-12
 
 
 @pytest.mark.extended
 def test_scipy_s_trust_region_with_a_jax_jacobian_finds_the_same_minimum():
-    posterior, _, found = plain()
+    posterior, _, solution = plain()
     size = posterior.model.space.size
     free = np.flatnonzero([p.role != "noise" for p in posterior.model.space.free])
 
@@ -78,16 +78,16 @@ def test_scipy_s_trust_region_with_a_jax_jacobian_finds_the_same_minimum():
         ftol=1e-15,
         gtol=1e-12,
     )
-    assert 2 * theirs.cost == pytest.approx(found.sum_of_squares, rel=1e-9)
-    np.testing.assert_allclose(found.z[free], theirs.x, atol=1e-5)
+    assert 2 * theirs.cost == pytest.approx(solution.sum_of_squares, rel=1e-9)
+    np.testing.assert_allclose(solution.z[free], theirs.x, atol=1e-5)
 
 
 def test_the_solution_does_not_depend_on_the_start():
-    posterior, objective, found = plain()
+    posterior, objective, solution = plain()
     for seed in range(8):  # the first of them leaps to zero curvature, and must find its way back
         start = np.random.default_rng(seed).standard_normal(posterior.model.space.size)
         again = fit_least_squares(posterior, objective, start, intervals=False)
-        for name, estimate in found.estimates.items():
+        for name, estimate in solution.estimates.items():
             assert again.estimates[name].value == pytest.approx(estimate.value, rel=1e-5, abs=1e-6), name
             assert again.estimates[name].standard_error == pytest.approx(estimate.standard_error, rel=1e-4), name
 
@@ -114,8 +114,8 @@ def _many_fits(description, n: int) -> tuple[dict[str, np.ndarray], dict[str, np
         space = space or model.space
         posterior = LogDensity(replace(model, space=space))
         objective = objective or make_objective(posterior)
-        found = fit_least_squares(posterior, objective, np.zeros(space.size), intervals=False)
-        for name, estimate in found.estimates.items():
+        solution = fit_least_squares(posterior, objective, np.zeros(space.size), intervals=False)
+        for name, estimate in solution.estimates.items():
             values.setdefault(name, []).append(estimate.value)
             errors.setdefault(name, []).append(estimate.standard_error)
     return tuple({name: np.array(v) for name, v in d.items()} for d in (values, errors))
@@ -127,8 +127,8 @@ def _check_standard_errors(tables: tuple[str, ...], n: int, low: float, high: fl
         identified = np.isfinite(values[name])  # now and then noise sends a coefficient to 0, and the fit says so
         assert identified.mean() > 0.95
         scatter = np.std(values[name][identified])
-        stated = np.sqrt(np.mean(errors[name][identified] ** 2))
-        assert low < stated / scatter < high, name
+        predicted_sd = np.sqrt(np.mean(errors[name][identified] ** 2))
+        assert low < predicted_sd / scatter < high, name
         assert abs(np.mean(values[name][identified]) - TRUTH[name]) < (4.5 / np.sqrt(n) + 0.1) * scatter, name
 
 
@@ -155,13 +155,13 @@ def test_standard_errors_are_what_many_experiments_scatter_by_to_a_tenth(tables)
 def test_readings_and_scatter_are_those_of_the_fit():
     """The scatter of an efficiency table is that of its log efficiencies; of an angle table, that of its angles."""
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), seed=1, once=True)
-    _, found = fitted(dataset)
+    _, solution = fitted(dataset)
     angles, efficiencies = dataset.measurements.table(AngleTable), dataset.measurements.table(EfficiencyTable)
-    loss = np.log(efficiencies.efficiency / found.readings["efficiency"])
-    assert found.residual_sd["efficiency"] == pytest.approx(np.sqrt(np.sum(loss**2) / (len(loss) - 2)), rel=0.2)
-    readings = found.readings["wrap_angle"].reshape(2, -1).T
+    loss = np.log(efficiencies.efficiency / solution.readings["efficiency"])
+    assert solution.residual_sd["efficiency"] == pytest.approx(np.sqrt(np.sum(loss**2) / (len(loss) - 2)), rel=0.2)
+    readings = solution.readings["wrap_angle"].reshape(2, -1).T
     deviation = np.rad2deg(angles.angle) - readings
-    assert found.residual_sd["wrap_angle"] == pytest.approx(
+    assert solution.residual_sd["wrap_angle"] == pytest.approx(
         np.sqrt(np.sum(deviation**2) / (deviation.size - 6)), rel=0.02
     )
 
@@ -176,21 +176,21 @@ def _constant(name: str, friction: str, angle: float) -> dict:
 @pytest.mark.extended
 def test_two_coefficients_at_constant_angles_are_not_told_apart():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_clamp", 70)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
+    _, solution = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
     for name in ("mu_edge", "mu_clamp"):
-        assert not found.estimates[name].identified
-        assert np.isnan(found.estimates[name].value) and np.isnan(found.estimates[name].standard_error)
-        assert "do not determine" in found.estimates[name].remark
-    assert found.estimates["mu_free"].identified
-    assert found.condition_number == np.inf
+        assert not solution.estimates[name].identified
+        assert np.isnan(solution.estimates[name].value) and np.isnan(solution.estimates[name].standard_error)
+        assert "do not determine" in solution.estimates[name].remark
+    assert solution.estimates["mu_free"].identified
+    assert solution.condition_number == np.inf
 
 
 @pytest.mark.extended
 def test_one_coefficient_at_two_constant_angles_is_identified():
     contacts = [CONTACTS[0], _constant("one edge", "mu_edge", 45), _constant("other edge", "mu_edge", 70)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
-    assert all(estimate.identified for estimate in found.estimates.values())
-    assert np.isfinite(found.condition_number)
+    _, solution = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
+    assert all(estimate.identified for estimate in solution.estimates.values())
+    assert np.isfinite(solution.condition_number)
 
 
 @pytest.mark.extended
@@ -207,10 +207,10 @@ def test_a_gain_error_is_not_told_from_a_constant_angle_by_pulling_alone_but_is_
 @pytest.mark.extended
 def test_a_contact_without_wrap_says_nothing_of_its_coefficient():
     contacts = [CONTACTS[0], CONTACTS[1], _constant("straight", "mu_edge", 0.0)]
-    _, found = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
-    assert not found.estimates["mu_edge"].identified
-    assert np.isnan(found.estimates["mu_edge"].value)
-    assert found.estimates["mu_free"].identified and found.estimates["mu_squeezed"].identified
+    _, solution = fitted(measured(cable(3, contact=contacts), seed=1, once=True)[0])
+    assert not solution.estimates["mu_edge"].identified
+    assert np.isnan(solution.estimates["mu_edge"].value)
+    assert solution.estimates["mu_free"].identified and solution.estimates["mu_squeezed"].identified
 
 
 def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
@@ -222,8 +222,8 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
     )  # all loss grows with the free angle, and falls with the squeezed one
     loss = np.linspace(0.1, 0.9, len(table.route))
     changed = dataset.measurements.with_tables(replace(table, efficiency=np.exp(-loss)))
-    _, found = fitted(replace(dataset, measurements=changed))
-    estimate = found.estimates["mu_squeezed"]
+    _, solution = fitted(replace(dataset, measurements=changed))
+    estimate = solution.estimates["mu_squeezed"]
     assert not estimate.identified and np.isnan(estimate.value)
     assert estimate.at_bound and "runs to its lower end" in estimate.remark
 
@@ -231,13 +231,13 @@ def test_a_coefficient_that_would_be_negative_is_not_given_a_number():
 @pytest.mark.extended
 def test_fixed_parameters_keep_their_value_and_have_no_error():
     description = cable(3, friction={"mu_edge": {"fixed": 0.17}}, prior={"sigma_theta": {"fixed": 2.0}})
-    posterior, found = fitted(measured(description, seed=1, once=True)[0])
-    assert found.estimates["mu_edge"].value == 0.17
-    assert np.isnan(found.estimates["mu_edge"].standard_error)
-    assert found.estimates["mu_edge"].remark == "fixed"
+    posterior, solution = fitted(measured(description, seed=1, once=True)[0])
+    assert solution.estimates["mu_edge"].value == 0.17
+    assert np.isnan(solution.estimates["mu_edge"].standard_error)
+    assert solution.estimates["mu_edge"].remark == "fixed"
     assert {p.name for p in posterior.model.space.fixed} == {"mu_edge", "sigma_theta"}
     _, _, free = plain()
-    assert found.estimates["mu_free"].standard_error < free.estimates["mu_free"].standard_error
+    assert solution.estimates["mu_free"].standard_error < free.estimates["mu_free"].standard_error
 
 
 @pytest.mark.extended
@@ -251,10 +251,10 @@ def test_a_prior_moves_the_maximum_of_the_posterior_and_not_the_classical_estima
     assert float(jax.jit(posterior.model.space.constrain)(best.z)["mu_free"]) > 0.17
     assert np.all(np.linalg.eigvalsh(best.covariance) > 0)
     assert np.all(np.diag(best.covariance) <= 1 + 1e-9)  # never wider than the prior
-    found = fit_least_squares(posterior, objective, np.zeros(posterior.model.space.size))
+    solution = fit_least_squares(posterior, objective, np.zeros(posterior.model.space.size))
     for name, estimate in without.estimates.items():
         if name != "mu_free":  # 23 sd away from its prior, in whose units the data say little
-            assert found.estimates[name].value == pytest.approx(estimate.value, rel=1e-6), name
+            assert solution.estimates[name].value == pytest.approx(estimate.value, rel=1e-6), name
 
 
 # The solver -------------------------------------------------------------------------------------------------------
@@ -272,9 +272,9 @@ def _exponential(x: np.ndarray, y: np.ndarray):
 
 def test_the_solver_finds_an_exact_minimum_to_the_last_digits():
     x = np.linspace(0.0, 2.0, 9)
-    found = minimize(_exponential(x, 3.0 * np.exp(0.7 * x)), np.array([1.0, 0.0]))
-    assert found.succeeded
-    np.testing.assert_allclose(found.x, [3.0, 0.7], rtol=1e-14)
+    solution = minimize(_exponential(x, 3.0 * np.exp(0.7 * x)), np.array([1.0, 0.0]))
+    assert solution.succeeded
+    np.testing.assert_allclose(solution.x, [3.0, 0.7], rtol=1e-14)
 
 
 def test_the_solver_avoids_where_residuals_cannot_be_computed():
@@ -284,18 +284,18 @@ def test_the_solver_avoids_where_residuals_cannot_be_computed():
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.array([np.sqrt(p[0]) - 0.1, 0.01 * (p[0] - 1.0)]), np.array([[0.5 / np.sqrt(p[0])], [0.01]])
 
-    found = minimize(evaluate, np.array([25.0]))
-    assert found.succeeded and 0.0 < found.x[0] < 0.1
+    solution = minimize(evaluate, np.array([25.0]))
+    assert solution.succeeded and 0.0 < solution.x[0] < 0.1
 
 
 def test_the_solver_says_that_residuals_at_the_start_are_not_numbers():
-    found = minimize(lambda p: (np.full(2, np.nan), np.zeros((2, 1))), np.array([1.0]))
-    assert not found.succeeded
+    solution = minimize(lambda p: (np.full(2, np.nan), np.zeros((2, 1))), np.array([1.0]))
+    assert not solution.succeeded
 
 
 def test_the_solver_leaves_what_has_no_parameters_alone():
-    found = minimize(lambda p: (np.array([3.0, 4.0]), np.zeros((2, 0))), np.zeros(0))
-    assert found.succeeded and found.sum_of_squares == 25.0
+    solution = minimize(lambda p: (np.array([3.0, 4.0]), np.zeros((2, 0))), np.zeros(0))
+    assert solution.succeeded and solution.sum_of_squares == 25.0
 
 
 @pytest.mark.parametrize(("precision", "digits"), [(solver.QUICK, 8), (solver.ROUGH, 5)])
@@ -303,12 +303,12 @@ def test_a_quick_solve_has_its_digits_of_the_sum_of_squares_with_fewer_evaluatio
     x, rng = np.linspace(0.0, 2.0, 30), np.random.default_rng(1)
     y = 3.0 * np.exp(0.7 * x) + 0.2 * rng.standard_normal(30)
     counts, sums = [], []
-    for asked in (solver.PRECISE, precision):
+    for request in (solver.PRECISE, precision):
         calls = []
         evaluate = _exponential(x, y)
-        found = minimize(lambda p, kept=calls, f=evaluate: kept.append(p) or f(p), np.array([1.0, 0.0]), asked)
+        solution = minimize(lambda p, history=calls, f=evaluate: history.append(p) or f(p), np.array([1.0, 0.0]), request)
         counts.append(len(calls))
-        sums.append(found.sum_of_squares)
+        sums.append(solution.sum_of_squares)
     assert sums[1] == pytest.approx(sums[0], rel=10.0**-digits)
     assert counts[1] < counts[0]
 

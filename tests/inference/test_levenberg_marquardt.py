@@ -23,46 +23,46 @@ def _counted(evaluate):
     return calls, lambda x: calls.append(x) or evaluate(x)
 
 
-def _of_itself(given, start, steps: int):
+def _of_itself(arguments, start, steps: int):
     """What optimistix's own loop finds, with the model in the program, of as many rows as are stepped from outside.
 
     Rows of zeros change nothing but the rounding of singular values, which hundreds of steps along a bent valley add up.
     """
-    method, none = LevenbergMarquardt(1e-14, 1e-13, 0.3), jnp.zeros(round_up_count(len(given.y)) - len(given.y))
+    method, none = LevenbergMarquardt(1e-14, 1e-13, 0.3), jnp.zeros(round_up_count(len(arguments.y)) - len(arguments.y))
 
     def residuals(b, _):
-        return jnp.concatenate([given.model(b, given.x) - given.y, none])
+        return jnp.concatenate([arguments.model(b, arguments.x) - arguments.y, none])
 
     return optx.least_squares(residuals, method, jnp.asarray(start), max_steps=steps, throw=False)
 
 
 def test_of_three_decays_from_afar_the_solver_finds_the_certified_minimum_with_no_other_start():
-    given = problem("mgh17")
-    calls, evaluate = _counted(given.evaluate())
-    found = minimize(evaluate, given.starts[0])
-    assert found.succeeded
-    assert digits_alike(found.x, given.certified) > 8
+    regression = problem("mgh17")
+    calls, evaluate = _counted(regression.evaluate())
+    solution = minimize(evaluate, regression.starts[0])
+    assert solution.succeeded
+    assert digits_alike(solution.x, regression.certified) > 8
     assert len(calls) < 500
-    assert sum(np.array_equal(x, given.starts[0]) for x in calls) == 1
+    assert sum(np.array_equal(x, regression.starts[0]) for x in calls) == 1
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("name", ["mgh17", "hahn1", "misra1a"])
 def test_stepped_from_outside_it_takes_the_steps_of_optimistix_s_own_loop(name, monkeypatch):
-    given = problem(name)
+    regression = problem(name)
     monkeypatch.setattr(solver, "_MOST_POLISHING", 0)
-    calls, evaluate = _counted(given.evaluate())
-    found = minimize(evaluate, given.starts[0])
-    alone = _of_itself(given, given.starts[0], 1000)
+    calls, evaluate = _counted(regression.evaluate())
+    solution = minimize(evaluate, regression.starts[0])
+    alone = _of_itself(regression, regression.starts[0], 1000)
     assert alone.result == optx.RESULTS.successful
     assert abs(int(alone.stats["num_steps"]) - len(calls)) <= 3  # rounding may put off the end
     # Both end where the sum of squares changes by 1e-14 of itself, and so within some 5e-7 standard errors of the minimum.
-    np.testing.assert_array_less(np.abs(found.x - alone.value), 1e-6 * given.standard_deviation)
+    np.testing.assert_array_less(np.abs(solution.x - alone.value), 1e-6 * regression.standard_deviation)
 
 
 def test_without_enough_steps_it_does_not_claim_an_end():
-    given = problem("mgh17")
-    assert _of_itself(given, given.starts[0], 20).result != optx.RESULTS.successful
+    regression = problem("mgh17")
+    assert _of_itself(regression, regression.starts[0], 20).result != optx.RESULTS.successful
 
 
 @pytest.mark.extended
@@ -72,12 +72,12 @@ def test_a_fit_whose_solver_did_not_end_says_so(monkeypatch):
     assert fit_least_squares(posterior, objective, start, intervals=False).message == ""
     monkeypatch.setattr(solver, "_MOST_POLISHING", 0)
 
-    def one_evaluation(*asked):
-        return objective(*asked[:-1], asked[-1]._replace(evaluations=1))
+    def one_evaluation(*request):
+        return objective(*request[:-1], request[-1]._replace(evaluations=1))
 
-    found = fit_least_squares(posterior, one_evaluation, start, intervals=False)
-    assert not found.converged
-    assert "stopped before it met its tolerance" in found.message
+    solution = fit_least_squares(posterior, one_evaluation, start, intervals=False)
+    assert not solution.converged
+    assert "stopped before it met its tolerance" in solution.message
 
 
 @pytest.mark.parametrize("start", [[5.0, -3.0], [-40.0, 8.0], [0.0, 0.0]])
@@ -86,30 +86,30 @@ def test_where_residuals_have_a_kink_the_solver_ends_on_it(start):
         side = np.sign(x[0] - 0.3)
         return np.array([1 + 2 * abs(x[0] - 0.3), x[0] + x[1], x[1] - 1]), np.array([[2 * side, 0], [1, 1], [0, 1.0]])
 
-    found = minimize(evaluate, np.array(start))
-    assert found.x[0] == pytest.approx(0.3, abs=1e-9)
-    assert found.sum_of_squares < 1.02 * 1.845  # along the kink no tangent leads to its minimum, 1.845
+    solution = minimize(evaluate, np.array(start))
+    assert solution.x[0] == pytest.approx(0.3, abs=1e-9)
+    assert solution.sum_of_squares < 1.02 * 1.845  # along the kink no tangent leads to its minimum, 1.845
 
 
 def test_a_parameter_without_influence_stays_where_it_is_and_disturbs_nothing():
-    given = problem("hahn1")
-    evaluate = given.evaluate()
+    regression = problem("hahn1")
+    evaluate = regression.evaluate()
 
     def wider(x):
         residuals, jacobian = evaluate(np.delete(x, 3))
         return residuals, np.insert(jacobian, 3, 0.0, axis=1)
 
-    found = minimize(wider, np.insert(given.starts[1], 3, 17.0))
-    assert found.succeeded and found.x[3] == 17.0
-    np.testing.assert_allclose(np.delete(found.x, 3), minimize(evaluate, given.starts[1]).x, rtol=1e-7)
+    solution = minimize(wider, np.insert(regression.starts[1], 3, 17.0))
+    assert solution.succeeded and solution.x[3] == 17.0
+    np.testing.assert_allclose(np.delete(solution.x, 3), minimize(evaluate, regression.starts[1]).x, rtol=1e-7)
 
 
 def _tangent(jacobian: np.ndarray, residuals: np.ndarray):
     """The descent, and its state at a point with this Jacobian and these residuals."""
     descent = ScaledDescent()
-    at = jnp.zeros(jacobian.shape[1])
+    points = jnp.zeros(jacobian.shape[1])
     info = optx.FunctionInfo.ResidualJac(jnp.asarray(residuals), lx.MatrixLinearOperator(jnp.asarray(jacobian)))
-    return descent, descent.query(at, info, descent.init(at, info))
+    return descent, descent.query(points, info, descent.init(points, info))
 
 
 def test_a_long_radius_gives_the_gauss_newton_step_and_a_short_one_a_scaled_step_of_that_length():
@@ -133,13 +133,13 @@ def test_the_search_goes_where_the_sum_of_squares_falls_as_predicted_and_back_wh
         return optx.FunctionInfo.ResidualJac(jnp.asarray(residuals), lx.MatrixLinearOperator(jnp.eye(2)))
 
     search = RadiusSearch(1.0)
-    zero, before = jnp.zeros(2), info([1.0, 1.0])
-    _, accepted, _, state = search.step(jnp.asarray(True), zero, zero, before, before, search.init(zero, before))
+    zero, initial = jnp.zeros(2), info([1.0, 1.0])
+    _, accepted, _, state = search.step(jnp.asarray(True), zero, zero, initial, initial, search.init(zero, initial))
     assert bool(accepted) and float(state.radius) == 1.0
     there = jnp.array([-0.7, -0.7])
-    longer, good, *_ = search.step(jnp.asarray(False), zero, there, before, info([0.3, 0.3]), state)
-    shorter, bad, *_ = search.step(jnp.asarray(False), zero, there, before, info([9.0, 9.0]), state)
-    lost, nowhere, *_ = search.step(jnp.asarray(False), zero, there, before, info([1e100, 1e100]), state)
+    longer, good, *_ = search.step(jnp.asarray(False), zero, there, initial, info([0.3, 0.3]), state)
+    shorter, bad, *_ = search.step(jnp.asarray(False), zero, there, initial, info([9.0, 9.0]), state)
+    lost, nowhere, *_ = search.step(jnp.asarray(False), zero, there, initial, info([1e100, 1e100]), state)
     assert bool(good) and float(longer) > 1.0
     assert not bool(bad) and not bool(nowhere)
     assert float(lost) <= float(shorter) < 1.0
@@ -147,8 +147,8 @@ def test_the_search_goes_where_the_sum_of_squares_falls_as_predicted_and_back_wh
 
 def test_tables_that_differ_by_a_few_rows_are_stepped_by_one_program():
     """The certified minima above are those of such tables: the 33 rows of mgh17 are stepped as 40."""
-    rows, before = 33, levenberg_marquardt._compile_step.cache_info().misses
+    rows, initial = 33, levenberg_marquardt._compile_step.cache_info().misses
     assert round_up_count(rows) == 40
     for count in range(rows, 41):
         levenberg_marquardt.compile_stepper(count, 2)
-    assert levenberg_marquardt._compile_step.cache_info().misses <= before + 1
+    assert levenberg_marquardt._compile_step.cache_info().misses <= initial + 1

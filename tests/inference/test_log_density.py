@@ -78,9 +78,9 @@ def test_gradients_agree_with_finite_differences_also_far_out(models, name):
     value, slope = value.reshape(len(shifts), -1), slope.reshape(len(shifts), *z.shape)
     assert np.all(np.isfinite(value))
     assert np.all(np.isfinite(slope))
-    at, along = value[2], np.sum(slope[2] * direction, axis=1)
+    base, along = value[2], np.sum(slope[2] * direction, axis=1)
     difference = (8 * (value[3] - value[1]) - (value[4] - value[0])) / (12 * h)
-    rounding = 1e-15 * np.abs(at) / h
+    rounding = 1e-15 * np.abs(base) / h
     assert np.all(np.abs(difference - along) <= 1e-6 * np.abs(along) + 100 * rounding + 1e-8)
 
 
@@ -94,8 +94,8 @@ def test_residuals_and_their_derivatives_are_finite_far_out(models, name):
     jacobian, residuals = over_rows(
         jax.jacfwd(lambda z, data: (posterior.residuals(z, data),) * 2, has_aux=True), z, posterior.data
     )
-    for found in (residuals, jacobian):
-        assert all(np.all(np.isfinite(x)) for x in found.values())
+    for computed in (residuals, jacobian):
+        assert all(np.all(np.isfinite(x)) for x in computed.values())
 
 
 @pytest.mark.parametrize("which", ["on-body", "bench"])
@@ -110,20 +110,20 @@ def test_ten_thousand_draws_of_the_prior_give_finite_densities_and_plausible_eff
     posterior = LogDensity(build_model(dataset))
     model = posterior.model
     low, high = model.description.route.range
-    at = jnp.linspace(low, high, 21)
+    points = jnp.linspace(low, high, 21)
 
     def of(z, data):
-        return posterior.log_density(z, data), jnp.exp(-model.cable.exponent_at(model.space.constrain(z), at))
+        return posterior.log_density(z, data), jnp.exp(-model.cable.exponent_at(model.space.constrain(z), points))
 
-    drawn = draws(model, 10_000, 8)
-    density, efficiency = over_rows(of, np.concatenate([np.zeros((1, model.space.size)), drawn]), posterior.data)
+    sample = draws(model, 10_000, 8)
+    density, efficiency = over_rows(of, np.concatenate([np.zeros((1, model.space.size)), sample]), posterior.data)
     assert np.all(np.isfinite(density))
     assert np.all((efficiency >= 0) & (efficiency < 1))
     assert np.all((efficiency[0] > 0.3) & (efficiency[0] < 0.95))  # z = 0, the medians of all priors
-    drawn = efficiency[1:]
-    assert np.mean(drawn.max(axis=1) > 0.05) > 0.96
-    assert np.mean(drawn[:, 10] > 0.05) > 0.84  # in the middle of the range
-    assert np.mean(drawn[:, [0, -1]] > 0.05) > 0.5  # at its ends
+    sample = efficiency[1:]
+    assert np.mean(sample.max(axis=1) > 0.05) > 0.96
+    assert np.mean(sample[:, 10] > 0.05) > 0.84  # in the middle of the range
+    assert np.mean(sample[:, [0, -1]] > 0.05) > 0.5  # at its ends
 
 
 DATA = Path(__file__).parents[2] / "datasets"
@@ -132,12 +132,15 @@ DATA_SETS = sorted(path.parent.name for path in DATA.glob("*/cable.toml"))
 
 def _measured_elsewhere(model: Model) -> Model:
     """The same terms with a cable that was measured at other loads and speeds."""
-    friction, at = model.cable.friction, model.cable.friction.conditions
-    load, (slow, fast) = at.median_load, at.speeds
+    friction, conditions = model.cable.friction, model.cable.friction.conditions
+    load, (slow, fast) = conditions.median_load, conditions.speeds
     elsewhere = replace(
-        at, reference_force=1.4 * at.reference_force, reference_speed=1.4 * at.reference_speed, speeds=(slow / 2, 2 * fast),
+        conditions,
+        reference_force=1.4 * conditions.reference_force,
+        reference_speed=1.4 * conditions.reference_speed,
+        speeds=(slow / 2, 2 * fast),
         median_load=None if load is None else 1.4 * load,
-    )  # fmt: skip
+    )
     cable = replace(model.cable, friction=replace(friction, conditions=elsewhere))
     return Model(cable, model.space, tuple(replace(term, cable=cable) for term in model.terms))
 
@@ -146,23 +149,23 @@ def _here_and_elsewhere(name: str, *settings: str) -> tuple[Model, dict[str, np.
     """A model, and the log likelihoods of its terms for cables measured at its own and at other loads and speeds."""
     model = build_model(load_dataset(DATA / name, settings))
     z, posterior, elsewhere = draws(model, 5, 7), LogDensity(model), LogDensity(_measured_elsewhere(model))
-    return model, *(over_rows(each.log_likelihoods, z, each.data) for each in (posterior, elsewhere))
+    return model, *(over_rows(item.log_likelihoods, z, item.data) for item in (posterior, elsewhere))
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("name", DATA_SETS)
 def test_terms_that_do_not_depend_on_conditions_are_the_same_elsewhere(name):
     """So that one compiled program may serve them all."""
-    model, here, there = _here_and_elsewhere(name)
+    model, original, there = _here_and_elsewhere(name)
     for term in model.terms:
         if not getattr(term, "depends_on_conditions", True):
-            np.testing.assert_array_equal(here[term.name], there[term.name])
+            np.testing.assert_array_equal(original[term.name], there[term.name])
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("setting", ["friction_model=load-dependent", 'sensors.offset_sd={value=1,unit="N"}'])
 def test_runs_depend_on_conditions_where_friction_or_load_cells_do(setting):
-    model, here, there = _here_and_elsewhere("synthetic-bench", setting)
+    model, original, there = _here_and_elsewhere("synthetic-bench", setting)
     runs = next(term for term in model.terms if term.name == "run_efficiency")
     assert runs.depends_on_conditions
-    assert not np.array_equal(here[runs.name], there[runs.name])
+    assert not np.array_equal(original[runs.name], there[runs.name])

@@ -28,8 +28,8 @@ def test_least_squares_recovers_friction_and_preload(several):
 
 
 def test_least_squares_of_recordings_without_noise_is_exact(tmp_path):
-    each = [recorded("triangle", 60.0, noise=0.0, seconds=8.0), recorded("sine", 90.0, noise=0.0, seconds=8.0)]
-    fit = bf.fit(folder_of(tmp_path, each), mcmc=False)
+    recordings = [recorded("triangle", 60.0, noise=0.0, seconds=8.0), recorded("sine", 90.0, noise=0.0, seconds=8.0)]
+    fit = bf.fit(folder_of(tmp_path, recordings), mcmc=False)
     assert fit.least_squares.estimates["mu"].value == pytest.approx(MU, rel=1e-3)
     assert fit.least_squares.estimates["preload"].value == pytest.approx(PRELOAD, rel=1e-3)
 
@@ -48,7 +48,7 @@ def test_recordings_are_fitted_together_with_a_loop_table(tmp_path, follows):
     """Also of a cable whose preload follows its stretch: then what the bent rope is preloaded to is lost with it."""
     stiffness, lengthening, bends = 50.0, 0.1 if follows else 0.0, (90, 180, 270)
     preloads = [PRELOAD + stiffness * lengthening * math.radians(bend) for bend in bends]
-    each = [
+    recordings = [
         recorded(amplitude=90.0, exponent=MU * math.radians(bend), preload=preload, seconds=6.0, seed=i)
         for i, (bend, preload) in enumerate(zip(bends, preloads, strict=True))
     ]
@@ -63,9 +63,11 @@ def test_recordings_are_fitted_together_with_a_loop_table(tmp_path, follows):
     (tmp_path / "loop.csv").write_text("\n".join(rows) + "\n")
     more = "[tables]\nrecordings = {}\nloop = { file = 'loop.csv' }"
     if follows:
-        known = f"bedding_stretch.fixed = 1e-6\nstiffness.fixed = {stiffness}\nlengthening.fixed = {math.radians(lengthening)}"
-        more = f"[preload]\nmodel = 'stretch'\n[prior]\n{known}\n{more}"
-    fit = bf.fit(folder_of(tmp_path, each, angles=bends, more=more), mcmc=False)
+        settings = (
+            f"bedding_stretch.fixed = 1e-6\nstiffness.fixed = {stiffness}\nlengthening.fixed = {math.radians(lengthening)}"
+        )
+        more = f"[preload]\nmodel = 'stretch'\n[prior]\n{settings}\n{more}"
+    fit = bf.fit(folder_of(tmp_path, recordings, angles=bends, more=more), mcmc=False)
     for name, truth in (("mu", MU), ("preload", PRELOAD)):
         estimate = fit.least_squares.estimates[name]
         assert estimate.value == pytest.approx(truth, abs=max(4 * estimate.standard_error, 0.003 * truth)), name

@@ -31,19 +31,19 @@ def test_there_are_27_problems_each_with_its_source():
 @pytest.mark.parametrize("name", sorted(set(MODELS) - set(ROUNDED)))
 def test_readings_leave_the_certified_sum_of_squares_at_the_certified_parameters(name):
     """A reading or a certified value copied wrong would not."""
-    given = problem(name)
-    residuals, _ = given.evaluate()(given.certified)
-    assert float(residuals @ residuals) == pytest.approx(given.residual_sum_of_squares, rel=2e-10)
+    regression = problem(name)
+    residuals, _ = regression.evaluate()(regression.certified)
+    assert float(residuals @ residuals) == pytest.approx(regression.residual_sum_of_squares, rel=2e-10)
 
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 @pytest.mark.parametrize("start", [1, 2])
 def test_parameters_and_standard_errors_have_the_certified_digits(name, start):
-    found = certified(name)[start - 1]
-    assert found.succeeded
-    assert found.parameters >= DIGITS_OF_PARAMETERS
-    assert found.standard_errors >= ROUNDED.get(name, DIGITS_OF_ERRORS)
-    assert found.sum_of_squares >= ROUNDED.get(name, 8.0)
+    certified_fit = certified(name)[start - 1]
+    assert certified_fit.succeeded
+    assert certified_fit.parameters >= DIGITS_OF_PARAMETERS
+    assert certified_fit.standard_errors >= ROUNDED.get(name, DIGITS_OF_ERRORS)
+    assert certified_fit.sum_of_squares >= ROUNDED.get(name, 8.0)
 
 
 def test_at_least_52_of_54_runs_have_the_parameters_and_50_their_standard_errors():
@@ -53,10 +53,10 @@ def test_at_least_52_of_54_runs_have_the_parameters_and_50_their_standard_errors
 
 
 def test_a_reading_changed_in_its_fourth_digit_would_be_noticed():
-    given = problem("misra1a")
-    changed = given.y.copy()
+    regression = problem("misra1a")
+    changed = regression.y.copy()
     changed[3] *= 1.001
-    residuals, _ = given.evaluate()(given.certified)
-    wrong = residuals + given.y - changed
-    assert abs(float(wrong @ wrong) / given.residual_sum_of_squares - 1) > 1e-3
+    residuals, _ = regression.evaluate()(regression.certified)
+    wrong = residuals + regression.y - changed
+    assert abs(float(wrong @ wrong) / regression.residual_sum_of_squares - 1) > 1e-3
     assert np.all(np.isfinite(residuals))

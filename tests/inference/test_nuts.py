@@ -180,13 +180,13 @@ def saved(tmp_path_factory):
     return bf.fit(YARN, output=folder, sampler="nuts", seed=3, settings=QUICK, figures=False), folder
 
 
-@pytest.mark.parametrize("at", [200, 600])
-def test_resumed_chains_equal_those_that_were_never_interrupted(program, tmp_path, at):
+@pytest.mark.parametrize("point", [200, 600])
+def test_resumed_chains_equal_those_that_were_never_interrupted(program, tmp_path, point):
     """Interrupted while tuning, and after."""
 
     def stop(progress):
         assert progress.sampler == "nuts"
-        if progress.steps >= at:
+        if progress.steps >= point:
             raise Stop
 
     def run(**options):

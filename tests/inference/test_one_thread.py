@@ -61,8 +61,8 @@ def test_while_a_batch_is_fitted():
 def test_while_any_of_several_is_at_it():
     """In whichever order they end."""
     first, second = ExitStack(), ExitStack()
-    for each in (first, second):
-        each.enter_context(linear_algebra_in_one_thread())
+    for item in (first, second):
+        item.enter_context(linear_algebra_in_one_thread())
     first.close()
     assert threads() == {1}
     second.close()
@@ -79,5 +79,5 @@ def test_whichever_library_is_loaded_by_then():
         "    import jax, scipy.linalg\n"
         "    print(*(one['num_threads'] for one in threadpool_info() if one['user_api'] == 'blas'))"
     )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(found.stdout.split()) == {"1"}
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(process.stdout.split()) == {"1"}

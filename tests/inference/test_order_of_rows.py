@@ -42,12 +42,12 @@ def shuffled(folder: Path, name: str, seed: int) -> Path:
 @pytest.mark.parametrize("case", CASES)
 def test_the_order_of_rows_leaves_the_log_density_as_it_is(case, tmp_path):
     name, settings = CASES[case]
-    found = []
+    results = []
     for folder in (DATASETS / name, shuffled(tmp_path / "other", name, 1)):
         model = build_model(bf.read(folder, settings=list(settings)))
         density, z = LogDensity(model), POINTS[:, : model.space.size]
-        found.append(over_rows(density.log_density, z, density.data))
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-10)
+        results.append(over_rows(density.log_density, z, density.data))
+    np.testing.assert_allclose(results[1], results[0], rtol=1e-10)
 
 
 def test_the_order_of_rows_leaves_verdict_and_estimates_as_they_are(tmp_path):

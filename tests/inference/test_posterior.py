@@ -58,17 +58,17 @@ Moments = dict[str, tuple[float, float]]
 
 def moments(draws: Draws) -> Moments:
     """Mean and standard deviation of every quantity."""
-    return {name: (float(np.mean(each)), float(np.std(each))) for name, each in draws.items()}
+    return {name: (float(np.mean(draw)), float(np.std(draw))) for name, draw in draws.items()}
 
 
 def disagreements(draws: Draws, reference: Moments) -> list[str]:
     """Quantities whose mean is off by more than 0.1 sd or whose sd by more than 10 %."""
-    found, drawn = [], moments(draws)
+    results, posterior_draws = [], moments(draws)
     for name, (mean, sd) in reference.items():
-        shift, ratio = abs(drawn[name][0] - mean) / sd, drawn[name][1] / sd
+        shift, ratio = abs(posterior_draws[name][0] - mean) / sd, posterior_draws[name][1] / sd
         if shift > 0.1 or abs(ratio - 1) > 0.1:
-            found.append(f"{name}: mean off by {shift:.3f} sd, sd times {ratio:.3f}")
-    return found
+            results.append(f"{name}: mean off by {shift:.3f} sd, sd times {ratio:.3f}")
+    return results
 
 
 class Bench:
@@ -155,13 +155,13 @@ def test_nuts_gives_the_moments_that_are_kept_of_it(bench, by_nuts):
 
 @pytest.fixture(scope="module")
 def by_bowdenfit(bench, on_body) -> Draws:
-    found = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000", *FIRST_PRIORS])
-    assert found.converged
-    drawn = bench.quantities(found.posterior.flat_z)
+    fit = bf.fit(on_body, seed=20220728, settings=["sampler.target_ess=6000", *FIRST_PRIORS])
+    assert fit.converged
+    draws = bench.quantities(fit.posterior.flat_z)
     for name in ("mu1", "sigma_theta"):
-        np.testing.assert_allclose(found.posterior.values[name].ravel(), drawn[name], rtol=1e-6)  # kept in single precision
-    np.testing.assert_allclose(found.posterior.optimum["optimal_length"].ravel(), drawn["optimal_length"], rtol=1e-6)
-    return drawn
+        np.testing.assert_allclose(fit.posterior.values[name].ravel(), draws[name], rtol=1e-6)  # kept in single precision
+    np.testing.assert_allclose(fit.posterior.optimum["optimal_length"].ravel(), draws["optimal_length"], rtol=1e-6)
+    return draws
 
 
 def test_the_joint_posterior_agrees_with_nuts_on_the_same_density(by_bowdenfit, by_nuts):
@@ -187,11 +187,11 @@ def test_the_shortest_path_that_is_trusted_agrees_with_nuts(bench, by_nuts):
 
 def test_the_joint_posterior_has_the_stated_moments(by_bowdenfit, by_nuts):
     """Means within 0.1 sd and standard deviations within 10 %, beyond the rounding of what is printed."""
-    for drawn in (moments(by_bowdenfit), by_nuts):
+    for draws in (moments(by_bowdenfit), by_nuts):
         for name, (mean, sd) in STATED.items():
             digit = {"optimal_length": 0.05, "optimal_efficiency": 5e-4}.get(name, 5e-5)
-            assert abs(drawn[name][0] - mean) < 0.1 * sd + digit, name
-            assert abs(drawn[name][1] - sd) < 0.1 * sd + digit, name
+            assert abs(draws[name][0] - mean) < 0.1 * sd + digit, name
+            assert abs(draws[name][1] - sd) < 0.1 * sd + digit, name
     np.testing.assert_allclose(np.quantile(by_bowdenfit["optimal_length"], (0.05, 0.95)), (462.1, 476.5), atol=0.6)
 
 
@@ -204,10 +204,10 @@ def by_default(on_body) -> bf.Fit:
 @pytest.mark.extended
 def test_the_default_priors_give_the_stated_moments(by_default):
     """As above; 1000 effective draws know a mean to 0.03 sd and the sd of a heavy tail to 7 %, so 0.15 sd and 25 %."""
-    drawn = by_default.posterior.values | by_default.posterior.optimum
+    draws = by_default.posterior.values | by_default.posterior.optimum
     for name, (mean, sd) in BY_DEFAULT.items():
-        assert abs(np.mean(drawn[name]) - mean) < 0.15 * sd, name
-        assert abs(np.std(drawn[name]) / sd - 1) < 0.25, name
+        assert abs(np.mean(draws[name]) - mean) < 0.15 * sd, name
+        assert abs(np.std(draws[name]) / sd - 1) < 0.25, name
 
 
 @pytest.mark.extended
@@ -216,15 +216,17 @@ def test_others_find_the_draws_in_the_file_converged_and_count_effective_ones_as
     groups, *_ = posterior_page(by_default)
     axes = {"chain_axis": 0, "draw_axis": 1}
     per_chain = len(by_default.posterior.z) // by_default.posterior.n_ensembles
-    for name, known in by_default.posterior.diagnostics.items():
+    for name, reference in by_default.posterior.diagnostics.items():
         draws = groups["posterior"][name]
         assert draws.shape[0] == by_default.posterior.n_ensembles == 4
         assert array_stats.rhat(draws, method="rank", **axes) < 1.01, name
-        assert array_stats.ess(draws, method="bulk", **axes) == pytest.approx(known.ess_bulk, rel=1e-5), name
-        assert array_stats.ess(draws, method="tail", prob=(0.05, 0.95), **axes) == pytest.approx(known.ess_tail, rel=1e-5), name
+        assert array_stats.ess(draws, method="bulk", **axes) == pytest.approx(reference.ess_bulk, rel=1e-5), name
+        assert array_stats.ess(draws, method="tail", prob=(0.05, 0.95), **axes) == pytest.approx(
+            reference.ess_tail, rel=1e-5
+        ), name
         # What the file must not hold: all walkers step by step look independent, and a chain for each is no chain.
         by_steps = draws.reshape(4, per_chain, -1).transpose(0, 2, 1).reshape(4, -1)
-        assert array_stats.ess(by_steps, method="bulk", **axes) > 1.5 * known.ess_bulk, name
+        assert array_stats.ess(by_steps, method="bulk", **axes) > 1.5 * reference.ess_bulk, name
         assert array_stats.rhat(draws.reshape(4 * per_chain, -1), method="rank", **axes) > 1.05, name
 
 
@@ -266,6 +268,6 @@ def test_walkers_that_never_move_are_a_reason_not_to_trust_the_draws():
 
 if __name__ == "__main__":
     jax.config.update("jax_enable_x64", True)
-    kept = first_bench(Path(__file__).parents[2] / "datasets" / "on-body-exoskeleton")
-    page = {"moments": moments(drawn_by_nuts(kept)), "densities": densities(kept)}
+    bench = first_bench(Path(__file__).parents[2] / "datasets" / "on-body-exoskeleton")
+    page = {"moments": moments(drawn_by_nuts(bench)), "densities": densities(bench)}
     BY_NUTS.write_text(json.dumps(page, indent=1) + "\n", "utf-8")

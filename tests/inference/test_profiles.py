@@ -40,13 +40,13 @@ def _rows(seed: int, n: int = 9, truth: tuple[float, ...] = (0.15, 0.1)) -> tupl
 
 def test_of_a_linear_model_the_profile_interval_is_the_t_interval():
     loss, angle = _rows(1)
-    _, _, found = fitted(of_rows(loss, angle))
-    solution, rest, *_ = np.linalg.lstsq(angle, loss)
+    _, _, least_squares_fit = fitted(of_rows(loss, angle))
+    solution, remainder, *_ = np.linalg.lstsq(angle, loss)
     freedom = len(loss) - angle.shape[1]
-    error = np.sqrt(float(rest[0]) / freedom * np.diag(np.linalg.inv(angle.T @ angle)))
+    error = np.sqrt(float(remainder[0]) / freedom * np.diag(np.linalg.inv(angle.T @ angle)))
     t = stats.t.ppf(0.95, freedom)
     for k, name in enumerate(("mu1", "mu2")):
-        estimate = found.estimates[name]
+        estimate = least_squares_fit.estimates[name]
         assert estimate.value == pytest.approx(solution[k], rel=1e-9)
         assert estimate.standard_error == pytest.approx(error[k], rel=1e-9)
         assert (estimate.lower, estimate.upper) == pytest.approx(
@@ -56,7 +56,7 @@ def test_of_a_linear_model_the_profile_interval_is_the_t_interval():
 
 def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
     """The others fitted again by SciPy's trust region at every grid point, and the level crossed between two of them."""
-    posterior, _, found = fitted(measured(cable(1, ("angles",)), seed=3)[0])
+    posterior, _, solution = fitted(measured(cable(1, ("angles",)), seed=3)[0])
     size, index = posterior.model.space.size, posterior.model.space.index["free_angle_c"]
     free = np.array([i for i, p in enumerate(posterior.model.space.free) if p.role == "curve" and i != index])
 
@@ -64,8 +64,8 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
         z = jnp.zeros(size).at[free].set(part).at[index].set(pin)
         return posterior.residuals(z, data)["wrap_angle"]
 
-    start, data = found.z[free], posterior.data
-    residuals = compile_program(stacked, start, found.z[index], data, run_once=True)
+    start, data = solution.z[free], posterior.data
+    residuals = compile_program(stacked, start, solution.z[index], data, run_once=True)
 
     def least(pin: float) -> float:
         solved = optimize.least_squares(
@@ -74,8 +74,8 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
         return 2 * float(solved.cost)
 
     spare = len(posterior.data[0]["angle"]) - 3
-    level = found.sum_of_squares * (1 + stats.f.ppf(0.9, 1, spare) / spare)
-    grid = found.z[index] + np.linspace(-1.0, 1.0, 61)
+    level = solution.sum_of_squares * (1 + stats.f.ppf(0.9, 1, spare) / spare)
+    grid = solution.z[index] + np.linspace(-1.0, 1.0, 61)
     rises = np.array([least(pin) for pin in grid]) - level
     crossings = [
         grid[i] - rises[i] * (grid[i + 1] - grid[i]) / (rises[i + 1] - rises[i])
@@ -83,43 +83,43 @@ def test_of_a_curved_model_the_interval_is_that_of_a_brute_force_grid():
     ]
     prior = posterior.model.space.free[index].prior
     expected = [float(prior.constrain(jnp.asarray(z))) for z in crossings]
-    estimate = found.estimates["free_angle_c"]
+    estimate = solution.estimates["free_angle_c"]
     assert (estimate.lower, estimate.upper) == pytest.approx(expected, abs=0.02 * estimate.standard_error)
     skew = (estimate.upper - estimate.value) / (estimate.value - estimate.lower)
     assert abs(skew - 1) > 0.01  # else the test would not tell a profile from standard errors
 
 
-def _profiled(given: Problem, index: int) -> tuple[float, float, float, float]:
+def _profiled(regression: Problem, index: int) -> tuple[float, float, float, float]:
     """Certified value and standard deviation of a parameter, and the limits of its interval."""
-    evaluate, best = given.evaluate(), given.certified
-    center, error = float(best[index]), float(given.standard_deviation[index])
-    others = np.delete(np.arange(len(best)), index)
-    spare = len(given.y) - len(best)
+    evaluate, best = regression.evaluate(), regression.certified
+    center, error = float(best[index]), float(regression.standard_deviation[index])
+    remaining = np.delete(np.arange(len(best)), index)
+    spare = len(regression.y) - len(best)
 
     def rise(scaled: float) -> float:  # the search is made for numbers of the order of 1
         def pinned(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             b = best.copy()
-            b[index], b[others] = center + error * scaled, part
+            b[index], b[remaining] = center + error * scaled, part
             residuals, jacobian = evaluate(b)
-            return residuals, jacobian[:, others]
+            return residuals, jacobian[:, remaining]
 
-        return minimize(pinned, best[others]).sum_of_squares - given.residual_sum_of_squares
+        return minimize(pinned, best[remaining]).sum_of_squares - regression.residual_sum_of_squares
 
-    low, high = find_interval_ends(rise, 0.0, 1.0, given.residual_sum_of_squares / spare, float(spare))
+    low, high = find_interval_ends(rise, 0.0, 1.0, regression.residual_sum_of_squares / spare, float(spare))
     return center, error, center + error * low, center + error * high
 
 
 @pytest.mark.parametrize(("name", "index"), [("misra1c", 0), ("danwood", 1), ("eckerle4", 0), ("gauss1", 3)])
 def test_of_nearly_linear_certified_problems_the_interval_is_t_certified_standard_deviations(name, index):
-    given = problem(name)
-    center, error, low, high = _profiled(given, index)
-    t = stats.t.ppf(0.95, len(given.y) - len(given.certified))
+    regression = problem(name)
+    center, error, low, high = _profiled(regression, index)
+    t = stats.t.ppf(0.95, len(regression.y) - len(regression.certified))
     assert ((center - low) / error, (high - center) / error) == pytest.approx((t, t), rel=0.03)
 
 
 def test_of_a_strongly_curved_certified_problem_the_interval_is_lopsided():
-    given = problem("boxbod")
-    center, error, low, high = _profiled(given, 1)
+    regression = problem("boxbod")
+    center, error, low, high = _profiled(regression, 1)
     t = stats.t.ppf(0.95, 4)
     assert high - center > 1.3 * t * error
     assert center - low < 0.9 * t * error
@@ -175,22 +175,22 @@ def test_a_limit_just_beyond_a_step_or_far_beyond_a_flat_stretch_is_found():
 @pytest.mark.parametrize(("bend", "most"), [(0.0, 2), (0.02, 6), (0.1, 8)])
 def test_an_interval_takes_few_solves(bend, most):
     """One a side where the rise is a parabola and the error is that of it, four where it is about one."""
-    asked, quantile = set(), stats.norm.ppf(0.95)
+    request, quantile = set(), stats.norm.ppf(0.95)
 
     def rise(z):
-        asked.add(z)
+        request.add(z)
         return (z / 0.1) ** 2 * (1 + bend * z / 0.1)
 
     low, high = find_interval_ends(rise, 0.0, 0.1, 1.0, 1e9)
     assert [rise(low), rise(high)] == pytest.approx([quantile**2] * 2, rel=1e-3)
-    assert len(asked - {0.0, low, high}) + 2 <= most
+    assert len(request - {0.0, low, high}) + 2 <= most
 
 
 def test_an_interval_that_reaches_zero_is_cut_off_there():
     angle = np.deg2rad(np.linspace(20.0, 160.0, 8))[:, None]
     loss = 0.006 * angle[:, 0] + 0.02 * np.array([1, -1, 1, 1, -1, -1, 1, -1])
-    _, _, found = fitted(of_rows(loss, angle))
-    estimate = found.estimates["mu1"]
+    _, _, solution = fitted(of_rows(loss, angle))
+    estimate = solution.estimates["mu1"]
     assert estimate.identified and not estimate.at_bound
     assert estimate.lower == pytest.approx(0.0, abs=1e-9)
     slope = float(angle[:, 0] @ loss / (angle[:, 0] @ angle[:, 0]))
@@ -202,15 +202,15 @@ def test_a_coefficient_at_its_bound_has_an_upper_limit_and_says_so():
     """Its best value would be negative: the limit is where the sum of squares has risen from that at zero."""
     loss, angle = _rows(4, truth=(0.2, 0.0))
     loss = loss - 0.01 * angle[:, 1]
-    _, _, found = fitted(of_rows(loss, angle))
-    estimate = found.estimates["mu2"]
+    _, _, solution = fitted(of_rows(loss, angle))
+    estimate = solution.estimates["mu2"]
     assert estimate.at_bound and not estimate.identified
     assert "no finite minimum: runs to its lower end, " in estimate.remark and "; at most " in estimate.remark
     assert estimate.lower == pytest.approx(0.0, abs=1e-9)
 
     def least(mu: float) -> float:
-        rest = loss - mu * angle[:, 1]
-        return float(np.sum((rest - angle[:, 0] * (angle[:, 0] @ rest) / (angle[:, 0] @ angle[:, 0])) ** 2))
+        remainder = loss - mu * angle[:, 1]
+        return float(np.sum((remainder - angle[:, 0] * (angle[:, 0] @ remainder) / (angle[:, 0] @ angle[:, 0])) ** 2))
 
     spare = len(loss) - 1
     level = least(0.0) * (1 + stats.t.ppf(0.95, spare) ** 2 / spare)
@@ -227,14 +227,14 @@ def test_beside_a_coefficient_at_its_bound_limits_are_those_of_non_negative_leas
     angle[:, 2] = angle[:, 1] + np.deg2rad(rng.uniform(-8.0, 8.0, 12))
     loss = angle @ np.array([0.15, 0.01, 0.1]) + 0.01 * rng.standard_normal(12)
     estimates = fitted(of_rows(loss, angle))[2].estimates
-    mu, rest = optimize.nnls(angle, loss)
+    mu, remainder = optimize.nnls(angle, loss)
     assert mu[1] == 0.0 and estimates["mu2"].at_bound
-    level = rest**2 * (1 + stats.t.ppf(0.95, 10) ** 2 / 10)
+    level = remainder**2 * (1 + stats.t.ppf(0.95, 10) ** 2 / 10)
     for k in (0, 2):
-        others = np.delete(angle, k, axis=1)
+        remaining = np.delete(angle, k, axis=1)
 
-        def above(pin, k=k, others=others):
-            return optimize.nnls(others, loss - pin * angle[:, k])[1] ** 2 - level
+        def above(pin, k=k, remaining=remaining):
+            return optimize.nnls(remaining, loss - pin * angle[:, k])[1] ** 2 - level
 
         estimate, limits = estimates[f"mu{k + 1}"], [optimize.brentq(above, mu[k], end) for end in (0.0, 1.0)]
         assert estimate.value == pytest.approx(mu[k], rel=1e-6)
@@ -243,18 +243,18 @@ def test_beside_a_coefficient_at_its_bound_limits_are_those_of_non_negative_leas
 
 def test_data_without_scatter_give_no_interval_wider_than_rounding():
     loss, angle = _rows(2)
-    _, _, found = fitted(of_rows(angle @ np.array([0.15, 0.1]), angle))
-    assert found.converged  # rounding leads nowhere
-    estimate = found.estimates["mu1"]
+    _, _, solution = fitted(of_rows(angle @ np.array([0.15, 0.1]), angle))
+    assert solution.converged  # rounding leads nowhere
+    estimate = solution.estimates["mu1"]
     assert estimate.lower == pytest.approx(0.15, rel=1e-6) and estimate.upper == pytest.approx(0.15, rel=1e-6)
 
 
 def test_a_fixed_parameter_and_an_undetermined_one_have_no_interval():
     loss, angle = _rows(1)
-    _, _, found = fitted(of_rows(loss, np.column_stack([angle[:, 0], angle[:, 0]])))
-    assert all(np.isnan(found.estimates[name].lower) for name in ("mu1", "mu2"))
-    _, _, found = fitted(of_rows(loss, angle, friction={"mu1": {"fixed": 0.15}}))
-    assert np.isnan(found.estimates["mu1"].upper) and np.isfinite(found.estimates["mu2"].upper)
+    _, _, solution = fitted(of_rows(loss, np.column_stack([angle[:, 0], angle[:, 0]])))
+    assert all(np.isnan(solution.estimates[name].lower) for name in ("mu1", "mu2"))
+    _, _, solution = fitted(of_rows(loss, angle, friction={"mu1": {"fixed": 0.15}}))
+    assert np.isnan(solution.estimates["mu1"].upper) and np.isfinite(solution.estimates["mu2"].upper)
 
 
 # Profiles for figures ---------------------------------------------------------------------------------------------
@@ -262,9 +262,9 @@ def test_a_fixed_parameter_and_an_undetermined_one_have_no_interval():
 
 def test_a_profile_is_a_parabola_of_a_linear_model():
     loss, angle = _rows(1)
-    posterior, objective, found = fitted(of_rows(loss, angle))
-    plain = compute_profile(posterior, objective, "mu1", found.z, np.linspace(-0.5, 0.5, 9))
-    curvature = plain.rise / (plain.values - found.estimates["mu1"].value) ** 2
+    posterior, objective, solution = fitted(of_rows(loss, angle))
+    plain = compute_profile(posterior, objective, "mu1", solution.z, np.linspace(-0.5, 0.5, 9))
+    curvature = plain.rise / (plain.values - solution.estimates["mu1"].value) ** 2
     np.testing.assert_allclose(curvature, curvature[0], rtol=1e-5)
     values = [0.12 * np.exp(1.4 * z) for z in np.linspace(-0.5, 0.5, 9)]
     np.testing.assert_allclose(plain.values, values, rtol=1e-9)
@@ -272,10 +272,10 @@ def test_a_profile_is_a_parabola_of_a_linear_model():
 
 def test_the_profile_of_what_readings_do_not_tell_is_flat_until_the_prior_counts():
     loss, angle = _rows(1)
-    posterior, objective, found = fitted(of_rows(loss, np.column_stack([angle[:, 0], 0 * angle[:, 0]])))
-    flat = compute_profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0])
+    posterior, objective, solution = fitted(of_rows(loss, np.column_stack([angle[:, 0], 0 * angle[:, 0]])))
+    flat = compute_profile(posterior, objective, "mu2", solution.z, [-2.0, 0.0, 2.0])
     np.testing.assert_allclose(flat.rise, 0.0, atol=1e-9)
-    informed = compute_profile(posterior, objective, "mu2", found.z, [-2.0, 0.0, 2.0], with_priors=True)
+    informed = compute_profile(posterior, objective, "mu2", solution.z, [-2.0, 0.0, 2.0], with_priors=True)
     np.testing.assert_allclose(informed.rise, [4.0, 0.0, 4.0], atol=1e-6)
 
 
@@ -295,8 +295,8 @@ def test_nine_in_ten_intervals_hold_the_truth(experiments):
         space = space or posterior.model.space
         posterior = LogDensity(replace(posterior.model, space=space))
         objective = objective or make_objective(posterior)
-        found = fit_least_squares(posterior, objective, np.zeros(space.size))
-        ends = [(found.estimates[name].lower, found.estimates[name].upper) for name in ("mu1", "mu2")]
+        solution = fit_least_squares(posterior, objective, np.zeros(space.size))
+        ends = [(solution.estimates[name].lower, solution.estimates[name].upper) for name in ("mu1", "mu2")]
         hits += [low <= value <= high for (low, high), value in zip(ends, truth, strict=True)]
     assert np.all(np.abs(hits - 0.9 * experiments) < 3.8 * np.sqrt(experiments * 0.9 * 0.1))
 
@@ -304,8 +304,8 @@ def test_nine_in_ten_intervals_hold_the_truth(experiments):
 def test_a_coefficient_at_the_upper_limit_of_its_prior_has_a_lower_limit_and_says_so():
     """The truth, 0.15, lies beyond the uniform prior's 0.12: the limit is where the sum has risen from that at 0.12."""
     loss, angle = _rows(6, truth=(0.15,))
-    _, _, found = fitted(of_rows(loss, angle, friction={"mu1": {"prior": {"uniform": {"low": 0.01, "high": 0.12}}}}))
-    estimate = found.estimates["mu1"]
+    _, _, solution = fitted(of_rows(loss, angle, friction={"mu1": {"prior": {"uniform": {"low": 0.01, "high": 0.12}}}}))
+    estimate = solution.estimates["mu1"]
     assert estimate.at_bound and not estimate.identified
     assert "runs to its upper end, 0.12" in estimate.remark
     assert estimate.upper == pytest.approx(0.12, rel=1e-6)
@@ -315,13 +315,13 @@ def test_a_coefficient_at_the_upper_limit_of_its_prior_has_a_lower_limit_and_say
 def test_a_limit_is_found_to_its_tolerance_between_any_two_points_and_on_plateaus():
     rng = np.random.default_rng(1)
     for power in (0.3, 0.5, 1.0, 2.0, 5.0):
-        for at in rng.uniform(0.01, 0.99, 40):
-            found = find_crossing(lambda x, p=power, r=at: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
-            assert found == pytest.approx(-at, abs=1e-3)
-            assert find_crossing(lambda x, r=at: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(at, abs=1e-3)
+        for level in rng.uniform(0.01, 0.99, 40):
+            computed = find_crossing(lambda x, p=power, r=level: np.copysign(abs(abs(x) - r) ** p, abs(x) - r), 0.0, -1.0, 1e-3)
+            assert computed == pytest.approx(-level, abs=1e-3)
+            assert find_crossing(lambda x, r=level: 1e150 if x > r else -1.0, 0.0, 1.0, 1e-3) == pytest.approx(level, abs=1e-3)
 
 
 def test_a_limit_is_looked_for_between_its_points_even_where_these_are_nearer_than_the_tolerance():
-    asked = []
-    found = find_crossing(lambda x: asked.append(x) or x - 37.99995, 37.9999, 38.0, 1e-2)
-    assert all(37.9999 <= x <= 38.0 for x in (found, *asked))
+    requests = []
+    computed = find_crossing(lambda x: requests.append(x) or x - 37.99995, 37.9999, 38.0, 1e-2)
+    assert all(37.9999 <= x <= 38.0 for x in (computed, *requests))

@@ -173,40 +173,40 @@ class Told:
 
 
 @pytest.fixture
-def told() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def fixed_numbers() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Uniform numbers, moving and resting walkers, (walker, number or dimension)."""
     random = np.random.default_rng(1)
     return random.uniform(size=(9, count_move_numbers(DIMENSIONS))), *random.standard_normal((2, 9, DIMENSIONS))
 
 
-def proposed(move, told):
+def proposed(move, outcome):
     with jax.enable_x64(True):
-        uniform, moving, resting = map(jnp.asarray, told)
+        uniform, moving, resting = map(jnp.asarray, outcome)
         return tuple(np.asarray(part) for part in move(random_numbers(uniform), moving, resting))
 
 
-def test_stretch_moves_are_emcee_s_own_given_the_same_random_numbers(told):
-    uniform, moving, resting = told
+def test_stretch_moves_are_emcee_s_own_given_the_same_random_numbers(fixed_numbers):
+    uniform, moving, resting = fixed_numbers
     random = Told(rand=uniform[:, 0], randint=(9 * uniform[:, 1]).astype(int))
     places, factors = emcee.moves.StretchMove().get_proposal(moving, [resting], random)
-    found = proposed(stretch, told)
-    np.testing.assert_allclose(found[0], places, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(found[1], factors, rtol=1e-12)
+    computed = proposed(stretch, fixed_numbers)
+    np.testing.assert_allclose(computed[0], places, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(computed[1], factors, rtol=1e-12)
 
 
 @pytest.mark.parametrize("gamma", [None, 1.0])
-def test_differential_evolution_is_emcee_s_own_given_the_same_random_numbers(told, gamma):
-    uniform, moving, resting = told
+def test_differential_evolution_is_emcee_s_own_given_the_same_random_numbers(fixed_numbers, gamma):
+    uniform, moving, resting = fixed_numbers
     theirs = emcee.moves.DEMove(gamma0=gamma)
     theirs.setup(moving)
     pairs = [tuple(pair) for pair in _get_nondiagonal_pairs(9)]
     first, further = (9 * uniform[:, 0]).astype(int), 1 + (8 * uniform[:, 1]).astype(int)
-    choice = [pairs.index((one, (one + more) % 9)) for one, more in zip(first, further, strict=True)]
+    choice = [pairs.index((single, (single + more) % 9)) for single, more in zip(first, further, strict=True)]
     random = Told(choice=choice, randn=2 * uniform[:, 2:3] - 1)
     places, factors = theirs.get_proposal(moving, [resting], random)
-    found = proposed(partial(differential_evolution, gamma=gamma), told)
-    np.testing.assert_allclose(found[0], places, rtol=1e-12, atol=1e-12)
-    np.testing.assert_array_equal(found[1], factors)
+    computed = proposed(partial(differential_evolution, gamma=gamma), fixed_numbers)
+    np.testing.assert_allclose(computed[0], places, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(computed[1], factors)
 
 
 class ToldOneByOne:
@@ -223,17 +223,17 @@ class ToldOneByOne:
         rows[:] = rows[next(self.orders)]
 
 
-def test_the_snooker_move_of_controls_is_emcee_s_own_given_the_same_random_numbers(told):
-    uniform, moving, resting = told
+def test_the_snooker_move_of_controls_is_emcee_s_own_given_the_same_random_numbers(fixed_numbers):
+    uniform, moving, resting = fixed_numbers
     expected = emcee.moves.DESnookerMove().get_proposal(moving, np.array_split(resting, 3), ToldOneByOne(uniform))
-    for found, known in zip(proposed(snooker, told), expected, strict=True):
-        np.testing.assert_allclose(found, known, rtol=1e-12, atol=1e-12)
+    for computed, reference in zip(proposed(snooker, fixed_numbers), expected, strict=True):
+        np.testing.assert_allclose(computed, reference, rtol=1e-12, atol=1e-12)
 
 
-def test_draws_from_a_fitted_distribution_have_the_factors_of_their_places(told):
+def test_draws_from_a_fitted_distribution_have_the_factors_of_their_places(fixed_numbers):
     """The t distribution's density at both, with the mean and covariance of the resting walkers."""
-    uniform, moving, resting = told
-    places, factors = proposed(fitted_t, told)
+    uniform, moving, resting = fixed_numbers
+    places, factors = proposed(fitted_t, fixed_numbers)
     fitted = stats.multivariate_t(resting.mean(axis=0), np.cov(resting.T), df=5)
     np.testing.assert_allclose(factors, fitted.logpdf(moving) - fitted.logpdf(places), rtol=1e-6, atol=1e-6)
 
@@ -257,8 +257,8 @@ def test_side_by_side_with_one_ensemble_is_distributed_as_emcee_s_own_sampler(mo
         sampler = emcee.EnsembleSampler(walkers, DIMENSIONS, log_t_of_rows, vectorize=True, moves=EMCEE_MOVES[move])
         state = emcee.State(start, random_state=np.random.RandomState(seed + 100).get_state())
         sampler.run_mcmc(state, steps // THIN, thin_by=THIN, skip_initial_state_check=True)
-        others = sampler.get_chain()[:, None]
-        for name, states in (("side by side", alone), ("emcee", others)):
+        remaining = sampler.get_chain()[:, None]
+        for name, states in (("side by side", alone), ("emcee", remaining)):
             shares[name].append(below_quantiles(states)[0])
     p = stats.ttest_ind(*shares.values(), axis=0, equal_var=False).pvalue
     assert np.nanmin(p) * p.size > 0.001
@@ -284,8 +284,8 @@ def test_walkers_that_start_where_the_density_cannot_be_computed_come_in_and_non
     assert np.all(states[-1, ..., 0] > 0)
 
 
-def without_coordinates_below_zero(given, is_z, data):
-    w, z, volume = z_map(given, is_z, data)
+def without_coordinates_below_zero(arguments, is_z, data):
+    w, z, volume = z_map(arguments, is_z, data)
     return w, z, jnp.where(z[:, 0] > 0, volume, jnp.nan)
 
 

@@ -35,10 +35,10 @@ def z(model):
 def test_the_density_is_that_of_a_fit_and_the_sum_of_its_parts(model, z):
     density = LogDensity(model._model)
 
-    def add_up(at):
+    def add_up(value):
         """The density of the parameters is that of z times the slope of z, which is one over what log_prior divides by."""
-        parameters = model.constrain(at)
-        slope = jax.jacfwd(lambda at: jnp.stack(list(model.constrain(at).values())))(at)
+        parameters = model.constrain(value)
+        slope = jax.jacfwd(lambda point: jnp.stack(list(model.constrain(point).values())))(value)
         volume = jnp.log(jnp.abs(jnp.linalg.det(slope)))
         return model.log_likelihood(parameters) + model.log_prior(parameters) + volume, model.unconstrain(parameters)
 
@@ -75,7 +75,7 @@ def test_the_efficiency_along_a_route_is_that_of_a_fit_and_has_derivatives(on_bo
     parameters = model.constrain(z)
     expected = fit.model.cable.efficiency_at(fit.model.space.constrain(z), jnp.array([440.0, 470.0]))
     np.testing.assert_allclose(model.efficiency(parameters, [440.0, 470.0]), expected, rtol=1e-9)
-    slope = jax.grad(lambda at: model.efficiency(at, 470.0)[0])(parameters)
+    slope = jax.grad(lambda point: model.efficiency(point, 470.0)[0])(parameters)
     assert float(slope["mu3"]) == pytest.approx(-np.deg2rad(45) * float(expected[1]), rel=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_least_squares_of_ones_own_finds_the_coefficient(tmp_path):
 
     (tmp_path / "t.csv").write_text(TABLE)
     model = bf.model(tmp_path / "t.csv", settings=["prior.tau.fixed=0.01", "prior.sigma_F.fixed=0.2"])
-    solution = least_squares(lambda at: np.asarray(model.residuals({"mu": at[0]})), [0.3])
+    solution = least_squares(lambda point: np.asarray(model.residuals({"mu": point[0]})), [0.3])
     fit = bf.fit(tmp_path / "t.csv", mcmc=False, settings=["prior.tau.fixed=0.01", "prior.sigma_F.fixed=0.2"])
     assert solution.x[0] == pytest.approx(fit.least_squares.estimates["mu"].value, rel=1e-4)
 
@@ -117,15 +117,15 @@ def test_a_sampler_of_ones_own_agrees_with_the_fit(tmp_path):
     model = bf.model(tmp_path / "t.csv")
     density, rng = jax.jit(jax.vmap(model.log_density)), np.random.default_rng(5)
     z = 0.1 * rng.standard_normal((400, len(model.names)))
-    at, kept = np.asarray(density(z)), []
+    point, history = np.asarray(density(z)), []
     for step in range(3000):
         moved = z + rng.choice([0.1, 0.4, 1.2]) * rng.standard_normal(z.shape)
         there = np.asarray(density(moved))
-        accepted = np.log(rng.random(len(z))) < there - at
-        z, at = np.where(accepted[:, None], moved, z), np.where(accepted, there, at)
+        accepted = np.log(rng.random(len(z))) < there - point
+        z, point = np.where(accepted[:, None], moved, z), np.where(accepted, there, point)
         if step >= 1500 and step % 15 == 0:
-            kept.append(z)
-    mu = np.asarray(jax.vmap(model.constrain)(jnp.asarray(np.concatenate(kept)))["mu"])
+            history.append(z)
+    mu = np.asarray(jax.vmap(model.constrain)(jnp.asarray(np.concatenate(history)))["mu"])
     interval = bf.fit(tmp_path / "t.csv", seed=2).parameter("mu")
     assert np.median(mu) == pytest.approx(interval.median, abs=0.25 * interval.sd)
     assert np.quantile(mu, 0.05) == pytest.approx(interval.q05, abs=0.5 * interval.sd)

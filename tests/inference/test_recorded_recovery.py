@@ -144,8 +144,8 @@ def prepared(description: Description, cable: Cable) -> Dataset:
         for entry, recording in zip(description.recording, cable.recorded, strict=True)
     ]
     parts, delay_sd = _prepare_files(files)
-    each = tuple(_make_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
-    return Dataset(description, Measurements((Recordings(description.angle_columns, each, "", delay_sd),)), {})
+    item = tuple(_make_recording(description, f, *p) for f, p in zip(files, parts, strict=True))
+    return Dataset(description, Measurements((Recordings(description.angle_columns, item, "", delay_sd),)), {})
 
 
 def internal_values(posterior: LogDensity) -> Callable[[np.ndarray], jax.Array]:
@@ -176,9 +176,9 @@ class Laboratory:
         space = posterior.model.space
         z = self.fits.draws(posterior, seed)
         values = self.fits.program(posterior, internal_values)(z)
-        found = dict(zip((p.name for p in space.free), np.asarray(values).T, strict=True))
-        del found[DELAY_ERROR]
-        return found | {TOTAL: found["mu_edge"] * EDGE + found["mu_bend"] * NOMINAL}
+        computed = dict(zip((p.name for p in space.free), np.asarray(values).T, strict=True))
+        del computed[DELAY_ERROR]
+        return computed | {TOTAL: computed["mu_edge"] * EDGE + computed["mu_bend"] * NOMINAL}
 
     def ranks(self, cable: Cable, dataset: Dataset, seed: int) -> dict[str, float]:
         """Share of the posterior below the truth, by parameter; uniform between 0 and 1 if all is right."""
@@ -205,7 +205,7 @@ SEVEN_OR_TEN = pytest.mark.parametrize("several", [7, pytest.param(10, marks=pyt
 def held(ranks: Sequence[dict[str, float]]) -> dict[str, int]:
     """In how many cables the central 90 % interval of each parameter holds the truth."""
     low, high = (1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2
-    return {name: sum(low < each[name] < high for each in ranks) for name in ranks[0]}
+    return {name: sum(low < rank[name] < high for rank in ranks) for name in ranks[0]}
 
 
 def p_value(hits: int, n: int) -> float:
@@ -250,7 +250,7 @@ def test_over_a_hundred_recorded_cables_ranks_are_uniform(laboratory: Laboratory
     """
     description, cables = described(prepare=STATED), {seed: simulated(seed) for seed in range(5000, 5100)}
     ranks = [laboratory.ranks(cable, prepared(description, cable), seed) for seed, cable in cables.items()]
-    p = [stats.kstest([each[name] for each in ranks], "uniform").pvalue for name in ranks[0]]
+    p = [stats.kstest([rank[name] for rank in ranks], "uniform").pvalue for name in ranks[0]]
     p += [p_value(hits, len(ranks)) for hits in held(ranks).values()]
     assert min(p) * len(p) > 0.001, (held(ranks), p)
 
@@ -261,8 +261,8 @@ def test_the_estimated_delay_is_as_good_as_its_standard_error_says(several: list
 
     By chance it is rejected in fewer than one of a thousand seeds.
     """
-    found = [(cable.delay, dataset.measurements.table(Recordings)) for cable, dataset in several]
-    z = [(r.items[0].account.delay - delay) / r.delay_sd for delay, r in found if r is not None]
+    table = [(cable.delay, dataset.measurements.table(Recordings)) for cable, dataset in several]
+    z = [(r.items[0].account.delay - delay) / r.delay_sd for delay, r in table if r is not None]
     hits = int(np.sum(np.abs(z) < stats.norm.ppf((1 + PROBABILITY) / 2)))
     assert p_value(hits, len(several)) > 0.001, z
 
@@ -303,8 +303,8 @@ def test_recordings_read_from_files_are_those_that_were_recorded(tmp_path: Path)
     assert expected is not None
     assert read.runs == expected.runs
     assert read.delay_sd == expected.delay_sd == DELAY_SD
-    for one, other in zip(read.items, expected.items, strict=True):
-        assert one.own_angle == pytest.approx(other.own_angle)
-        np.testing.assert_allclose(one.blocks.input_force, other.blocks.input_force, atol=1e-6)
-        np.testing.assert_allclose(one.blocks.output_force, other.blocks.output_force, atol=1e-6)
-        np.testing.assert_array_equal(one.strokes.stroke, other.strokes.stroke)
+    for first, other in zip(read.items, expected.items, strict=True):
+        assert first.own_angle == pytest.approx(other.own_angle)
+        np.testing.assert_allclose(first.blocks.input_force, other.blocks.input_force, atol=1e-6)
+        np.testing.assert_allclose(first.blocks.output_force, other.blocks.output_force, atol=1e-6)
+        np.testing.assert_array_equal(first.strokes.stroke, other.strokes.stroke)

@@ -27,10 +27,10 @@ DATA = Path(__file__).parents[2] / "datasets"
 YARN = DATA / "yarn-on-cylinder"
 
 
-def compared(draws: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> SamplerAgreement:
+def compared(draws: dict[str, np.ndarray], remaining: dict[str, np.ndarray]) -> SamplerAgreement:
     """Of chains that are an ensemble each."""
-    n = [len(next(iter(both.values()))) for both in (draws, others)]
-    return compare_samplers(SamplerDraws("emcee", draws, n[0]), SamplerDraws("nuts", others, n[1]))
+    n = [len(next(iter(both.values()))) for both in (draws, remaining)]
+    return compare_samplers(SamplerDraws("emcee", draws, n[0]), SamplerDraws("nuts", remaining, n[1]))
 
 
 def autocorrelated(generator, chains: int = 8, draws: int = 400, quantities: int = 12) -> dict[str, np.ndarray]:
@@ -48,9 +48,9 @@ def test_samplers_of_the_same_density_are_seldom_said_to_disagree(pairs):
     """
     generator = np.random.default_rng(1)
     for _ in range(pairs):
-        found = compared(autocorrelated(generator), autocorrelated(generator))
-        assert all(d.errors <= found.limit for d in found.differences)
-        assert "agree within Monte Carlo error" in found.sentence()
+        computed = compared(autocorrelated(generator), autocorrelated(generator))
+        assert all(d.errors <= computed.limit for d in computed.differences)
+        assert "agree within Monte Carlo error" in computed.sentence()
 
 
 @pytest.mark.parametrize(
@@ -62,20 +62,20 @@ def test_a_sampler_that_is_wrong_is_caught(disturb, summary):
     generator = np.random.default_rng(2)
     right, wrong = autocorrelated(generator), autocorrelated(generator)
     wrong["q3"] = disturb(wrong["q3"])
-    found = compared(right, wrong)
-    assert not found.agree
-    assert {d.quantity for d in found.significant} == {"q3"}
-    assert summary in {d.summary for d in found.significant}
-    (reason,) = found.reasons()
+    computed = compared(right, wrong)
+    assert not computed.agree
+    assert {d.quantity for d in computed.significant} == {"q3"}
+    assert summary in {d.summary for d in computed.significant}
+    (reason,) = computed.reasons()
     assert reason.startswith("emcee and NUTS disagree on the")
 
 
 def test_a_difference_beyond_chance_that_changes_nothing_is_no_disagreement():
     generator = np.random.default_rng(3)
     right, other = (autocorrelated(generator, draws=20_000, quantities=1) for _ in range(2))
-    found = compared(right, {"q0": other["q0"] + 0.05})
-    assert max(d.errors for d in found.differences) > found.limit
-    assert found.agree
+    computed = compared(right, {"q0": other["q0"] + 0.05})
+    assert max(d.errors for d in computed.differences) > computed.limit
+    assert computed.agree
 
 
 def test_walkers_that_depend_on_each_other_get_larger_errors():
@@ -92,9 +92,9 @@ def test_walkers_that_depend_on_each_other_get_larger_errors():
 
 def test_the_limit_is_bonferroni_s():
     draws = autocorrelated(np.random.default_rng(1))
-    found = compared(draws, draws)
-    assert 2 * stats.norm.sf(found.limit) * len(found.differences) == pytest.approx(FALSE_ALARM)
-    assert all(d.errors == 0 for d in found.differences)
+    computed = compared(draws, draws)
+    assert 2 * stats.norm.sf(computed.limit) * len(computed.differences) == pytest.approx(FALSE_ALARM)
+    assert all(d.errors == 0 for d in computed.differences)
 
 
 def test_a_quantity_that_cannot_vary_agrees_with_itself_and_with_nothing_else():
@@ -148,24 +148,24 @@ def test_samplers_that_disagree_are_a_reason_not_to_trust(monkeypatch):
     """The second sampler is made to sample a density shifted by half a unit of z."""
     sample = nuts.sample
     monkeypatch.setattr(nuts, "sample", lambda *a, **k: (lambda c: replace(c, z=c.z + 0.5))(sample(*a, **k)))
-    found = bf.fit(YARN, sampler="both", seed=1, settings=("sampler.n_walkers=64", "sampler.target_ess=500"))
-    assert not found.converged
-    assert any(reason.startswith("emcee and NUTS disagree on the") for reason in found.reasons)
-    assert "NOT CONVERGED" in details_text(found)
+    fit = bf.fit(YARN, sampler="both", seed=1, settings=("sampler.n_walkers=64", "sampler.target_ess=500"))
+    assert not fit.converged
+    assert any(reason.startswith("emcee and NUTS disagree on the") for reason in fit.reasons)
+    assert "NOT CONVERGED" in details_text(fit)
 
 
 @EACH
 def test_emcee_and_nuts_agree_on_every_data_set(name):
     """Mean, sd, 5 % and 95 % quantile of every parameter, l* and eta*; chance fails this once in a thousand seeds."""
-    found = fitted_by_both(name)
-    known = {p.name for p in found.model.space.free}
-    known |= {"optimal_length", "optimal_efficiency"} if found.dataset.description.route is not None else set()
-    assert {d.quantity for d in found.posterior.agreement.differences} >= known
-    assert found.posterior.agreement.agree, found.posterior.agreement.sentence()
-    assert found.converged, found.reasons
+    computed = fitted_by_both(name)
+    names = {p.name for p in computed.model.space.free}
+    names |= {"optimal_length", "optimal_efficiency"} if computed.dataset.description.route is not None else set()
+    assert {d.quantity for d in computed.posterior.agreement.differences} >= names
+    assert computed.posterior.agreement.agree, computed.posterior.agreement.sentence()
+    assert computed.converged, computed.reasons
 
 
 @EACH
 def test_figures_of_draws_can_be_read_on_every_data_set(name):
-    found = fitted_by_both(name)
-    assert_readable(dict(collect_figure_data(found)), found.name)
+    computed = fitted_by_both(name)
+    assert_readable(dict(collect_figure_data(computed)), computed.name)

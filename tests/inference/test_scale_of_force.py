@@ -86,13 +86,13 @@ def strong(folder: Path, name: str, settings: tuple[str, ...], factor: float):
         write_loop(folder / "loop.csv")
     for file in folder.rglob("*.csv"):
         file.write_text(times(file.read_text(), factor, "hold" in settings))
-    stated = [setting for setting in settings if setting != "hold"]
-    return bf.read(folder, settings=[scaled(setting, factor) for setting in stated])
+    description = [setting for setting in settings if setting != "hold"]
+    return bf.read(folder, settings=[scaled(setting, factor) for setting in description])
 
 
 def scaled(setting: str, factor: float) -> str:
     """A setting with the numbers in brackets times a factor."""
-    return re.sub(r"<(.*?)>", lambda found: repr(float(found[1]) * factor), setting)
+    return re.sub(r"<(.*?)>", lambda computed: repr(float(computed[1]) * factor), setting)
 
 
 def times(text: str, factor: float, held: bool) -> str:
@@ -172,8 +172,8 @@ def test_the_verdict_does_not_depend_on_how_strong_a_bench_is(name, tmp_path):
     """What is wrong, which sentences say it (but for their numbers), and the coefficients; by least squares."""
     fault, expected = FAULTS[name]
     fits = [bf.fit(spoiled(tmp_path / f"{f:g}", fault, f), mcmc=False, seed=1) for f in (1.0, *FACTORS)]
-    said = [{kind: re.sub(r"[\d.]+( [kmM]?N)?", "_", " ".join(s)) for kind, s in f.verdict().troubles.items()} for f in fits]
-    assert set(said[0]) == expected, said[0]
-    assert said[1] == said[0] and said[2] == said[0]
+    message = [{kind: re.sub(r"[\d.]+( [kmM]?N)?", "_", " ".join(s)) for kind, s in f.verdict().troubles.items()} for f in fits]
+    assert set(message[0]) == expected, message[0]
+    assert message[1] == message[0] and message[2] == message[0]
     mu = [[f.least_squares.estimates[n].value for n in ("mu_sheath", "mu_squeezed", "mu_edge")] for f in fits]
     np.testing.assert_allclose(mu[1:], [mu[0]] * 2, rtol=1e-5)

@@ -18,10 +18,10 @@ pytestmark = pytest.mark.extended
 LOADS, TAU, MU = (4.0, 8.0, 16.0, 32.0, 64.0), 0.03, 0.15
 
 
-def _trials(folder, seed, drag=0.0, noise=0.02, tau=TAU, each=10):
+def _trials(folder, seed, drag=0.0, noise=0.02, tau=TAU, item=10):
     """Trials in random order, each mounted anew, by a bench that shares no code with the likelihood."""
     generator = np.random.default_rng(seed)
-    order = generator.permutation(np.repeat(LOADS, each))
+    order = generator.permutation(np.repeat(LOADS, item))
     trials = [
         pull(generator, [180.0], [MU * np.pi], [load], strokes=(1,), noise=(noise, noise), scatter=tau, drag=drag)
         for load in order
@@ -38,8 +38,8 @@ def test_healthy_trials_are_trusted_and_a_drag_is_found_as_large_as_it_is(tmp_pa
     fits = [bf.fit(_trials(tmp_path / str(seed), seed, drag), friction=model, mcmc=False, seed=1) for seed in range(tables)]
     assert [fit.verdict().reasons for fit in fits] == [()] * tables
     if drag:
-        found = np.mean([fit.least_squares.estimates["drag"].value for fit in fits])
-        assert found == pytest.approx(drag, abs=3.5 * 0.13 / np.sqrt(tables))
+        estimate = np.mean([fit.least_squares.estimates["drag"].value for fit in fits])
+        assert estimate == pytest.approx(drag, abs=3.5 * 0.13 / np.sqrt(tables))
 
 
 def test_a_drag_that_is_not_in_the_model_is_found_between_trials(tmp_path):
@@ -51,13 +51,13 @@ def test_a_drag_that_is_not_in_the_model_is_found_between_trials(tmp_path):
 @pytest.mark.parametrize(("tau", "noise"), [(0.04, 0.001), (0.002, 0.2)])
 def test_the_loads_tell_mountings_from_the_noise_of_load_cells(tmp_path, tau, noise):
     """Of 200 trials: the scatter that there is to 15 %, three of its standard errors, and little of the other."""
-    model = build_model(load_dataset(_trials(tmp_path, 3, noise=noise, tau=tau, each=40)))
+    model = build_model(load_dataset(_trials(tmp_path, 3, noise=noise, tau=tau, item=40)))
     (term,) = model.terms
-    told = term.scatter_of_single_readings({"mu": MU, "tau": 0.1, "sigma_F": 0.1})
+    outcome = term.scatter_of_single_readings({"mu": MU, "tau": 0.1, "sigma_F": 0.1})
     if tau > 0.01:
-        assert told["tau"] == pytest.approx(tau, rel=0.15) and told["sigma_F"] < 0.1
+        assert outcome["tau"] == pytest.approx(tau, rel=0.15) and outcome["sigma_F"] < 0.1
     else:
-        assert told["sigma_F"] == pytest.approx(noise, rel=0.15) and told["tau"] < 0.01
+        assert outcome["sigma_F"] == pytest.approx(noise, rel=0.15) and outcome["tau"] < 0.01
 
 
 def test_runs_of_more_readings_tell_noise_by_themselves(tmp_path):

@@ -22,11 +22,11 @@ MU, TAU = PriorDefaults().friction, PriorDefaults().run_scatter
 
 def losses(count: int) -> list[np.ndarray]:
     """Six runs of three contacts each, of coefficients of 0.08 to 0.2 and mountings that differ by 1 to 3 %."""
-    random, found = np.random.default_rng(5), []
+    random, results = np.random.default_rng(5), []
     for _ in range(count):
         mu, tau = random.uniform(0.08, 0.2, 3), random.uniform(0.01, 0.03)
-        found.append(ANGLES @ mu + tau * random.standard_normal(len(ANGLES)))
-    return found
+        results.append(ANGLES @ mu + tau * random.standard_normal(len(ANGLES)))
+    return results
 
 
 def exact_sds(loss: np.ndarray, n: int = 4096) -> np.ndarray:
@@ -46,14 +46,14 @@ def exact_sds(loss: np.ndarray, n: int = 4096) -> np.ndarray:
         tau = np.exp(log_tau)
         mu = np.concatenate([of_prior, middle + tau * unit])
         mu = mu[(mu > 0).all(axis=1)]
-        here = np.log(mu / MU.median) / MU.log_sd
-        prior = -(here**2).sum(axis=1) / 2 - np.log(mu).sum(axis=1) - 3 * np.log(MU.log_sd)
+        standardized = np.log(mu / MU.median) / MU.log_sd
+        prior = -(standardized**2).sum(axis=1) / 2 - np.log(mu).sum(axis=1) - 3 * np.log(MU.log_sd)
         squares = ((mu @ ANGLES.T - loss) ** 2).sum(axis=1)
         apart = (mu - middle) @ precision
         normal = -(apart * (mu - middle)).sum(axis=1) / (2 * tau**2) - 3 * log_tau - norm
         of_tau = -np.log1p((tau / TAU) ** 2) + log_tau
         log_weights.append(prior + of_tau - squares / (2 * tau**2) - n_runs * log_tau - np.logaddexp(prior, normal))
-        z.append(here)
+        z.append(standardized)
     every, weight = np.concatenate(z), np.concatenate(log_weights)
     weight = np.exp(weight - weight.max()) / np.exp(weight - weight.max()).sum()
     return np.sqrt(weight @ (every - weight @ every) ** 2)
@@ -72,7 +72,7 @@ def test_weighted_draws_are_as_wide_as_the_posterior(count):
     read = losses(count)
     posteriors = [LogDensity(build_model(of_rows(loss, ANGLES))) for loss in read]
     weighted = fit_batch(posteriors[0], [posterior.data for posterior in posteriors], range(count), OF_FLEETS)
-    drawn = [i for i, fit in enumerate(weighted) if fit.engine == "laplace"]
-    assert len(drawn) > 0.9 * count
-    ratios = np.array([np.std(weighted[i].z[:, :3], axis=0) / exact_sds(read[i]) for i in drawn])
+    draws = [i for i, fit in enumerate(weighted) if fit.engine == "laplace"]
+    assert len(draws) > 0.9 * count
+    ratios = np.array([np.std(weighted[i].z[:, :3], axis=0) / exact_sds(read[i]) for i in draws])
     assert np.all(np.abs(np.log(ratios).mean(axis=0)) < (0.03 if count < 100 else 0.015)), np.log(ratios).mean(axis=0)

@@ -55,7 +55,7 @@ def test_every_file_every_row_and_every_column_is_named_at_once(bench, refuse):
         two_csv="cable_length_mm,input_force,output_force_lb\n430,50,40\n",
         efficiencies_csv="cable_length_mm,efficiency\n430,80\n460,\n",
     )
-    said = refuse("check", folder, faults=8)
+    message = refuse("check", folder, faults=8)
     for place in (
         "angles.csv, row 2, column 'sheath_angle_deg': 'x' is not a number",
         "angles.csv, row 3, column 'sheath_angle_deg': '-20' is negative",
@@ -66,7 +66,7 @@ def test_every_file_every_row_and_every_column_is_named_at_once(bench, refuse):
         "efficiencies.csv, row 2, column 'efficiency': an efficiency of '80' is above 1",
         "efficiencies.csv, row 3, column 'efficiency': the cell is blank",
     ):
-        assert place in said, said
+        assert place in message, message
 
 
 def test_fit_refuses_with_the_same_list_as_check(bench, refuse, run):
@@ -76,9 +76,9 @@ def test_fit_refuses_with_the_same_list_as_check(bench, refuse, run):
 
 def test_the_same_fault_of_many_rows_is_said_once_with_its_rows(bench, refuse):
     rows = "".join(f"430,{-50 - i},40\n" for i in range(30))
-    said = refuse("check", bench(one_csv="cable_length_mm,input_force_N,output_force_N\n" + rows))
-    assert "row 2, column 'input_force_N': '-50' is not positive" in said
-    assert said.rstrip().endswith("The same in rows 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 and 17 more.")
+    message = refuse("check", bench(one_csv="cable_length_mm,input_force_N,output_force_N\n" + rows))
+    assert "row 2, column 'input_force_N': '-50' is not positive" in message
+    assert message.rstrip().endswith("The same in rows 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 and 17 more.")
 
 
 def test_of_many_different_faults_twenty_are_said_and_the_rest_counted():
@@ -92,59 +92,59 @@ def test_of_many_different_faults_twenty_are_said_and_the_rest_counted():
 
 
 def test_a_column_that_is_missing_is_one_fault_however_many_rows_need_it(bench, refuse):
-    said = refuse("check", bench(one_csv="cable_length_mm,input_force_N\n430,50\n460,50\n"))
-    assert "one.csv has no column output_force" in said
+    message = refuse("check", bench(one_csv="cable_length_mm,input_force_N\n430,50\n460,50\n"))
+    assert "one.csv has no column output_force" in message
 
 
 def test_keys_of_the_description_are_refused_together(bench, refuse):
     spoiled = CABLE.replace('friction = "mu"', "").replace("range = [400, 500]", "range = [500, 400]")
     spoiled = spoiled.replace("[tables]", "[sensors]\nforce_nose = 1\n[tables]")
-    said = refuse("check", bench(cable_toml=spoiled), faults=3)
+    message = refuse("check", bench(cable_toml=spoiled), faults=3)
     for name in ("contact.0.friction", "[lowest, highest]", "force_nose"):
-        assert name in said
+        assert name in message
 
 
 def test_a_misspelled_key_is_not_missing_as_well(bench, refuse):
-    said = refuse("check", bench(cable_toml=CABLE.replace("[[contact]]", "[[contatc]]")))
-    assert "did you mean 'contact'?" in said
+    message = refuse("check", bench(cable_toml=CABLE.replace("[[contact]]", "[[contatc]]")))
+    assert "did you mean 'contact'?" in message
 
 
 def test_contradictions_of_a_description_are_said_together(bench, refuse):
     spoiled = CABLE.replace("[route]", 'geometry = "published"\nstudent_degrees_of_freedom = 6\n[route]')
     spoiled = spoiled.replace('{ curve = "gaussian", column', "{ column").replace('angles = { file = "angles.csv" }\n', "")
-    said = refuse("check", bench(cable_toml=spoiled + '[friction.mi]\nfixed = 0.1\n'), faults=3)
+    message = refuse("check", bench(cable_toml=spoiled + '[friction.mi]\nfixed = 0.1\n'), faults=3)
     for words in ("needs contacts with a curve", "student_degrees_of_freedom", "friction.mi"):
-        assert words in said
+        assert words in message
 
 
 def test_tables_are_looked_at_too_where_a_key_is_wrong_that_they_do_not_ask_for(bench, refuse):
     spoiled = CABLE.replace('"bench"', '"NAME OF THE CABLE"') + "[sampler]\nn_walker = 3\n[sensors]\noffset_sd = 3\n"
-    said = refuse("check", bench(cable_toml=spoiled, two_csv=FORCES.replace("50,40", "50,y")), faults=4)
+    message = refuse("check", bench(cable_toml=spoiled, two_csv=FORCES.replace("50,40", "50,y")), faults=4)
     for words in ("line 3: 'NAME OF THE CABLE' is left from the template", "n_walker", "a number needs its unit", "'y'"):
-        assert words in said
+        assert words in message
 
 
 def test_rows_outside_the_range_and_contacts_without_angles_are_all_named(bench, refuse):
     outside = FORCES.replace("430,", "600,").replace("460,", "700,")
-    said = refuse("check", bench(one_csv=outside))
-    assert "row 2, column 'cable_length': 600 mm lies outside" in said and "The same in row 3." in said
+    message = refuse("check", bench(one_csv=outside))
+    assert "row 2, column 'cable_length': 600 mm lies outside" in message and "The same in row 3." in message
 
 
 def test_readings_that_a_bad_table_needs_bring_no_faults_of_their_own(bench, refuse):
-    (said,) = [refuse("check", bench(angles_csv=ANGLES.replace("sheath_angle_deg", "sheath_angle")))]
-    assert "does not state its unit" in said
+    (message,) = [refuse("check", bench(angles_csv=ANGLES.replace("sheath_angle_deg", "sheath_angle")))]
+    assert "does not state its unit" in message
 
 
 def test_every_placeholder_of_the_template_is_refused_with_its_line(run, refuse, tmp_path):
     folder = tmp_path / "cable"
     run("init", folder)
     lines = (folder / "cable.toml").read_text().splitlines()
-    said = refuse("check", folder, faults=5)
+    message = refuse("check", folder, faults=5)
     for number, line in enumerate(lines, start=1):
         for word in PLACEHOLDERS:
             if f'"{word}"' in line.partition("#")[0]:
-                assert f"cable.toml, line {number}: '{word}'" in said
-    assert refuse("fit", folder, faults=5) == said
+                assert f"cable.toml, line {number}: '{word}'" in message
+    assert refuse("fit", folder, faults=5) == message
 
 
 def test_whatever_stands_in_capitals_in_the_template_is_a_placeholder(run, tmp_path):

@@ -31,15 +31,15 @@ def bench():
         folder = ROOT / "datasets" / "synthetic-recordings"
         dataset = load_dataset(folder)
         model, tables = build_model(dataset), dataset.measurements
-        stated = json.loads((folder / "truth.json").read_text())["truth"]
-        truth = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters}
+        stated_truth = json.loads((folder / "truth.json").read_text())["truth"]
+        truth = {p.name: stated_truth.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters}
         recordings, angles = tables.table(Recordings), tables.table(AngleTable)
         draw = jax.jit(lambda named, key: draw_readings(model.cable, tables, named, key)["recordings"])
 
         def made(seed: int, **values: float) -> Recordings:
             named = {name: jnp.asarray(value) for name, value in (truth | values).items()}
-            drawn = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
-            return replace_forces(dataset.description, recordings, drawn)
+            draws = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
+            return replace_forces(dataset.description, recordings, draws)
 
         def terms(**values: float) -> tuple[dict[str, jax.Array], list[RunsTerm]]:
             again = [make_recordings_term(model.cable, made(seed, **values), angles) for seed in range(TIMES)]
@@ -54,10 +54,10 @@ def most_likely_noise(named: dict[str, jax.Array], term: RunsTerm) -> float:
     def log_likelihood(factor: jax.Array) -> jax.Array:
         return jnp.sum(term.log_likelihood(named | {"sigma_block": factor * named["sigma_block"]}, term.data))
 
-    found = np.asarray(jax.vmap(log_likelihood)(jnp.asarray(GRID)))
-    best = int(np.argmax(found))
+    log_likelihoods = np.asarray(jax.vmap(log_likelihood)(jnp.asarray(GRID)))
+    best = int(np.argmax(log_likelihoods))
     assert 0 < best < len(GRID) - 1
-    square, slope, _ = np.polyfit(np.log(GRID[best - 1 : best + 2]), found[best - 1 : best + 2], 2)
+    square, slope, _ = np.polyfit(np.log(GRID[best - 1 : best + 2]), log_likelihoods[best - 1 : best + 2], 2)
     return float(np.exp(-slope / (2 * square)))
 
 
@@ -70,30 +70,30 @@ def test_the_most_likely_noise_of_blocks_is_on_average_the_true_one(bench, noise
     0.02 N.
     """
     _, terms, _ = bench
-    named, found = terms(sigma_block=noise, delay_error=delay)
-    assert np.mean([most_likely_noise(named, term) for term in found]) == pytest.approx(1.0, abs=0.036)
+    named, computed = terms(sigma_block=noise, delay_error=delay)
+    assert np.mean([most_likely_noise(named, term) for term in computed]) == pytest.approx(1.0, abs=0.036)
 
 
 def test_noise_neither_adds_to_the_friction_of_recordings_nor_hides_their_strokes(bench):
     """Mean log ratio of all runs together, within four standard errors of the truth."""
     quiet, terms, _ = bench
-    named, found = terms(sigma_block=4.0, tau=1e-9)
-    apart = [np.mean(np.log(np.asarray(t.expected(named, t.data)) / t.observed())) for t in found]
+    named, computed = terms(sigma_block=4.0, tau=1e-9)
+    apart = [np.mean(np.log(np.asarray(t.expected(named, t.data)) / t.observed())) for t in computed]
     assert abs(np.mean(apart)) < 4 * np.std(apart, ddof=1) / np.sqrt(TIMES)
-    assert np.mean([t.data["n"].sum() for t in found]) > 0.9 * quiet.data["n"].sum()
+    assert np.mean([t.data["n"].sum() for t in computed]) > 0.9 * quiet.data["n"].sum()
 
 
 def test_drifts_hold_less_noise_than_the_change_from_block_to_block(bench):
     """By which a delay would seem a third smaller at 2 N, and better known than it is; without noise they are that change."""
     by_blocks, by_drifts = np.zeros((2, 4, 7))
     for seed in range(4):
-        noisy, quiet = (bench[2](seed, sigma_block=each).items for each in (2.0, 1e-6))
-        for i, (one, other) in enumerate(zip(noisy, quiet, strict=True)):
-            change = np.gradient(np.log(np.maximum(one.blocks.output_force, 1.0)), one.blocks.time)
-            mine = (one.strokes.stroke == 1) & one.strokes.used_sliding & other.strokes.used_sliding
+        noisy, quiet = (bench[2](seed, sigma_block=item).items for item in (2.0, 1e-6))
+        for i, (first, other) in enumerate(zip(noisy, quiet, strict=True)):
+            change = np.gradient(np.log(np.maximum(first.blocks.output_force, 1.0)), first.blocks.time)
+            mask = (first.strokes.stroke == 1) & first.strokes.used_sliding & other.strokes.used_sliding
             true = output_drift(other)
             np.testing.assert_allclose(true, np.gradient(np.log(other.blocks.output_force), other.blocks.time))
-            by_blocks[seed, i], by_drifts[seed, i] = np.var((change - true)[mine]), np.var((output_drift(one) - true)[mine])
+            by_blocks[seed, i], by_drifts[seed, i] = np.var((change - true)[mask]), np.var((output_drift(first) - true)[mask])
     shares = by_drifts.sum(axis=0) / by_blocks.sum(axis=0)
     assert max(shares) < 0.5
     assert np.mean(shares) < 0.3

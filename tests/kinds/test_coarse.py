@@ -84,12 +84,12 @@ def test_scatter_that_is_stated_needs_no_digits(tmp_path):
     """Of one reading with what its last digit leaves open, and of efficiencies with a standard deviation."""
     (tmp_path / "cable.toml").write_text(CABLE + "[prior.sigma_F]\nfixed = 0.29\n")
     (tmp_path / "forces.csv").write_text("run,stroke,input_force_N,output_force_N\nr0,pull,20,14\n")
-    one = bf.fit(tmp_path, seed=1, settings=QUICK)
-    assert COARSE not in one.verdict().troubles
-    assert one.parameter("mu").q05 < TRUE_MU < one.parameter("mu").q95
+    single_fit = bf.fit(tmp_path, seed=1, settings=QUICK)
+    assert COARSE not in single_fit.verdict().troubles
+    assert single_fit.parameter("mu").q05 < TRUE_MU < single_fit.parameter("mu").q95
     (tmp_path / "efficiencies.csv").write_text("wrap_angle_deg,efficiency,efficiency_sd\n" + "180,0.7,0.03\n" * 6)
-    stated = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
-    assert COARSE not in stated.verdict().troubles
+    setting = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
+    assert COARSE not in setting.verdict().troubles
     (tmp_path / "efficiencies.csv").write_text("wrap_angle_deg,efficiency\n" + "180,0.7\n" * 6)
     (sentence,) = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK).verdict().troubles[COARSE]
     assert sentence.endswith("state its standard deviation: a column efficiency_sd with 0.029.")

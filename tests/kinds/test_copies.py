@@ -108,22 +108,22 @@ def test_readings_that_are_only_alike_are_never_called_copies_and_most_copies_ar
     five last digits or more, nine in ten are found, and of copied runs of ten readings and more. Of 2000 benches 96 and 99 of
     100 were, so that chance fails this once in 100 seeds or less.
     """
-    generator, found = np.random.default_rng(7), {"pasted": [], "saved": []}
+    generator, computed = np.random.default_rng(7), {"pasted": [], "saved": []}
     for _ in range(400):
         rows, fineness = simulated(generator)
         assert describe_copies(compared(rows)) == []
         if len(rows) >= 30 and fineness > 5:
             first = rows[rows[:, 0] == 0].copy()
-            found["pasted"].append(bool(describe_copies(compared(np.vstack([rows, rows])))))
+            computed["pasted"].append(bool(describe_copies(compared(np.vstack([rows, rows])))))
             if len(first) >= 10:
                 first[:, 0] = rows[:, 0].max() + 1
-                found["saved"].append(bool(describe_copies(compared(np.vstack([rows, first])))))
-    assert all(len(hits) > 30 and np.mean(hits) > 0.9 for hits in found.values()), found
+                computed["saved"].append(bool(describe_copies(compared(np.vstack([rows, first])))))
+    assert all(len(hits) > 30 and np.mean(hits) > 0.9 for hits in computed.values()), computed
 
 
 def test_readings_without_noise_are_no_copies():
     """Two mountings of a computed bench are the same to the last digit; so are readings of a coarse display."""
     loads = np.repeat(np.array(LOADS), 4)
     for out in (0.7 * loads * (1 + 0.001 * loads), np.round(0.7 * loads)):
-        one = np.column_stack([np.zeros(20), np.ones(20), loads, out])
-        assert describe_copies(compared(np.vstack([one, one + np.eye(4)[0]]))) == []
+        run_rows = np.column_stack([np.zeros(20), np.ones(20), loads, out])
+        assert describe_copies(compared(np.vstack([run_rows, run_rows + np.eye(4)[0]]))) == []

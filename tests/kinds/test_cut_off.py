@@ -92,9 +92,11 @@ def test_set_points_are_not_said_to_be_cut_off(end):
     generator, group = np.random.default_rng(2), np.repeat(np.arange(6), len(LOADS))
     loads = np.tile(LOADS, 6)
     ramp = np.where(loads == 100.0, 100.0, (loads + generator.standard_normal(30)).round(2))
-    for given in (loads, ramp):
-        read = (0.7 * given * np.exp(0.02 * generator.standard_normal(6))[group] + 0.2 * generator.standard_normal(30)).round(2)
-        columns = pair_forces(*((given, read) if end == 0 else (read, given)), group)
+    for arguments in (loads, ramp):
+        read = (
+            0.7 * arguments * np.exp(0.02 * generator.standard_normal(6))[group] + 0.2 * generator.standard_normal(30)
+        ).round(2)
+        columns = pair_forces(*((arguments, read) if end == 0 else (read, arguments)), group)
         assert not any(len(rows) for column in columns for rows in find_cut_off(column))
 
 

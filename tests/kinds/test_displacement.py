@@ -62,14 +62,14 @@ SPOILED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "old", "new", "said"), SPOILED)
-def test_bad_input_is_refused_with_a_remedy(catheter, refuse, name, old, new, said):
+@pytest.mark.parametrize(("name", "old", "new", "message"), SPOILED)
+def test_bad_input_is_refused_with_a_remedy(catheter, refuse, name, old, new, message):
     path = catheter / name
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
     sentence = refuse("check", catheter)
-    assert all(part in sentence for part in said), sentence
+    assert all(part in sentence for part in message), sentence
 
 
 def with_columns(catheter, change):
@@ -94,12 +94,12 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("what", CHANGES)
-def test_forces_that_no_rope_with_a_spring_has_are_refused(catheter, refuse, what):
-    change, said = CHANGES[what]
+@pytest.mark.parametrize("case", CHANGES)
+def test_forces_that_no_rope_with_a_spring_has_are_refused(catheter, refuse, case):
+    change, message = CHANGES[case]
     with_columns(catheter, change)
     sentence = refuse("check", catheter)
-    assert all(part in sentence for part in said), sentence
+    assert all(part in sentence for part in message), sentence
 
 
 def test_a_run_of_one_reading_is_refused_unless_it_is_said_where_its_displacement_begins(catheter, refuse):
@@ -144,9 +144,9 @@ def test_rows_before_a_stop_are_counted_and_left_out(catheter):
     spoil(catheter / TOML, *STOP)
     data = bf.read(catheter)
     table = data.measurements.table(DisplacementTable)
-    before = int(np.sum(table.displacement <= 12))
+    initial = int(np.sum(table.displacement <= 12))
     assert not np.any(table.used & (table.displacement <= 12))
-    assert "rows lie before the stop" in describe_data_set(data) and before > 10
+    assert "rows lie before the stop" in describe_data_set(data) and initial > 10
 
 
 PLAN = """name = "planned"
@@ -180,8 +180,8 @@ def test_a_plan_is_simulated_row_by_row_as_friction_at_every_place_has_it(tmp_pa
     rows = np.loadtxt(tmp_path / "out" / "tip.csv", delimiter=",", skiprows=1, usecols=(0, 2, 3))
     for bend in (180, 360):
         x, force = rows[rows[:, 0] == bend, 1:].T
-        known = Catheter(0.1 * np.deg2rad(bend), 0.5, 5.0, 1.0).pulled(x)
-        np.testing.assert_allclose(force[7:], known[7:], atol=0.06)  # the first stroke is from a slack rope
+        reference = Catheter(0.1 * np.deg2rad(bend), 0.5, 5.0, 1.0).pulled(x)
+        np.testing.assert_allclose(force[7:], reference[7:], atol=0.06)  # the first stroke is from a slack rope
 
 
 def test_of_a_long_table_some_rows_are_used_and_all_turns(catheter):
@@ -197,8 +197,8 @@ def test_of_a_long_table_some_rows_are_used_and_all_turns(catheter):
 
 
 def test_turns_are_remembered_and_forgotten_once_they_are_passed():
-    at = np.array([0, 10, 20, 30, 20, 10, 15, 20, 25, 22, 25, 29, 31, 30, 0, -5], dtype=float)
-    motion = follow_motor(at, np.zeros(len(at), dtype=int))
+    points = np.array([0, 10, 20, 30, 20, 10, 15, 20, 25, 22, 25, 29, 31, 30, 0, -5], dtype=float)
+    motion = follow_motor(points, np.zeros(len(points), dtype=int))
     assert motion.turns.at.tolist() == [0, 30, 10, 25, 22, 31]
     came_after = motion.turns.at[motion.after].tolist()
     #                     pull, back from 30, pull from 10, back from 25, pull from 22, from 10 again, from 0, back from 31

@@ -15,14 +15,14 @@ CASES = [  # efficiencies in percent, what is said of them
 ]
 
 
-@pytest.mark.parametrize(("readings", "said"), CASES)
-def test_fractions_under_a_heading_of_percent_are_pointed_out(on_body, tmp_path, readings, said):
+@pytest.mark.parametrize(("readings", "message"), CASES)
+def test_fractions_under_a_heading_of_percent_are_pointed_out(on_body, tmp_path, readings, message):
     folder = shutil.copytree(on_body, tmp_path / "cable")
     rows = [f"{length},{value}" for length, value in zip((440, 470, 510, 550), readings, strict=True)]
     (folder / "efficiencies.csv").write_text("\n".join(["# measured", "cable_length_mm,efficiency_percent", *rows]) + "\n")
-    found = bf.check(folder)
-    text = " ".join(str(found).split())
-    assert (said in text) if said else "fraction under a heading" not in text
+    computed = bf.check(folder)
+    text = " ".join(str(computed).split())
+    assert (message in text) if message else "fraction under a heading" not in text
 
 
 def test_small_fractions_are_what_they_are(on_body, tmp_path):

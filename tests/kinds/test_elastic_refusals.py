@@ -73,9 +73,9 @@ TABLES = [
 @pytest.mark.parametrize(("file", "old", "new", "names"), TABLES)
 def test_a_spoiled_elastic_table_is_refused_by_name(haptic, refuse, file, old, new, names):
     spoil(haptic / file, old, new)
-    said = refuse("check", haptic)
+    message = refuse("check", haptic)
     for name in [file, *names]:
-        assert name in said, said
+        assert name in message, message
 
 
 HEADS = {
@@ -92,9 +92,9 @@ def test_an_elastic_table_without_rows_is_refused(haptic, refuse, file, rows, na
         (haptic / file).unlink()
     else:
         (haptic / file).write_text("" if rows is None else HEADS[file] + "\n")
-    said = refuse("check", haptic)
-    assert file in said
-    assert names in said
+    message = refuse("check", haptic)
+    assert file in message
+    assert names in message
 
 
 FALLING = [
@@ -107,9 +107,9 @@ FALLING = [
 @pytest.mark.parametrize(("rows", "row"), FALLING)
 def test_stretch_that_falls_with_load_is_refused_at_all_angles_or_at_one(haptic, refuse, rows, row):
     (haptic / S).write_text(f"{HEADS[S]}\n{rows}")
-    said = refuse("check", haptic)
+    message = refuse("check", haptic)
     for name in (S, row, "stretch_mm", "the stretch falls", "write stretch as positive"):
-        assert name in said, said
+        assert name in message, message
 
 
 def test_stretch_that_falls_in_a_single_pair_may_be_noise_and_is_warned_of(haptic, run):
@@ -121,18 +121,18 @@ def test_stretch_that_falls_in_a_single_pair_may_be_noise_and_is_warned_of(hapti
 
 def test_output_ahead_of_input_is_refused(haptic, refuse):
     (haptic / L).write_text(LOOP.replace("20,18", "18,20").replace("20,22", "22,20").replace("40,33", "33,40"))
-    said = refuse("check", haptic)
+    message = refuse("check", haptic)
     for name in (L, "row 4", "input 33 N", "output 40 N", "swapped"):
-        assert name in said, said
+        assert name in message, message
 
 
 @pytest.mark.parametrize("end", ["input", "output"])
 def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refuse, end):
     spoil(haptic / "cable.toml", f'{end}_pulley_radius = {{ value = 20, unit = "mm" }}\n', "")
     (haptic / L).write_bytes((haptic / "torques.csv").read_bytes())
-    said = refuse("check", haptic)
-    assert f"{end}_torque" in said
-    assert f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}' in said
+    message = refuse("check", haptic)
+    assert f"{end}_torque" in message
+    assert f'{end}_pulley_radius = {{ value = 15, unit = "mm" }}' in message
 
 
 @pytest.mark.parametrize("verb", ["check", "fit"])
@@ -148,9 +148,9 @@ def test_torque_without_radius_is_refused_with_the_line_to_write(haptic, refuse,
 def test_nothing_is_written_after_a_refused_elastic_table(haptic, refuse, tmp_path, verb, file, old, new):
     spoil(haptic / file, old, new)
     output = ["--output", tmp_path / "results"] if verb == "fit" else []
-    before = sorted(tmp_path.rglob("*"))
+    files_at_start = sorted(tmp_path.rglob("*"))
     refuse(verb, haptic, *output)
-    assert sorted(tmp_path.rglob("*")) == before
+    assert sorted(tmp_path.rglob("*")) == files_at_start
 
 
 RADIUS, ANGLE = 'input_pulley_radius = { value = 20, unit = "mm" }', 'wrap_angle = { value = 90, unit = "deg" }  '
@@ -194,9 +194,9 @@ DESCRIPTIONS = [
 @pytest.mark.parametrize(("old", "new", "names"), DESCRIPTIONS)
 def test_a_spoiled_elastic_description_is_refused_by_key(haptic, refuse, old, new, names):
     spoil(haptic / "cable.toml", old, new)
-    said = refuse("check", haptic)
+    message = refuse("check", haptic)
     for name in ["cable.toml", *names]:
-        assert name in said, said
+        assert name in message, message
 
 
 def test_a_preload_that_is_stated_twice_is_refused(haptic, refuse):
@@ -252,10 +252,10 @@ def test_a_rope_that_is_only_stretched_straight_is_said_to_tell_nothing_of_frict
     assert "every row of stretch.csv is at a wrap angle of 0, so it has no information on friction" in " ".join(out.split())
 
 
-@pytest.mark.parametrize(("preloads", "said"), [((20, 10, 5), "falls with the wrap angle"), ((0, 0, 0), "reads 0")])
-def test_preloads_that_bending_does_not_give_are_warned_of(haptic, run, preloads, said):
+@pytest.mark.parametrize(("preloads", "message"), [((20, 10, 5), "falls with the wrap angle"), ((0, 0, 0), "reads 0")])
+def test_preloads_that_bending_does_not_give_are_warned_of(haptic, run, preloads, message):
     rows = "\n".join(f"{angle},{preload}" for angle, preload in zip((0, 90, 180), preloads, strict=True))
     (haptic / P).write_text(f"{HEADS[P]}\n{rows}\n")
     code, out, _ = run("check", haptic)
     assert code == 0
-    assert said in out
+    assert message in out

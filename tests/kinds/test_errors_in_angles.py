@@ -47,9 +47,9 @@ def _with_latent_angles(
     def residuals(unknown: np.ndarray) -> np.ndarray:
         return np.concatenate([(loss - unknown[0] * unknown[1:]) / loss_sd, (angle - unknown[1:]) / sd])
 
-    found = optimize.least_squares(residuals, np.concatenate([[0.1], angle]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    scatter = 2 * found.cost / (len(loss) - 1)
-    return float(found.x[0]), float(np.sqrt(scatter * np.linalg.inv(found.jac.T @ found.jac)[0, 0]))
+    solution = optimize.least_squares(residuals, np.concatenate([[0.1], angle]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    scatter = 2 * solution.cost / (len(loss) - 1)
+    return float(solution.x[0]), float(np.sqrt(scatter * np.linalg.inv(solution.jac.T @ solution.jac)[0, 0]))
 
 
 @pytest.mark.parametrize("degrees", [2.0, 5.0])
@@ -68,15 +68,15 @@ def test_the_difference_to_unknown_true_angles_is_the_share_that_is_known():
     """Of a whole hundred rows of 8 deg: nearly two hundredths, more than half a standard error."""
     sd = np.deg2rad(8.0)
     loss, angle = _misread(11, sd, n=100)
-    found = fitted(of_rows(loss, angle[:, None], sd, prior={"tau": {"fixed": TAU}})).estimates["mu1"]
+    solution = fitted(of_rows(loss, angle[:, None], sd, prior={"tau": {"fixed": TAU}})).estimates["mu1"]
     mu, error = _with_latent_angles(loss, angle, sd)
 
-    def share(at: float) -> float:
-        weight = 1 / (TAU**2 + at**2 * sd**2)
-        return at * sd**2 * np.sum(weight**2 * (loss - at * angle) ** 2) / np.sum(weight * angle**2)
+    def share(value: float) -> float:
+        weight = 1 / (TAU**2 + value**2 * sd**2)
+        return value * sd**2 * np.sum(weight**2 * (loss - value * angle) ** 2) / np.sum(weight * angle**2)
 
-    assert mu - found.value == pytest.approx(share(mu), rel=0.1)
-    assert 0.005 < (mu - found.value) / mu < 0.03
+    assert mu - solution.value == pytest.approx(share(mu), rel=0.1)
+    assert 0.005 < (mu - solution.value) / mu < 0.03
     assert error / mu < 0.03
 
 
@@ -113,8 +113,8 @@ def _with_angle_errors(dataset: Dataset, misread: np.ndarray, sd: np.ndarray) ->
     """Force runs whose angles were misread, with their standard deviations as the table states them [rad]."""
     forces = dataset.measurements.table(ForceTable)
     angle = np.maximum(forces.own.angle[:, 0] + misread[forces.run], 0.01)
-    own = replace(forces.own, angle=angle[:, None], sd=sd[forces.run][:, None])
-    return replace(dataset, measurements=dataset.measurements.with_tables(replace(forces, own=own)))
+    own_angles = replace(forces.own, angle=angle[:, None], sd=sd[forces.run][:, None])
+    return replace(dataset, measurements=dataset.measurements.with_tables(replace(forces, own=own_angles)))
 
 
 def _runs(dataset: Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -29,9 +29,9 @@ def _mean(rows: Readings, noise_ratio: float) -> float:
 @pytest.mark.parametrize("loads", LOADS)
 def test_the_mean_of_a_noisy_run_is_unbiased(loads, noise_ratio, stroke):
     """Weights of noisy outputs gave 0.7 points too much here; 0.05 is 3.5 standard errors of 200,000 readings or more."""
-    sd, at = 0.088 * EFFICIENCY * 50.0, LOADS[loads]
+    sd, points = 0.088 * EFFICIENCY * 50.0, LOADS[loads]
     rows = pull(
-        np.random.default_rng(11), [0.0], [-np.log(EFFICIENCY)], at, strokes=(stroke,), repeats=ROWS // len(at),
+        np.random.default_rng(11), [0.0], [-np.log(EFFICIENCY)], points, strokes=(stroke,), repeats=ROWS // len(points),
         noise=(noise_ratio * sd, sd),
     )  # fmt: skip
     assert _mean(rows, noise_ratio) == pytest.approx(100 * EFFICIENCY, abs=0.05)
@@ -88,8 +88,8 @@ def test_a_hung_weight_has_no_noise_in_the_likelihood_nor_in_what_is_simulated(t
 
     def best(term):
         grid = np.linspace(0.3, 0.8, 201)
-        at = jax.jit(jax.vmap(lambda s: jnp.sum(term.log_likelihood(values | {"sigma_F": s}, term.data))))
-        return grid[int(np.argmax(at(jnp.asarray(grid))))]
+        log_values = jax.jit(jax.vmap(lambda s: jnp.sum(term.log_likelihood(values | {"sigma_F": s}, term.data))))
+        return grid[int(np.argmax(log_values(jnp.asarray(grid))))]
 
     assert best(term) == pytest.approx(sd, rel=0.05)  # 3200 readings: 1.25 % is one standard error
     _, as_cells = _term(write(tmp_path / "cells", rows))

@@ -54,9 +54,9 @@ def test_more_force_out_than_in_is_refused_with_its_usual_cause(tmp_path, refuse
     spoil, names = MISTAKES[mistake]
     rows = _bench()
     rows = replace(rows, force_in=unit * rows.force_in, force_out=unit * rows.force_out)
-    said = refuse("check", write(tmp_path, spoil(rows)))
+    message = refuse("check", write(tmp_path, spoil(rows)))
     for name in (*names, "forces.csv, row"):
-        assert name in said
+        assert name in message
 
 
 @pytest.mark.parametrize("n", [1, 3, 6])
@@ -69,12 +69,12 @@ def test_swapped_columns_are_refused_where_every_run_is_one_reading(tmp_path, re
 
 def test_a_table_that_says_that_some_readings_are_wrong_is_refused_only_as_a_whole(tmp_path, accept, refuse):
     heavy = 'noise = "student"\n'
-    one = write(tmp_path / "one", _bench().swapped(np.array([17])))
+    first = write(tmp_path / "one", _bench().swapped(np.array([17])))
     every = write(tmp_path / "every", _bench().swapped())
-    for folder in (one, every):
+    for folder in (first, every):
         file = folder / "cable.toml"
         file.write_text(heavy + file.read_text())
-    accept("check", one)
+    accept("check", first)
     assert "swapped" in refuse("check", every)
 
 
@@ -83,12 +83,12 @@ def test_stated_offsets_and_gain_errors_explain_a_gain_that_noise_does_not(tmp_p
         np.random.default_rng(2), [10.0], [0.02], LOADS, strokes=(1,), noise=(0.05, 0.05), repeats=5, offset=(0.0, 2.0)
     )
     assert "not zeroed" in refuse("check", write(tmp_path / "bare", rows))
-    stated = '[sensors]\noffset_sd = { value = 1, unit = "N" }\n'
-    accept("check", write(tmp_path / "offset", rows, more=stated))
+    setting = '[sensors]\noffset_sd = { value = 1, unit = "N" }\n'
+    accept("check", write(tmp_path / "offset", rows, more=setting))
     gained = replace(rows, force_out=1.06 * (rows.force_out - 2.0))
     refuse("check", write(tmp_path / "no gain", gained))
-    stated = "[sensors]\ninput_gain_error_sd = 0.015\noutput_gain_error_sd = 0.02\n"
-    accept("check", write(tmp_path / "gain", gained, more=stated))
+    setting = "[sensors]\ninput_gain_error_sd = 0.015\noutput_gain_error_sd = 0.02\n"
+    accept("check", write(tmp_path / "gain", gained, more=setting))
 
 
 # runs, loads, strokes, repeats, noise in both cells [N] and friction exponent of cables with hardly any friction
@@ -125,8 +125,8 @@ def test_a_noisy_table_of_a_cable_without_friction_is_hardly_ever_refused(bench,
 def _table(rows: Readings) -> ForceTable:
     n, (names, run) = len(rows.place), np.unique(rows.label, return_inverse=True)
     unknown, origin = np.full(n, np.nan), RowOrigin.below_heading("forces.csv", n)
-    own = OwnAngles.none((), n)
-    return ForceTable(unknown, rows.force_in, rows.force_out, run, tuple(names), rows.stroke, own, origin, unknown)
+    own_angles = OwnAngles.none((), n)
+    return ForceTable(unknown, rows.force_in, rows.force_out, run, tuple(names), rows.stroke, own_angles, origin, unknown)
 
 
 def test_an_efficiency_above_1_within_its_error_is_read_and_one_beyond_it_is_refused(tmp_path, accept, refuse):
@@ -150,18 +150,18 @@ def test_gain_errors_of_both_cells_add_in_quadrature_and_one_for_both_is_refused
     rows = _bench()
     both = refuse("check", write(tmp_path / "both", rows, more="[sensors]\ngain_error_sd = 0.005\n"))
     assert "input_gain_error_sd = 0.005 and output_gain_error_sd = 0.005" in both
-    one = refuse("check", write(tmp_path / "one", rows, more="[sensors]\noutput_gain_error_sd = 0.005\n"))
-    assert "input_gain_error_sd too" in one
+    first = refuse("check", write(tmp_path / "one", rows, more="[sensors]\noutput_gain_error_sd = 0.005\n"))
+    assert "input_gain_error_sd too" in first
     assert Sensors(input_gain_error_sd=0.003, output_gain_error_sd=0.004).gain_sd == pytest.approx(0.005)
     assert Sensors.model_validate({"gain_error_sd": None}).gain_sd is None  # as older results have stored it
 
 
-@pytest.mark.parametrize(("strokes", "more", "said"), [
+@pytest.mark.parametrize(("strokes", "more", "message"), [
     ((1,), "", "only pulls were read"), ((-1,), "", "only returns were read"), ((1, -1), "", ""),
     ((1,), "[sensors]\ninput_gain_error_sd = 0.0\noutput_gain_error_sd = 0.0\n", ""),
 ])  # fmt: skip
-def test_readings_of_one_stroke_that_cannot_tell_the_gains_of_the_cells_are_warned_of(tmp_path, accept, strokes, more, said):
+def test_readings_of_one_stroke_that_cannot_tell_the_gains_of_the_cells_are_warned_of(tmp_path, accept, strokes, more, message):
     """One percent of gain over the mean loss of 0.31 is 3 % of the coefficient."""
     out = " ".join(accept("check", write(tmp_path, _bench(strokes=strokes), more=more)).split())
-    assert (said in out) if said else ("look like friction" not in out)
-    assert not said or "by 1 %, coefficients are wrong by 3 %" in out
+    assert (message in out) if message else ("look like friction" not in out)
+    assert not message or "by 1 %, coefficients are wrong by 3 %" in out

@@ -15,10 +15,10 @@ TRUE = {"new rope": 0.1, "old": 0.2}
 BY_GROUP = 'friction_model = "by-group"\n'
 
 
-def _folder(path, groups=tuple(TRUE), description=BENDS, top="", beside="", heading="group", run=None):
+def _folder(path, groups=tuple(TRUE), description=BENDS, top="", extra="", heading="group", run=None):
     """Two mountings of each group at one bend; the same labels in each."""
     path.mkdir(parents=True, exist_ok=True)
-    (path / "cable.toml").write_text(top + description.replace('"forces.csv"', f'"forces.csv"{beside}'))
+    (path / "cable.toml").write_text(top + description.replace('"forces.csv"', f'"forces.csv"{extra}'))
     lines = [f"run,{heading},wrap_angle_deg,stroke,input_force_N,output_force_N"]
     for group, mu in zip(groups, TRUE.values(), strict=True):
         rows = pull(np.random.default_rng(1), [180.0] * 2, [mu * np.pi] * 2, (20, 40, 60), noise=(0.1, 0.1), scatter=0.01)
@@ -41,15 +41,15 @@ def _log_likelihood(model, z):
 
 def test_equal_coefficients_of_all_groups_are_the_shared_one(tmp_path):
     folder = _folder(tmp_path)
-    shared, own = _density(folder), _density(folder, 'friction_model="by group+drag"', "prior.drag.fixed=0.0")
-    names = [p.name for p in own.model.space.free]
+    shared, own_density = _density(folder), _density(folder, 'friction_model="by group+drag"', "prior.drag.fixed=0.0")
+    names = [p.name for p in own_density.model.space.free]
     assert names[:2] == ["mu[new rope]", "mu[old]"]
     z = 0.5 * np.random.default_rng(0).standard_normal(shared.model.space.size)
-    one, other = (
-        _log_likelihood(density.model, at) for density, at in ((shared, z), (own, np.append(z[0], z)))
+    first, other = (
+        _log_likelihood(density.model, point) for density, point in ((shared, z), (own_density, np.append(z[0], z)))
     )
-    assert one == pytest.approx(other, abs=1e-9)
-    assert abs(_log_likelihood(own.model, np.append(z[0] + 0.5, z)) - one) > 1
+    assert first == pytest.approx(other, abs=1e-9)
+    assert abs(_log_likelihood(own_density.model, np.append(z[0] + 0.5, z)) - first) > 1
 
 
 def test_a_group_has_a_name_that_fits_into_a_table(tmp_path):
@@ -84,8 +84,8 @@ def test_a_contact_may_be_shared_by_all_groups(tmp_path):
 
 
 def test_what_is_said_of_a_coefficient_holds_for_each_group_unless_said_of_one(tmp_path):
-    one = '[friction."mu[old]"]\nfixed = 0.3\n[friction.mu]\nmeasured = { value = 0.1, sd = 0.01 }\n[tables]'
-    folder = _folder(tmp_path, top=BY_GROUP, description=BENDS.replace("[tables]", one))
+    text = '[friction."mu[old]"]\nfixed = 0.3\n[friction.mu]\nmeasured = { value = 0.1, sd = 0.01 }\n[tables]'
+    folder = _folder(tmp_path, top=BY_GROUP, description=BENDS.replace("[tables]", text))
     new, old = build_model(load_dataset(folder)).space.parameters[:2]
     assert new.prior_text == "measured 0.1 ± 0.01" and old.fixed == 0.3
 
@@ -93,19 +93,19 @@ def test_what_is_said_of_a_coefficient_holds_for_each_group_unless_said_of_one(t
 def test_a_label_in_another_group_is_another_mounting_unless_it_stayed_mounted(tmp_path, accept):
     table = load_dataset(_folder(tmp_path / "anew")).measurements.table(ForceTable)
     assert table.run_names == ("1 (new rope)", "2 (new rope)", "1 (old)", "2 (old)")
-    said = " ".join(accept("check", tmp_path / "anew").split())
-    assert "in another group" in said and "across groups" in said and "--friction by-group" in said
-    stayed = _folder(tmp_path / "stayed", beside=', run = "across groups"')
+    output = " ".join(accept("check", tmp_path / "anew").split())
+    assert "in another group" in output and "across groups" in output and "--friction by-group" in output
+    stayed = _folder(tmp_path / "stayed", extra=', run = "across groups"')
     assert load_dataset(stayed).measurements.table(ForceTable).run_names == ("1", "2")
 
 
 def test_check_says_of_which_groups_coefficients_are(tmp_path, accept):
-    said = accept("check", _folder(tmp_path), "--friction", "by-group")
-    assert "mu: free, default prior; one for each of the groups new rope and old" in said
+    output = accept("check", _folder(tmp_path), "--friction", "by-group")
+    assert "mu: free, default prior; one for each of the groups new rope and old" in output
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"groups": ("1", "2")}, ['called by numbers', "temperature"]),
         ({"groups": ("new", "")}, ["row 14", "blank", "'new'"]),
@@ -114,9 +114,9 @@ def test_check_says_of_which_groups_coefficients_are(tmp_path, accept):
         ({"description": BENDS.replace('friction = "mu"', 'friction = "by group"')}, ["name of the coefficient", "--friction"]),
     ],
 )  # fmt: skip
-def test_a_column_that_names_no_groups_is_refused(tmp_path, refuse, changes, said):
+def test_a_column_that_names_no_groups_is_refused(tmp_path, refuse, changes, message):
     sentence = refuse("check", _folder(tmp_path, top=BY_GROUP, **changes))
-    assert all(words in sentence for words in said), sentence
+    assert all(words in sentence for words in message), sentence
 
 
 def test_tables_without_groups_are_refused_beside_those_with(tmp_path, refuse):
@@ -127,7 +127,7 @@ def test_tables_without_groups_are_refused_beside_those_with(tmp_path, refuse):
 
 
 def test_groups_called_by_numbers_are_read_where_that_is_said(tmp_path, accept):
-    folder = _folder(tmp_path, groups=("1", "2"), beside=', groups = "called by numbers"', top=BY_GROUP)
+    folder = _folder(tmp_path, groups=("1", "2"), extra=', groups = "called by numbers"', top=BY_GROUP)
     assert build_model(load_dataset(folder)).cable.coefficients == ("mu[1]", "mu[2]")
     assert "It is not used" in accept("check", _folder(tmp_path / "not", groups=("1", "2")))
 
@@ -136,20 +136,20 @@ def test_groups_called_by_numbers_are_read_where_that_is_said(tmp_path, accept):
 
 
 def test_every_row_can_be_a_run_of_its_own(tmp_path, accept):
-    folder = _folder(tmp_path, beside=', run = "each row"')
+    folder = _folder(tmp_path, extra=', run = "each row"')
     table = load_dataset(folder).measurements.table(ForceTable)
     assert len(table.run_names) == len(table.run) == 24 and table.run_names[0] == "row 2"
     assert "mounting of its own" in " ".join(accept("check", folder).split())
-    asked = accept("check", _folder(tmp_path / "asked"), "--set", "tables.forces.run=each row")
-    assert "24 runs" in asked
+    answer = accept("check", _folder(tmp_path / "asked"), "--set", "tables.forces.run=each row")
+    assert "24 runs" in answer
 
 
 def test_rows_of_one_mounting_each_are_weighed_together(tmp_path):
     """A reading weighed by itself weighs more where noise makes its output larger."""
-    (term,) = build_model(load_dataset(_folder(tmp_path, beside=', run = "each row"'))).terms
+    (term,) = build_model(load_dataset(_folder(tmp_path, extra=', run = "each row"'))).terms
     rows, group = term.rows, np.repeat([0, 1], 12)
     np.testing.assert_allclose(rows.log_ratio, rows.stroke * np.log(rows.input_force / rows.output_force))
     by_itself = 1 / (rows.input_force**-2 + rows.output_force**-2)
-    for mine in [(group == g) & (rows.stroke > 0) for g in (0, 1)]:
-        less = np.log(by_itself[mine] / rows.weight(1.0)[mine])
-        assert np.corrcoef(less, rows.log_ratio[mine])[0, 1] < -0.9
+    for mask in [(group == g) & (rows.stroke > 0) for g in (0, 1)]:
+        less = np.log(by_itself[mask] / rows.weight(1.0)[mask])
+        assert np.corrcoef(less, rows.log_ratio[mask])[0, 1] < -0.9

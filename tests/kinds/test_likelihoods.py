@@ -29,7 +29,7 @@ def _force_table(runs, names=(), angle=None, sd=None) -> ForceTable:
     """Rows (run, stroke, input force, output force), with wrap angles of their own if given [rad]."""
     run, stroke, force_in, force_out = (np.array(column) for column in zip(*runs, strict=True))
     n = len(run)
-    own = OwnAngles(
+    own_angles = OwnAngles(
         tuple(names),
         np.full((n, len(names)), np.nan) if angle is None else np.asarray(angle, dtype=float).reshape(n, -1),
         np.full((n, len(names)), np.nan) if sd is None else np.asarray(sd, dtype=float).reshape(n, -1),
@@ -37,7 +37,7 @@ def _force_table(runs, names=(), angle=None, sd=None) -> ForceTable:
     origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     labels = tuple(str(i) for i in range(int(run.max()) + 1))
     velocity = np.full(n, np.nan)
-    return ForceTable(np.full(n, np.nan), force_in * 1.0, force_out * 1.0, run, labels, stroke, own, origin, velocity)
+    return ForceTable(np.full(n, np.nan), force_in * 1.0, force_out * 1.0, run, labels, stroke, own_angles, origin, velocity)
 
 
 def _single_contact(wrap_angle, table: ForceTable, **more) -> Model:
@@ -46,10 +46,10 @@ def _single_contact(wrap_angle, table: ForceTable, **more) -> Model:
     return build_model(Dataset(description.model_copy(update={"route": None}), Measurements((table,)), {}))
 
 
-def _of_term(model: Model, term, what: str, values: dict[str, float]) -> np.ndarray:
+def _of_term(model: Model, term, case: str, values: dict[str, float]) -> np.ndarray:
     """A function of a term at named values; those not named are at their prior medians or where they are fixed."""
     named = model.space.constrain(jnp.zeros(model.space.size)) | {k: jnp.asarray(v) for k, v in values.items()}
-    return np.asarray(jax.jit(getattr(term, what))(named, term.data))
+    return np.asarray(jax.jit(getattr(term, case))(named, term.data))
 
 
 def _readings(seed: int, n: int, run: int = 0, strokes=(1, -1)) -> list[tuple[int, int, float, float]]:
@@ -69,9 +69,9 @@ def _as_read(model: Model, table: ForceTable) -> SlidingRows:
 
 def _integrated(read: SlidingRows, exponents, tau: float, sigma: float, gain: float = 0.0, run: int = 0) -> float:
     """Log likelihood of one run: every sample's own Gaussian, the run's effect integrated by quadrature."""
-    mine = read.run == run
-    ratio, exponents = (read.log_ratio - read.stroke * gain)[mine], exponents[mine]
-    spread = sigma * np.sqrt(1 / read.input_force**2 + 1 / read.output_force**2)[mine]
+    mask = read.run == run
+    ratio, exponents = (read.log_ratio - read.stroke * gain)[mask], exponents[mask]
+    spread = sigma * np.sqrt(1 / read.input_force**2 + 1 / read.output_force**2)[mask]
 
     def log_joint(m):
         return stats.norm.logpdf(ratio, exponents + m, spread).sum() + stats.norm.logpdf(m, 0.0, tau)
@@ -94,10 +94,10 @@ def test_four_numbers_of_a_run_say_what_all_its_samples_say_with_the_mounting_in
     model = _single_contact({"value": 150, "unit": "deg"}, table, **sensors)
     values = VALUES | ({"gain_error": gain} if gain else {})
     (term,) = model.terms
-    found = _of_term(model, term, "log_likelihood", values)
+    log_likelihood = _of_term(model, term, "log_likelihood", values)
     exponents = np.full(n, VALUES["mu"] * np.deg2rad(150))
     expected = _integrated(_as_read(model, table), exponents, VALUES["tau"], VALUES["sigma_F"], gain)
-    np.testing.assert_allclose(found, [expected], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(log_likelihood, [expected], rtol=0, atol=1e-8)
 
 
 def test_the_same_holds_for_several_runs_each_with_several_angles_of_its_own():
@@ -109,11 +109,11 @@ def test_the_same_holds_for_several_runs_each_with_several_angles_of_its_own():
     (term,) = model.terms
     assert isinstance(term, RunsTerm)
     assert np.sum(term.data["weight"] > 0) == 10
-    found = _of_term(model, term, "log_likelihood", VALUES)
+    log_likelihood = _of_term(model, term, "log_likelihood", VALUES)
     read, exponents = _as_read(model, table), VALUES["mu"] * angles[order]
     for run in range(3):
         expected = _integrated(read, exponents, VALUES["tau"], VALUES["sigma_F"], run=run)
-        assert found[run] == pytest.approx(expected, abs=1e-8)
+        assert log_likelihood[run] == pytest.approx(expected, abs=1e-8)
 
 
 def test_the_error_of_a_run_s_own_angle_widens_its_mounting_effect():
@@ -121,10 +121,10 @@ def test_the_error_of_a_run_s_own_angle_widens_its_mounting_effect():
     rows, angle, sd = _readings(5, 20), 2.6, 0.05
     table = _force_table(rows, ("angle",), np.full(20, angle), np.full(20, sd))
     model = _single_contact({"column": "angle"}, table)
-    found = _of_term(model, model.terms[0], "log_likelihood", VALUES)
+    log_likelihood = _of_term(model, model.terms[0], "log_likelihood", VALUES)
     tau = np.hypot(VALUES["tau"], VALUES["mu"] * sd)
     expected = _integrated(_as_read(model, table), np.full(20, VALUES["mu"] * angle), tau, VALUES["sigma_F"])
-    assert found[0] == pytest.approx(expected, abs=1e-8)
+    assert log_likelihood[0] == pytest.approx(expected, abs=1e-8)
 
 
 def test_the_cost_does_not_grow_with_the_length_of_a_recording():
@@ -200,10 +200,10 @@ def test_a_held_reading_has_a_finite_likelihood_and_gradient_however_absurd_the_
 
 def test_held_readings_alone_bound_the_coefficient_from_below_and_leave_the_rest_to_the_prior():
     """Friction is at least what holds the load; above that, twice as much friction is as likely as ten times."""
-    at = [float(_held(VALUES | {"mu": mu})[1]) for mu in (0.02, 0.05, 0.2, 0.5, 1.0)]
-    assert at[0] < at[1] < at[2] - 1.0
-    assert at[2] == pytest.approx(0.0, abs=1e-6)
-    assert at[3] == pytest.approx(at[4], abs=1e-9)
+    values = [float(_held(VALUES | {"mu": mu})[1]) for mu in (0.02, 0.05, 0.2, 0.5, 1.0)]
+    assert values[0] < values[1] < values[2] - 1.0
+    assert values[2] == pytest.approx(0.0, abs=1e-6)
+    assert values[3] == pytest.approx(values[4], abs=1e-9)
 
 
 # Angles -----------------------------------------------------------------------------------------------------------
@@ -222,12 +222,12 @@ def test_undetected_angles_have_the_probability_of_lying_below_the_limit(on_body
         values = model.space.constrain(z)
         return term.expected(values, data), term.log_likelihood(values, data), values["sigma_theta"]
 
-    expected, found, sigma = over_rows(at, draws(model, 50, 1), term.data)
+    expected, computed, sigma = over_rows(at, draws(model, 50, 1), term.data)
     n, theta, sigma = len(term.data["angle"]), np.deg2rad(expected), sigma[:, None]
     np.testing.assert_allclose(
-        found[:, n:], stats.norm.logcdf((np.deg2rad(10.0) - theta[:, n:]) / sigma), rtol=1e-9, atol=1e-15
+        computed[:, n:], stats.norm.logcdf((np.deg2rad(10.0) - theta[:, n:]) / sigma), rtol=1e-9, atol=1e-15
     )
-    np.testing.assert_allclose(found[:, :n], stats.norm.logpdf(term.data["angle"], theta[:, :n], sigma), rtol=1e-9)
+    np.testing.assert_allclose(computed[:, :n], stats.norm.logpdf(term.data["angle"], theta[:, :n], sigma), rtol=1e-9)
 
 
 @pytest.mark.parametrize(("how", "detected", "undetected"), [("censored", 17, 5), ("zero", 22, 0), ("dropped", 17, 0)])
@@ -251,10 +251,10 @@ def test_a_row_outside_the_curves_takes_the_angle_table_s_row_with_its_error(on_
     values = {"mu1": 0.09, "mu2": 0.11, "mu3": 0.2, "sigma_theta": 0.05, "tau": 0.007}
     mean = 0.09 * np.deg2rad(100) + 0.11 * np.deg2rad(37) + 0.2 * np.deg2rad(45)
     sd = np.sqrt(0.007**2 + (0.09**2 + 0.11**2) * 0.05**2)
-    found = _of_term(model, term, "log_likelihood", values)
-    assert found[3] == pytest.approx(stats.norm.logpdf(-np.log(0.678), mean, sd), rel=1e-12)
+    log_likelihood = _of_term(model, term, "log_likelihood", values)
+    assert log_likelihood[3] == pytest.approx(stats.norm.logpdf(-np.log(0.678), mean, sd), rel=1e-12)
     inside = stats.norm.logpdf(-np.log(0.77), -np.log(_of_term(model, term, "expected", values)[0]), 0.007)
-    assert found[0] == pytest.approx(inside, rel=1e-9)
+    assert log_likelihood[0] == pytest.approx(inside, rel=1e-9)
 
 
 def test_an_undetected_angle_outside_the_curves_counts_as_half_the_limit_give_or_take(on_body):
@@ -268,12 +268,12 @@ def test_an_undetected_angle_outside_the_curves_counts_as_half_the_limit_give_or
 def test_a_row_s_own_angle_comes_before_the_curve_with_its_stated_error_or_none(on_body):
     dataset = load_dataset(on_body)
     table: EfficiencyTable = dataset.measurements.table(EfficiencyTable)
-    own = OwnAngles(
+    own_angles = OwnAngles(
         ("free_sheath_angle", "squeezed_sheath_angle"),
         np.array([[np.nan, 0.7], [np.nan] * 2, [np.nan] * 2, [1.0, 0.5]]),
         np.array([[np.nan, 0.02], [np.nan] * 2, [np.nan] * 2, [np.nan, 0.03]]),
     )
-    changed = dataset.measurements.with_tables(replace(table, own=own))
+    changed = dataset.measurements.with_tables(replace(table, own=own_angles))
     data = build_model(replace(dataset, measurements=changed)).terms[1].data
     np.testing.assert_array_equal(data["is_own"][:, :2], [[False, True], [False] * 2, [False] * 2, [True, True]])
     np.testing.assert_allclose(data["known_variance"][:, 1], [0.02**2, 0, 0, 0.03**2])

@@ -25,9 +25,9 @@ def term_of(folder) -> LoopRecordingsTerm:
     return next(t for t in build_model(load_dataset(folder)).terms if isinstance(t, LoopRecordingsTerm))
 
 
-def of_term(term, what, values, *extra):
+def of_term(term, case, values, *extra):
     named = {name: jnp.asarray(float(value)) for name, value in values.items()}
-    return np.asarray(jax.jit(getattr(term, what))(named, term.data, *extra))
+    return np.asarray(jax.jit(getattr(term, case))(named, term.data, *extra))
 
 
 def test_the_slope_of_the_operator_is_its_derivative():
@@ -119,10 +119,10 @@ def test_an_error_of_the_delay_shifts_the_output(tmp_path):
     time, output = columns["time_s"], columns["output_force_N"]
     more = '[tables]\nrecordings = { prepare = { block = "none" } }'
     term = term_of(folder_of(tmp_path, [columns | {"output_force_N": np.interp(time - 0.01, time, output)}], more=more))
-    found = {
+    computed = {
         late: np.mean(of_term(term, "residuals", VALUES | {"delay_error": late}) ** 2) for late in (-0.01, 0.0, 0.01)
     }
-    assert found[0.01] < 0.05 * found[0.0] < 0.05 * found[-0.01]
+    assert computed[0.01] < 0.05 * computed[0.0] < 0.05 * computed[-0.01]
 
 
 def test_expected_loss_is_the_observed_one_and_mountings_scatter_it(tmp_path):

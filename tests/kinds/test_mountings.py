@@ -23,7 +23,7 @@ def _folder(path, labels, along="lengths", more=""):
     loss = 0.2 * np.deg2rad(180 - places / 5)
     rows = pull(np.random.default_rng(3), places, loss, [20, 40, 60], labels=labels, noise=(0.2, 0.2), scatter=0.01)
     folder = write(path, rows, description.replace('file = "forces.csv"', f'file = "forces.csv"{more}'), column)
-    angles = "\n".join(f"{at},{180 - at / 5}" for at in range(440, 541, 10))
+    angles = "\n".join(f"{length},{180 - length / 5}" for length in range(440, 541, 10))
     (folder / "angles.csv").write_text(f"cable_length_mm,sheath_angle_deg\n{angles}\n")
     return folder
 
@@ -32,15 +32,15 @@ def _folder(path, labels, along="lengths", more=""):
 @pytest.mark.parametrize("along", ALONG)
 def test_labels_that_come_back_elsewhere_equal_labels_of_their_own(tmp_path, accept, along):
     again = _folder(tmp_path / "again", ["1", "2", "3"] * 6, along)
-    own = _folder(tmp_path / "own", [str(i) for i in range(18)], along)
-    densities = [LogDensity(build_model(load_dataset(folder))) for folder in (again, own)]
+    own_density = _folder(tmp_path / "own", [str(i) for i in range(18)], along)
+    densities = [LogDensity(build_model(load_dataset(folder))) for folder in (again, own_density)]
     for seed in range(3):
         z = jnp.asarray(0.5 * np.random.default_rng(seed).standard_normal(densities[0].model.space.size))
-        one, other = (float(density.log_density(z, density.data)) for density in densities)
-        assert one == pytest.approx(other, abs=1e-9)
-    said = accept("check", again)
-    assert "18 mountings in all" in " ".join(said.split()) and f"across {along}" in said
-    assert "mountings in all" not in accept("check", own)
+        first, other = (float(density.log_density(z, density.data)) for density in densities)
+        assert first == pytest.approx(other, abs=1e-9)
+    output = accept("check", again)
+    assert "18 mountings in all" in " ".join(output.split()) and f"across {along}" in output
+    assert "mountings in all" not in accept("check", own_density)
     labels = next(term.labels for term in densities[0].model.terms if term.name == "run_efficiency")
     assert len(set(labels)) == 18
 

@@ -39,16 +39,16 @@ def rope_of(path, count, drag):
 @pytest.mark.slow
 def test_noise_adds_neither_friction_nor_preload_to_a_loop(tmp_path):
     """An operator led through the readings has friction 7.7 % too large; 3 % are three times what other seeds scatter by."""
-    each = [recorded("triangle", noise=NOISE, seed=i, seconds=8.0) for i in range(3)]
-    found = bf.fit(folder_of(tmp_path, each, more=f"[tables]\nrecordings = {{ {SAMPLES} }}"), mcmc=False).least_squares
-    assert found.estimates["mu"].value == pytest.approx(MU, rel=0.03)
-    assert found.estimates["preload"].value == pytest.approx(PRELOAD, rel=0.03)
+    recordings = [recorded("triangle", noise=NOISE, seed=i, seconds=8.0) for i in range(3)]
+    solution = bf.fit(folder_of(tmp_path, recordings, more=f"[tables]\nrecordings = {{ {SAMPLES} }}"), mcmc=False).least_squares
+    assert solution.estimates["mu"].value == pytest.approx(MU, rel=0.03)
+    assert solution.estimates["preload"].value == pytest.approx(PRELOAD, rel=0.03)
 
 
 @pytest.mark.parametrize(("friction", "drag"), [("capstan", 0.0), ("drag", DRAG)])
 def test_noise_adds_neither_friction_nor_drag_to_a_single_rope(tmp_path, friction, drag):
     """An operator led through the readings has friction 11 % too large, or a drag of 24 N; three standard errors here."""
-    found = bf.fit(rope_of(tmp_path, 3, drag), friction=friction, mcmc=False).least_squares
-    assert found.estimates["mu"].value == pytest.approx(MU, rel=0.1 if drag else 0.03)
+    solution = bf.fit(rope_of(tmp_path, 3, drag), friction=friction, mcmc=False).least_squares
+    assert solution.estimates["mu"].value == pytest.approx(MU, rel=0.1 if drag else 0.03)
     if drag:
-        assert found.estimates["drag"].value == pytest.approx(drag, abs=7.0)
+        assert solution.estimates["drag"].value == pytest.approx(drag, abs=7.0)

@@ -53,8 +53,8 @@ def _named(values) -> dict:
     return {name: jnp.asarray(value) for name, value in values.items()}
 
 
-def _of_term(term, what: str, values, *extra):
-    return np.asarray(jax.jit(getattr(term, what))(_named(values), term.data, *extra))
+def _of_term(term, case: str, values, *extra):
+    return np.asarray(jax.jit(getattr(term, case))(_named(values), term.data, *extra))
 
 
 def _at_each(term, points) -> np.ndarray:
@@ -90,8 +90,8 @@ def _law(rows: SlidingRows, values, m):
 
 def _first_order(rows: SlidingRows, values):
     """The same to first order in m, the derivative by a complex step."""
-    at, slope = _law(rows, values, 0.0), np.imag(_law(rows, values, 1e-30j)) / 1e-30
-    return lambda m: at + slope * m
+    mean, slope = _law(rows, values, 0.0), np.imag(_law(rows, values, 1e-30j)) / 1e-30
+    return lambda m: mean + slope * m
 
 
 def _integrated(rows: SlidingRows, expected, values) -> float:
@@ -100,8 +100,8 @@ def _integrated(rows: SlidingRows, expected, values) -> float:
     tau = values["tau"]
 
     def log_joint(m):
-        each = stats.norm.logpdf(rows.log_ratio, expected(m), spread)
-        return np.sum(rows.n_effective * each) + stats.norm.logpdf(m, 0.0, tau)
+        terms = stats.norm.logpdf(rows.log_ratio, expected(m), spread)
+        return np.sum(rows.n_effective * terms) + stats.norm.logpdf(m, 0.0, tau)
 
     grid = np.linspace(-6 * tau, 6 * tau, 241)
     peak = grid[np.argmax([log_joint(m) for m in grid])]
@@ -118,9 +118,9 @@ def _rows(seed: int, n: int, values, strokes=(1, -1), angles=(2.5,), m: float = 
     generator = np.random.default_rng(seed)
     stroke = np.array([strokes[i % len(strokes)] for i in range(n)])
     force_in, velocity = generator.uniform(20.0, 90.0, n), generator.choice([5.0, 15.0, 40.0], n)
-    own = np.array([[angles[(i // 2) % len(angles)]] for i in range(n)])
+    own_angles = np.array([[angles[(i // 2) % len(angles)]] for i in range(n)])
     drift = stroke * generator.uniform(0.0, 1.5, n) if "delay_error" in values else np.zeros(n)
-    arrays = {"route": np.zeros(n), "own": own, "is_own": np.ones((n, 1), dtype=bool),
+    arrays = {"route": np.zeros(n), "own": own_angles, "is_own": np.ones((n, 1), dtype=bool),
               "known_variance": np.zeros((n, 1)), "noisy": np.zeros((n, 1), dtype=bool),
               "group": np.zeros(n, dtype=int)}  # fmt: skip
     rows = SlidingRows(
@@ -158,24 +158,24 @@ def test_a_run_says_what_its_readings_say_with_the_mounting_integrated_out(name,
     values = VALUES | extra
     rows = _rows(1, 6 * len(strokes), values, strokes, angles=(2.5, 3.1))  # few enough for cells of their own
     term = _runs_term(_cable(**more), rows)
-    found = _of_term(term, "log_likelihood", values)
+    log_likelihood = _of_term(term, "log_likelihood", values)
     expected = _integrated(rows, _first_order(rows, values), values)
-    np.testing.assert_allclose(found, [expected], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(log_likelihood, [expected], rtol=0, atol=1e-8)
     exact = _integrated(rows, lambda m: _law(rows, values, m), values)
-    assert abs(exact - found[0]) < (1e-8 if name in {"gain error", "delay"} else 0.05)
+    assert abs(exact - log_likelihood[0]) < (1e-8 if name in {"gain error", "delay"} else 0.05)
 
 
 @pytest.mark.extended
 def test_on_a_realistic_run_the_first_order_in_the_mounting_effect_is_enough():
     """40 readings good to 0.05 N, drag and offsets, tau = 0.02: second order adds up to 0.07 within tau, 0.32 at twice that."""
     values = VALUES | {"drag": 4.0, "input_offset": 0.5, "output_offset": -0.3, "sigma_F": 0.05}
-    at, program = _cable(friction_model="drag", sensors=OFFSET), None
+    loaded_cable, program = _cable(friction_model="drag", sensors=OFFSET), None
     for m, most in ((-0.04, 0.4), (-0.02, 0.1), (0.0, 1e-3), (0.02, 0.1), (0.04, 0.4)):
         rows = _rows(2, 40, values, m=m)
-        term = _runs_term(at, rows)
+        term = _runs_term(loaded_cable, rows)
         program = program or jax.jit(term.log_likelihood)
-        found = float(program(_named(values), term.data)[0])
-        assert abs(_integrated(rows, lambda m, rows=rows: _law(rows, values, m), values) - found) < most
+        computed = float(program(_named(values), term.data)[0])
+        assert abs(_integrated(rows, lambda m, rows=rows: _law(rows, values, m), values) - computed) < most
 
 
 def test_a_reading_worth_three_is_three_readings():
@@ -186,9 +186,11 @@ def test_a_reading_worth_three_is_three_readings():
     several = SlidingRows(*(getattr(rows, name)[copied] for name in
         ("input_force", "output_force", "log_ratio", "stroke", "run", "velocity", "drift", "n_effective")),
         {name: array[copied] for name, array in rows.angles.items()})  # fmt: skip
-    at = _cable(sensors=GAIN)
-    weighted = _of_term(_runs_term(at, replace(rows, n_effective=worth)), "log_likelihood", values)
-    np.testing.assert_allclose(weighted, _of_term(_runs_term(at, several), "log_likelihood", values), rtol=0, atol=1e-8)
+    loaded_cable = _cable(sensors=GAIN)
+    weighted = _of_term(_runs_term(loaded_cable, replace(rows, n_effective=worth)), "log_likelihood", values)
+    np.testing.assert_allclose(
+        weighted, _of_term(_runs_term(loaded_cable, several), "log_likelihood", values), rtol=0, atol=1e-8
+    )
 
 
 def test_up_to_a_constant_of_the_data_a_reading_s_worth_is_its_power_in_the_likelihood():
@@ -197,8 +199,8 @@ def test_up_to_a_constant_of_the_data_a_reading_s_worth_is_its_power_in_the_like
     rows = replace(rows, n_effective=np.random.default_rng(6).uniform(0.1, 2.5, 15))
     term, apart = _runs_term(_cable(), rows), []
     for values in (VALUES, VALUES | {"mu": 0.13}, VALUES | {"tau": 0.1}, VALUES | {"sigma_F": 1.0}):
-        found = _of_term(term, "log_likelihood", values)[0]
-        apart.append(found - _integrated(rows, _first_order(rows, values), values))
+        log_likelihood = _of_term(term, "log_likelihood", values)[0]
+        apart.append(log_likelihood - _integrated(rows, _first_order(rows, values), values))
     np.testing.assert_allclose(apart, apart[0], rtol=0, atol=1e-8)
 
 
@@ -207,12 +209,12 @@ def binned_and_alone(request):
     """Log likelihood of 2000 readings in bins of the load and each by itself: at the truth and 5 % to each side of it."""
     more, extra = LAWS[request.param]
     values = VALUES | extra | {"sigma_F": 0.05}
-    rows, at = _rows(7, 2000, values), _cable(**more)
+    rows, loaded_cable = _rows(7, 2000, values), _cable(**more)
     points = [values | {name: value * factor for name, value in extra.items()} for factor in (0.95, 1.0, 1.05)]
-    binned = _runs_term(at, rows)
+    binned = _runs_term(loaded_cable, rows)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runs_of_model, "_LOAD_BINS", 10**6)
-        alone = _runs_term(at, rows)
+        alone = _runs_term(loaded_cable, rows)
     assert len(binned.data["mean"]) < 1000 and len(alone.data["mean"]) == 2000
     return _at_each(binned, points), _at_each(alone, points)
 
@@ -246,8 +248,8 @@ def _recorded(
     name = f"{angle:g} rad, {seed}"
     blocks, account = prepare(to_raw(simulated, name, f"{name}.csv"), settings)
     strokes = find_strokes(blocks, f"{name}.csv", name)
-    own = np.array([angle]), np.array([np.nan])
-    return Recording(name, f"{name}.csv", name, float("nan"), *own, blocks, strokes, account)
+    own_angles = np.array([angle]), np.array([np.nan])
+    return Recording(name, f"{name}.csv", name, float("nan"), *own_angles, blocks, strokes, account)
 
 
 def _model(recordings, likelihood="whole", saturation="left out", **more) -> Model:
@@ -279,11 +281,11 @@ def test_without_anything_that_changes_the_scale_whole_recordings_are_sums_over_
     assert isinstance(sums, RunsTerm)
     whole = _whole(model, recordings)
     points = [BLOCK | change for change in ({}, {"mu": 0.14}, {"mu": 0.16}, {"tau": 0.05}, {"sigma_block": 0.2})]
-    found = []
+    results = []
     for term in (sums, whole):
         program = jax.jit(term.log_likelihood)
-        found.append([np.asarray(program(_named(v), term.data)) for v in points])
-    by_sums, by_operator = np.array(found)
+        results.append([np.asarray(program(_named(v), term.data)) for v in points])
+    by_sums, by_operator = np.array(results)
     apart = by_operator - by_sums
     np.testing.assert_allclose(apart[1:4], np.tile(apart[0], (3, 1)), rtol=0, atol=1e-6)
     np.testing.assert_allclose(whole.data["n"], sums.data["n"], rtol=0.02)  # blocks before the first slide
@@ -298,8 +300,8 @@ def test_an_output_that_comes_later_than_it_was_shifted_back_by_has_a_positive_e
     model = _model([recording], likelihood)
     (term,) = model.terms if likelihood == "runs" else (_whole(model, recordings.items),)
     grid = np.linspace(-0.008, 0.008, 33)
-    found = jax.jit(jax.vmap(lambda d: term.log_likelihood(_named(BLOCK) | {"delay_error": d}, term.data)[0]))(grid)
-    assert grid[int(np.argmax(found))] == pytest.approx(late, abs=0.0006)
+    log_likelihood = jax.jit(jax.vmap(lambda d: term.log_likelihood(_named(BLOCK) | {"delay_error": d}, term.data)[0]))(grid)
+    assert grid[int(np.argmax(log_likelihood))] == pytest.approx(late, abs=0.0006)
 
 
 ALL = "drag+load-dependent+rate-dependent"
@@ -318,12 +320,12 @@ def gradients():
     assert isinstance(term, WholeRecordingsTerm)
     total = jax.jit(jax.value_and_grad(lambda values, data: term.log_likelihood(values, data).sum()))
     _, slope = total(_named(FULL), term.data)
-    found = {}
+    results = {}
     for name, value in FULL.items():
         h = 1e-6 * max(abs(value), 0.1)
         there, back = (float(total(_named(FULL | {name: value + sign * h}), term.data)[0]) for sign in (1, -1))
-        found[name] = float(slope[name]), (there - back) / (2 * h)
-    return found
+        results[name] = float(slope[name]), (there - back) / (2 * h)
+    return results
 
 
 @pytest.mark.extended
@@ -357,10 +359,10 @@ def test_the_mounting_effect_of_a_whole_recording_integrates_out(name):
 
     constant = data["log_weights"] / 2 - data["n"] * np.log(noise * np.sqrt(2 * np.pi))
     grid = np.linspace(-0.01, 0.05, 601)
-    at = np.array([log_joint(m) for m in grid])
-    found = _of_term(term, "log_likelihood", values)[0]
-    exact = at.max() + np.log(integrate.trapezoid(np.exp(at - at.max()), grid)) + constant
-    assert found == pytest.approx(exact, abs=1e-8 if name == "capstan" else 1e-4)
+    index = np.array([log_joint(m) for m in grid])
+    log_likelihood = _of_term(term, "log_likelihood", values)[0]
+    exact = index.max() + np.log(integrate.trapezoid(np.exp(index - index.max()), grid)) + constant
+    assert log_likelihood == pytest.approx(exact, abs=1e-8 if name == "capstan" else 1e-4)
 
 
 FLAGGING = AS_READ.model_copy(update={"saturation": "left out"})
@@ -391,8 +393,8 @@ def test_saturated_blocks_that_are_left_out_do_not_pull_the_coefficient(cell, li
     recordings = [_recorded(angle, BenchFriction(drag=4.0 * (model == "drag")), faults, int(angle), settings=FLAGGING)
                   for angle in (1.0, 2.0, 3.0)]  # fmt: skip
     assert all(r.blocks.saturated.sum() > 40 for r in recordings)
-    found = _fitted(_model(recordings, likelihood, friction_model=model)).estimates["mu"]
-    assert found.value == pytest.approx(MU, rel=2e-3 if model == "capstan" else 1e-2)
+    solution = _fitted(_model(recordings, likelihood, friction_model=model)).estimates["mu"]
+    assert solution.value == pytest.approx(MU, rel=2e-3 if model == "capstan" else 1e-2)
 
 
 # Known truth ------------------------------------------------------------------------------------------------------

@@ -52,22 +52,22 @@ def pulls():
         folder = ROOT / "datasets" / "synthetic-recordings"
         dataset = load_dataset(folder)
         model, tables = build_model(dataset), dataset.measurements
-        stated = json.loads((folder / "truth.json").read_text())["truth"]
+        truth = json.loads((folder / "truth.json").read_text())["truth"]
         recordings, angles = tables.table(Recordings), tables.table(AngleTable)
         draw = jax.jit(lambda named, key: draw_readings(model.cable, tables, named, key)["recordings"])
 
         def pull(seed: int, **values: float) -> float:
-            page = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
+            page = {p.name: truth.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
             named = {name: jnp.asarray(value) for name, value in page.items()}
-            drawn = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
-            term = make_recordings_term(model.cable, replace_forces(dataset.description, recordings, drawn), angles)
+            draws = {name: np.asarray(array) for name, array in draw(named, jax.random.key(seed)).items()}
+            term = make_recordings_term(model.cable, replace_forces(dataset.description, recordings, draws), angles)
 
             def log_likelihood(delay: jax.Array) -> jax.Array:
                 return jnp.sum(term.log_likelihood(named | {"delay_error": delay}, term.data))
 
             step = 1e-5
-            less, here, more = jax.vmap(log_likelihood)(jnp.asarray(page["delay_error"] + step * np.arange(-1, 2)))
-            return float((more - less) / 2 / np.sqrt(2 * here - less - more))
+            less, middle, more = jax.vmap(log_likelihood)(jnp.asarray(page["delay_error"] + step * np.arange(-1, 2)))
+            return float((more - less) / 2 / np.sqrt(2 * middle - less - more))
 
         yield lambda **values: np.array([pull(seed, **values) for seed in range(TIMES)])
 
@@ -81,6 +81,6 @@ def test_the_likelihood_of_recordings_made_again_points_at_the_delay_they_were_m
 
     With the noise of the measured input taken for motion, the mean was 4.1 at little noise.
     """
-    found = pulls(**values)
-    assert abs(np.mean(found)) < 4 / np.sqrt(TIMES)
-    assert np.sum(found**2) < 42.6  # chi square of twelve at 2.5e-5
+    computed = pulls(**values)
+    assert abs(np.mean(computed)) < 4 / np.sqrt(TIMES)
+    assert np.sum(computed**2) < 42.6  # chi square of twelve at 2.5e-5

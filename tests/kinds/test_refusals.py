@@ -56,9 +56,9 @@ TABLES = [
 @pytest.mark.parametrize(("file", "old", "new", "names"), TABLES)
 def test_a_spoiled_table_is_refused_by_name(dataset, refuse, file, old, new, names):
     spoil(dataset / file, old, new)
-    said = refuse("check", dataset)
+    message = refuse("check", dataset)
     for name in names:
-        assert name in said, said
+        assert name in message, message
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_a_spoiled_table_is_refused_by_name(dataset, refuse, file, old, new, nam
 def test_spoiled_forces_are_refused_by_name(dataset, refuse, old, new, names):
     spoil(dataset / "cable.toml", *FORCES)
     spoil(dataset / "forces.csv", old, new)
-    said = refuse("check", dataset)
+    message = refuse("check", dataset)
     for name in names:
-        assert name in said, said
+        assert name in message, message
 
 
 DESCRIPTIONS = [
@@ -106,9 +106,9 @@ EVERYWHERE = ("rang = [430", 'curv = "gaussian"')  # two contacts have them
 @pytest.mark.parametrize(("old", "new", "names"), DESCRIPTIONS)
 def test_a_spoiled_description_is_refused_by_key(dataset, refuse, old, new, names):
     spoil(dataset / "cable.toml", old, new)
-    said = refuse("check", dataset, faults=2 if new in EVERYWHERE else 1)
+    message = refuse("check", dataset, faults=2 if new in EVERYWHERE else 1)
     for name in names:
-        assert name in said, said
+        assert name in message, message
 
 
 @pytest.mark.parametrize(
@@ -138,9 +138,9 @@ def test_two_columns_for_one_quantity_are_refused(dataset, refuse):
 def test_nothing_is_written_after_bad_input(dataset, refuse, tmp_path, verb):
     spoil(dataset / "efficiencies.csv", "440,77", "440,177")
     output = ["--output", tmp_path / "results"] if verb == "fit" else []
-    before = sorted(tmp_path.rglob("*"))
+    files_at_start = sorted(tmp_path.rglob("*"))
     refuse(verb, dataset, *output)
-    assert sorted(tmp_path.rglob("*")) == before
+    assert sorted(tmp_path.rglob("*")) == files_at_start
 
 
 def test_what_only_the_model_can_judge_leaves_an_earlier_fit_alone(dataset, refuse, tmp_path):

@@ -90,8 +90,8 @@ def test_angle_and_torque_at_once_are_refused(tmp_path):
 
 
 def test_least_squares_finds_what_a_ring_down_was_made_of(tmp_path):
-    stated = INERTIA.replace("sd = 2e-5, ", "")
-    fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4))], stated), seed=1, mcmc=False)
+    setting = INERTIA.replace("sd = 2e-5, ", "")
+    fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4))], setting), seed=1, mcmc=False)
     for name, truth in list(NAMES.items())[1:]:
         assert fit.least_squares.estimates[name].value == pytest.approx(truth, rel=0.05), name
 
@@ -100,22 +100,22 @@ def test_least_squares_finds_what_a_ring_down_was_made_of(tmp_path):
 def test_a_second_ring_down_with_a_known_inertia_tells_the_inertia(tmp_path):
     fit = bf.fit(folder_of(tmp_path, [(0.0, swung()), (1e-3, swung(1e-3, seed=1))], ""), seed=1, settings=QUICK)
     for name, truth in NAMES.items():
-        found = fit.parameter(name)
-        assert abs(found.mean - truth) < 4 * found.sd and found.sd < 0.1 * truth, name
+        estimate = fit.parameter(name)
+        assert abs(estimate.mean - truth) < 4 * estimate.sd and estimate.sd < 0.1 * truth, name
 
 
 @pytest.mark.slow
 def test_torque_tells_the_same_as_angle(tmp_path):
     fit = bf.fit(folder_of(tmp_path, [(0.0, swung(torque=True))], heading="torque_N_m"), seed=1, settings=QUICK)
     for name, truth in NAMES.items():
-        found = fit.parameter(name)
-        assert abs(found.mean - truth) < 4 * found.sd and found.sd < 0.1 * truth, name
+        estimate = fit.parameter(name)
+        assert abs(estimate.mean - truth) < 4 * estimate.sd and estimate.sd < 0.1 * truth, name
 
 
 @pytest.mark.extended
 def test_a_released_joint_is_drawn_as_it_was_read_and_fitted(tmp_path):
-    stated = INERTIA.replace("sd = 2e-5, ", "")
-    fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4)), (1e-3, swung(1e-3, noise=2e-4, seed=1))], stated), seed=1,
+    setting = INERTIA.replace("sd = 2e-5, ", "")
+    fit = bf.fit(folder_of(tmp_path, [(0.0, swung(noise=2e-4)), (1e-3, swung(1e-3, noise=2e-4, seed=1))], setting), seed=1,
                  mcmc=False)  # fmt: skip
     first, second = ring_down_figure.data(fit)
     assert (first.label, second.label) == ("Run 1", "Run 2, 0.001 kg m² added")
@@ -127,5 +127,5 @@ def test_a_released_joint_is_drawn_as_it_was_read_and_fitted(tmp_path):
 
 def test_files_of_a_released_joint_are_offered_where_no_description_says_what_they_hold():
     questions = KINDS["ringdown"].init_questions
-    assert [each.quantity.name for each in questions.required] == ["time", "angle"]
+    assert [item.quantity.name for item in questions.required] == ["time", "angle"]
     assert not questions.is_guessed, "time and angle are in many a file"

@@ -52,17 +52,17 @@ def swung(cables, seed):
     medians, sds = np.array([20.0, 0.006, 0.05]), np.array([0.2, 0.4, 0.3])
     stiffness, damping, friction = (medians * np.exp(sds * draw.standard_normal((cables, 3)))).T
     amplitude, late = 0.2 + 0.01 * draw.standard_normal(cables), np.abs(1e-3 * draw.standard_normal(cables))
-    at, speed, seen = amplitude.copy(), np.zeros(cables), []
+    value, speed, seen = amplitude.copy(), np.zeros(cables), []
     rows, next_row = np.arange(ROWS) / RATE, 0
     for i in range(round((ROWS / RATE) / STEP)):
         if next_row < ROWS and i * STEP >= rows[next_row] - STEP / 2:
-            seen.append(at.copy())
+            seen.append(value.copy())
             next_row += 1
         moving = i * STEP >= late
-        pushed = speed + STEP * (-stiffness * at - damping * speed) / inertia
+        pushed = speed + STEP * (-stiffness * value - damping * speed) / inertia
         held = np.sign(pushed) * np.maximum(np.abs(pushed) - STEP * friction / inertia, 0.0)
         speed = np.where(moving, held, 0.0)
-        at = at + STEP * speed
+        value = value + STEP * speed
     shown = np.array(seen) + 0.5 + NOISE * draw.standard_normal((ROWS, cables))
     return dict(zip(NAMES, (inertia, stiffness, damping, friction), strict=True)), rows, shown.T
 
@@ -72,14 +72,14 @@ def posteriors(folder, cables, seed):
     truth, rows, shown = swung(cables, seed)
     (folder / "efficiencies.csv").write_text("wrap_angle_deg,efficiency\n90,0.86\n180,0.74\n270,0.63\n")
     (folder / "cable.toml").write_text(CABLE)
-    found = []
+    results = []
     for angles in shown:
         lines = ["time_s,angle_rad", *(f"{t:.6f},{x:.8f}" for t, x in zip(rows, angles, strict=True))]
         (folder / "ringdown.csv").write_text("\n".join(lines) + "\n")
         model = build_model(load_dataset(folder))
         terms = [replace(t, data=t.data | {"swings": np.zeros(SWINGS)}) if "swings" in t.data else t for t in model.terms]
-        found.append(LogDensity(Model(model.cable, model.space, tuple(terms))))
-    return truth, found
+        results.append(LogDensity(Model(model.cable, model.space, tuple(terms))))
+    return truth, results
 
 
 def true_z(posterior, truth, i):
@@ -89,19 +89,19 @@ def true_z(posterior, truth, i):
 
 def distances(posteriors, truth):
     """Squares of the distances of truths from what is found, in standard deviations; of four parameters at once."""
-    objective, found = make_objective(posteriors[0]), []
-    at = [posteriors[0].model.space.index[name] for name in NAMES]
+    objective, results = make_objective(posteriors[0]), []
+    index = [posteriors[0].model.space.index[name] for name in NAMES]
     for i, posterior in enumerate(posteriors):
         best = find_maximum_posterior(posterior, objective)
-        away = best.z[at] - true_z(posterior, truth, i)
-        found.append(float(away @ np.linalg.solve(best.covariance[np.ix_(at, at)], away)))
-    return np.array(found)
+        away = best.z[index] - true_z(posterior, truth, i)
+        results.append(float(away @ np.linalg.solve(best.covariance[np.ix_(index, index)], away)))
+    return np.array(results)
 
 
 def test_truths_lie_as_far_from_what_is_found_as_is_said(tmp_path):
     """Chi-square of 4 times 8; one seed in 500 would fail by chance."""
-    truth, found = posteriors(tmp_path, 8, 5)
-    far = distances(found, truth)
+    truth, estimates = posteriors(tmp_path, 8, 5)
+    far = distances(estimates, truth)
     assert chi2(32).ppf(0.001) < far.sum() < chi2(32).ppf(0.999)
     assert np.all(far < chi2(4).ppf(0.9999)), "none in a maximum of another number of half swings"
 
@@ -109,12 +109,12 @@ def test_truths_lie_as_far_from_what_is_found_as_is_said(tmp_path):
 @pytest.mark.slow
 def test_ranks_of_truths_among_draws_are_uniform(tmp_path):
     """Three quantities of 120 cables; one seed in 300 would fail by chance."""
-    truth, found = posteriors(tmp_path, 120, 6)
-    space = found[0].model.space
-    fits = fit_batch(found[0], [posterior.data for posterior in found], list(range(120)), RANK_SETTINGS)
+    truth, estimates = posteriors(tmp_path, 120, 6)
+    space = estimates[0].model.space
+    fits = fit_batch(estimates[0], [posterior.data for posterior in estimates], list(range(120)), RANK_SETTINGS)
     settled = [i for i, fit in enumerate(fits) if not fit.reasons]
     assert len(settled) >= 110
     for name in NAMES[1:]:
-        at = space.index[name]
-        ranks = [np.mean(fits[i].z[:, at] < true_z(found[i], truth, i)[NAMES.index(name)]) for i in settled]
+        index = space.index[name]
+        ranks = [np.mean(fits[i].z[:, index] < true_z(estimates[i], truth, i)[NAMES.index(name)]) for i in settled]
         assert kstest(ranks, "uniform").pvalue > 0.001, name

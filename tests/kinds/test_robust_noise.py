@@ -40,7 +40,7 @@ FAR = np.concatenate([[0.0], *(s * np.geomspace(1e-9, 1e30, 200) for s in (-1, 1
 
 def _at(function, x, freedom: int):
     """A function of one deviation and its derivative, at many."""
-    both = jax.value_and_grad(lambda at: function(at, freedom))
+    both = jax.value_and_grad(lambda value: function(value, freedom))
     return jax.tree.map(np.asarray, compile_program(jax.vmap(both), x, run_once=True)(x))
 
 
@@ -89,9 +89,9 @@ def test_half_the_squared_residual_is_minus_the_log_density_with_a_derivative_al
     assert np.all(slope > 0)
     assert slope[0] == pytest.approx(np.sqrt((freedom + 1) / freedom), rel=1e-14)
     with_value = residual != 0
-    at = FAR[with_value]
+    far_value = FAR[with_value]
     np.testing.assert_allclose(
-        slope[with_value] * residual[with_value], (freedom + 1) * at / (freedom + at**2), rtol=1e-12
+        slope[with_value] * residual[with_value], (freedom + 1) * far_value / (freedom + far_value**2), rtol=1e-12
     )
 
 
@@ -100,9 +100,9 @@ def test_the_residual_of_a_bound_is_finite_with_its_derivative_however_far_the_b
     residual, slope = _at(student_bound_residual, FAR, freedom)
     value, of_value = _at(log_student_cdf, FAR, freedom)
     assert np.all(np.isfinite(residual) & np.isfinite(slope))
-    told = value < -1e-250
-    np.testing.assert_allclose(residual[told] ** 2, -2 * value[told], rtol=1e-12)
-    np.testing.assert_allclose(slope[told] * residual[told], -of_value[told], rtol=1e-10)
+    is_impossible = value < -1e-250
+    np.testing.assert_allclose(residual[is_impossible] ** 2, -2 * value[is_impossible], rtol=1e-12)
+    np.testing.assert_allclose(slope[is_impossible] * residual[is_impossible], -of_value[is_impossible], rtol=1e-10)
 
 
 def _extrapolated(function) -> np.ndarray:
@@ -114,8 +114,8 @@ def test_many_degrees_of_freedom_are_a_normal():
     u = jnp.linspace(-1.5, 1.5, 7)
     for name in ("log_density", "log_cdf", "residual", "bound_residual"):
         normal, of_four = (np.asarray(getattr(law, name)(u)) for law in (NormalNoise(), StudentNoise(4)))
-        found = _extrapolated(lambda freedom, name=name: getattr(StudentNoise(freedom), name)(u))
-        np.testing.assert_allclose(found, normal, rtol=0, atol=1e-3)
+        computed = _extrapolated(lambda freedom, name=name: getattr(StudentNoise(freedom), name)(u))
+        np.testing.assert_allclose(computed, normal, rtol=0, atol=1e-3)
         assert np.abs(of_four - normal).max() > 0.03
 
 
@@ -134,10 +134,10 @@ def _force_table(seed: int, tau: float = 0.01, strokes=(1, -1), outlier: float =
     mounting = tau * generator.standard_normal(RUNS) + outlier * (np.arange(RUNS) == 0)
     force_out = force * np.exp(-stroke * (MU * WRAP_ANGLE + mounting[run]))
     noise, n = FORCE_NOISE * generator.standard_normal((2, len(run))), len(run)
-    own = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
+    own_angles = OwnAngles((), np.zeros((n, 0)), np.zeros((n, 0)))
     origin = RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
     unknown, names = np.full(n, np.nan), tuple(str(i) for i in range(RUNS))
-    return ForceTable(unknown, force + noise[0], force_out + noise[1], run, names, stroke, own, origin, unknown)
+    return ForceTable(unknown, force + noise[0], force_out + noise[1], run, names, stroke, own_angles, origin, unknown)
 
 
 def _forces(noise: str, table: ForceTable) -> Model:
@@ -156,11 +156,11 @@ def _with_a_slack_row(dataset: Dataset) -> Dataset:
 
 
 @cache
-def _model(what: str, noise: str) -> Model:
-    if what in SETS:
-        dataset = load_dataset(ROOT / "datasets" / SETS[what], [f'noise="{noise}"'])
-        return build_model(_with_a_slack_row(dataset) if what == "loop" else dataset)
-    return _forces(noise, _force_table(1, strokes=(0,) if what == "held" else (1, -1)))
+def _model(case: str, noise: str) -> Model:
+    if case in SETS:
+        dataset = load_dataset(ROOT / "datasets" / SETS[case], [f'noise="{noise}"'])
+        return build_model(_with_a_slack_row(dataset) if case == "loop" else dataset)
+    return _forces(noise, _force_table(1, strokes=(0,) if case == "held" else (1, -1)))
 
 
 def _of(model: Model, z: np.ndarray):
@@ -176,13 +176,13 @@ def _of(model: Model, z: np.ndarray):
     return jax.tree.map(np.asarray, program(z, posterior.data))
 
 
-@pytest.mark.parametrize("what", ["on-body", "loop", "runs"])
-def test_student_noise_exchanges_the_law_of_the_standardized_deviations_and_nothing_else(what):
+@pytest.mark.parametrize("case", ["on-body", "loop", "runs"])
+def test_student_noise_exchanges_the_law_of_the_standardized_deviations_and_nothing_else(case):
     """Of each reading, of each run's mean deviation; samples within a run keep their normal scatter."""
-    z = 0.7 * np.random.default_rng(1).standard_normal((12, _model(what, "normal").space.size))
-    student, of_student, _, _ = _of(_model(what, "student"), z)
-    normal, u, expected, values = _of(_model(what, "normal"), z)
-    for term in _model(what, "student").terms:
+    z = 0.7 * np.random.default_rng(1).standard_normal((12, _model(case, "normal").space.size))
+    student, of_student, _, _ = _of(_model(case, "student"), z)
+    normal, u, expected, values = _of(_model(case, "normal"), z)
+    for term in _model(case, "student").terms:
         n, name = len(term.labels), term.name
         read = slice(0, n - len(_bounds(term)))
         deviation, within = u[name][:, read], slice(n, None)
@@ -235,12 +235,12 @@ def _standardized(model: Model, name: str, draws: int) -> np.ndarray:
         return jax.vmap(lambda key: term.simulate(values, data, key))(keys), term.expected(values, data), scale
 
     keys = jax.random.split(jax.random.key(5), draws)
-    drawn, expected, scale = compile_program(at, keys, term.data, run_once=True)(keys, term.data)
+    sample, expected, scale = compile_program(at, keys, term.data, run_once=True)(keys, term.data)
     if term.unit == "1":
-        return np.asarray((jnp.log(expected) - jnp.log(drawn)) / scale).ravel()
+        return np.asarray((jnp.log(expected) - jnp.log(sample)) / scale).ravel()
     if term.unit == "deg":
         scale = jnp.rad2deg(scale)
-    return np.asarray((drawn - expected) / scale).ravel()
+    return np.asarray((sample - expected) / scale).ravel()
 
 
 SIMULATED = [
@@ -252,12 +252,12 @@ SIMULATED = [
 ]
 
 
-@pytest.mark.parametrize(("what", "name"), SIMULATED)
-def test_simulated_readings_scatter_by_the_law_of_the_likelihood(what, name):
+@pytest.mark.parametrize(("case", "name"), SIMULATED)
+def test_simulated_readings_scatter_by_the_law_of_the_likelihood(case, name):
     """By Kolmogorov and Smirnov; one false alarm in ten thousand for each table, were the seed not fixed."""
-    drawn = _standardized(_model(what, "student"), name, 2000)
-    assert stats.kstest(drawn, stats.t(4).cdf).pvalue > 1e-4
-    assert stats.kstest(drawn, stats.norm.cdf).pvalue < 1e-10
+    draws = _standardized(_model(case, "student"), name, 2000)
+    assert stats.kstest(draws, stats.t(4).cdf).pvalue > 1e-4
+    assert stats.kstest(draws, stats.norm.cdf).pvalue < 1e-10
 
 
 def test_normal_noise_scatters_by_the_normal_law_with_the_draws_it_always_had():
@@ -269,8 +269,8 @@ def test_normal_noise_scatters_by_the_normal_law_with_the_draws_it_always_had():
 
 def test_effects_of_new_mountings_in_predictions_scatter_by_the_student_law():
     """By Kolmogorov and Smirnov; one false alarm in ten thousand, were the seed not fixed."""
-    drawn = StudentNoise(4).draw_with(np.random.default_rng(1), 20_000)
-    assert stats.kstest(drawn, stats.t(4).cdf).pvalue > 1e-4
+    draws = StudentNoise(4).draw_with(np.random.default_rng(1), 20_000)
+    assert stats.kstest(draws, stats.t(4).cdf).pvalue > 1e-4
 
 
 # What it is for ---------------------------------------------------------------------------------------------------
@@ -281,20 +281,20 @@ _Z_MU, _Z_TAU = np.linspace(-1.2, 1.2, 161), np.linspace(-4.0, 7.0, 89)
 @cache
 def _posteriors(outlier: float, tau: float = 0.01, seeds: int = 20) -> dict[str, np.ndarray]:
     """Posterior mean and sd of mu on simulated cables, integrated on a grid over mu and tau, by noise law."""
-    found = {}
+    results = {}
     for noise in ("normal", "student"):
         models = [_forces(noise, _force_table(seed, tau, outlier=outlier)) for seed in range(seeds)]
         posterior, data = LogDensity(models[0]), [LogDensity(model).data for model in models]
         z = np.stack(np.meshgrid(_Z_MU, _Z_TAU, indexing="ij"), axis=-1).reshape(-1, 2)
-        stacked = jax.tree.map(lambda *each: np.stack(each), *data)
+        stacked = jax.tree.map(lambda *item: np.stack(item), *data)
         over = jax.vmap(jax.vmap(posterior.log_density, in_axes=(0, None)), in_axes=(None, 0))
         density = np.asarray(compile_program(over, z, stacked, run_once=True)(z, stacked))
         weight = np.exp(density - density.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         mu = np.asarray(posterior.model.space.parameters[0].prior.constrain(jnp.asarray(z[:, 0])))
         mean = weight @ mu
-        found[noise] = np.stack([mean, np.sqrt(weight @ mu**2 - mean**2)])
-    return found
+        results[noise] = np.stack([mean, np.sqrt(weight @ mu**2 - mean**2)])
+    return results
 
 
 def test_one_bad_mounting_pulls_a_normal_fit_far_and_a_student_fit_hardly():
@@ -314,10 +314,10 @@ def test_the_farther_off_a_bad_mounting_is_the_less_it_pulls_a_student_fit():
 
 def test_of_healthy_measurements_student_noise_says_what_normal_noise_says():
     """On twenty cables; the answers differ by 0.2 of the posterior sd typically, so by 0.8 once in a thousand such tests."""
-    found = _posteriors(0.0)
-    difference = (found["student"][0] - found["normal"][0]) / found["normal"][1]
+    estimates = _posteriors(0.0)
+    difference = (estimates["student"][0] - estimates["normal"][0]) / estimates["normal"][1]
     assert np.all(np.abs(difference) < 0.8)
-    ratio = found["student"][1] / found["normal"][1]
+    ratio = estimates["student"][1] / estimates["normal"][1]
     assert 0.9 < np.median(ratio) < 1.1
     assert np.all((ratio > 0.7) & (ratio < 1.4))
 
@@ -336,7 +336,7 @@ def _best_fits(noise: str, folders: tuple[Path, Path]) -> list[dict[str, float]]
     posteriors = [LogDensity(build_model(load_dataset(folder, [f'noise="{noise}"']))) for folder in folders]
     space, objective = posteriors[0].model.space, make_objective(posteriors[0])
     z = [find_maximum_posterior(posterior, objective).z for posterior in posteriors]
-    return [{name: float(value) for name, value in space.constrain(jnp.asarray(at)).items()} for at in z]
+    return [{name: float(value) for name, value in space.constrain(jnp.asarray(point)).items()} for point in z]
 
 
 def test_two_swapped_digits_spoil_a_normal_fit_and_not_a_student_fit(on_body, tmp_path):
@@ -364,9 +364,9 @@ def test_a_sampled_student_fit_answers_as_if_two_digits_had_not_been_swapped(on_
         ("robust", on_body, "student"),
         ("typo", folder, "student"),
     ):
-        found = bf.fit(data, seed=1, noise=noise)
-        assert found.converged
-        answers[name] = np.concatenate([np.asarray(found.posterior.values[p]).reshape(-1, 1) for p in MU_NAMES], axis=1)
+        fit = bf.fit(data, seed=1, noise=noise)
+        assert fit.converged
+        answers[name] = np.concatenate([np.asarray(fit.posterior.values[p]).reshape(-1, 1) for p in MU_NAMES], axis=1)
     center, sd = np.median(answers["right"], axis=0), answers["right"].std(axis=0)
     for name in ("robust", "typo"):
         assert np.all(np.abs(np.median(answers[name], axis=0) - center) < 0.25 * sd)
@@ -376,9 +376,9 @@ def test_a_sampled_student_fit_answers_as_if_two_digits_had_not_been_swapped(on_
 
 
 def test_no_scale_of_a_student_law_is_called_a_standard_deviation():
-    for what in ("on-body", "loop", "runs"):
-        for p in _model(what, "student").space.parameters:
-            if p.role != "noise" or (what, p.name) == ("runs", "sigma_F"):
+    for case in ("on-body", "loop", "runs"):
+        for p in _model(case, "student").space.parameters:
+            if p.role != "noise" or (case, p.name) == ("runs", "sigma_F"):
                 continue
             assert "standard deviation" not in p.meaning
             assert p.meaning.startswith("scale of ")
@@ -396,7 +396,7 @@ def test_noise_is_chosen_on_the_command_line_and_named_in_the_summary(run, on_bo
 
 
 @pytest.mark.parametrize(
-    ("settings", "what"),
+    ("settings", "case"),
     [
         (['noise="gauss"'], "cable.toml, noise: input should be 'normal' or 'student' (found 'gauss')."),
         (
@@ -410,10 +410,10 @@ def test_noise_is_chosen_on_the_command_line_and_named_in_the_summary(run, on_bo
         (["student_degrees_of_freedom=6"], 'student_degrees_of_freedom belongs to noise = "student"'),
     ],
 )
-def test_noise_that_does_not_exist_is_refused_in_a_sentence(run, on_body, settings, what):
+def test_noise_that_does_not_exist_is_refused_in_a_sentence(run, on_body, settings, case):
     code, _, err = run("check", on_body, *(part for setting in settings for part in ("--set", setting)))
     assert code == 2
-    assert what in err
+    assert case in err
 
 
 def test_degrees_of_freedom_can_be_chosen(on_body):

@@ -82,8 +82,8 @@ def test_recordings_of_a_run_that_is_written_differently_are_of_one_mounting(tmp
     shutil.copytree(RECORDED, folder)
     text = (RECORDED / "cable.toml").read_text()
 
-    def runs(one, other):
-        renamed = text.replace('"440 mm, 20 r/min"', f'"{one}"').replace('"470 mm, 20 r/min"', f'"{other}"')
+    def runs(first, other):
+        renamed = text.replace('"440 mm, 20 r/min"', f'"{first}"').replace('"470 mm, 20 r/min"', f'"{other}"')
         (folder / "cable.toml").write_text(renamed)
         table = bf.read(folder).measurements.table(Recordings)
         assert table is not None

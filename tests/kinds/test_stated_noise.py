@@ -49,12 +49,12 @@ def bench(generator, mu, tau, sd=0.15, runs=6):
     return rows
 
 
-def write(folder, rows, stated=True, toml=True):
+def write(folder, rows, stated_value=True, toml=True):
     folder.mkdir(exist_ok=True)
-    lines = [",".join(map(str, row[: 7 if stated else 5])) for row in rows]
-    (folder / "t.csv").write_text("\n".join([HEAD + (SDS if stated else ""), *lines]) + "\n")
+    lines = [",".join(map(str, row[: 7 if stated_value else 5])) for row in rows]
+    (folder / "t.csv").write_text("\n".join([HEAD + (SDS if stated_value else ""), *lines]) + "\n")
     if toml:
-        (folder / "cable.toml").write_text(TOML.replace("PRIOR", "" if stated else OF_NOISE))
+        (folder / "cable.toml").write_text(TOML.replace("PRIOR", "" if stated_value else OF_NOISE))
     return folder
 
 
@@ -148,10 +148,10 @@ def test_the_likelihood_is_that_of_readings_with_this_noise_and_a_common_mountin
     rows, values = term.rows, {"mu": 0.13, "tau": 0.004, STATED_NOISE: 1.0}
     expected = []
     for run in range(6):
-        here = rows.run == run
+        mask = rows.run == run
         angle = np.deg2rad(ANGLES[run % 4])
-        covariance = np.diag(1 / rows.information[here]) + 0.004**2
-        expected.append(stats.multivariate_normal.logpdf(rows.log_ratio[here], np.full(here.sum(), 0.13 * angle), covariance))
+        covariance = np.diag(1 / rows.information[mask]) + 0.004**2
+        expected.append(stats.multivariate_normal.logpdf(rows.log_ratio[mask], np.full(mask.sum(), 0.13 * angle), covariance))
     with jax.enable_x64(True):
         computed = term.log_likelihood({name: jnp.asarray(value) for name, value in values.items()}, term.data)
     assert np.asarray(computed) == pytest.approx(expected, rel=1e-9)
@@ -215,9 +215,9 @@ class Quadrature:
     """Posterior of mu, and whatever else is free, on a grid of z; one compiled program for all tables of a shape."""
 
     def __init__(self, posterior, points):
-        at = np.linspace(-3.5, 3.5, points)
-        grid = np.stack(np.meshgrid(*[at] * posterior.model.space.size, indexing="ij"), axis=-1)
-        self.z, self.at = grid.reshape(-1, grid.shape[-1]), at
+        positions = np.linspace(-3.5, 3.5, points)
+        grid = np.stack(np.meshgrid(*[positions] * posterior.model.space.size, indexing="ij"), axis=-1)
+        self.z, self.at = grid.reshape(-1, grid.shape[-1]), positions
         self.density = jax.jit(jax.vmap(posterior.log_density, (0, None)))
 
     def mu(self, posterior):
@@ -238,12 +238,12 @@ def test_intervals_hold_and_are_narrower_where_the_noise_of_each_reading_is_stat
         for number in range(count):
             mu, tau = 0.12 * np.exp(0.3 * generator.standard_normal()), 0.005 * abs(generator.standard_normal())
             rows = bench(generator, mu, tau, sd=0.15)
-            for stated in (True, False):
-                posterior = LogDensity(build_model(bf.read(write(tmp_path / f"{number}{stated}", rows, stated))))
-                quadrature = quadratures.setdefault(stated, Quadrature(posterior, 281 if stated else 81))
+            for is_stated in (True, False):
+                posterior = LogDensity(build_model(bf.read(write(tmp_path / f"{number}{is_stated}", rows, is_stated))))
+                quadrature = quadratures.setdefault(is_stated, Quadrature(posterior, 281 if is_stated else 81))
                 rank, width = quadrature.mu(posterior)
                 widths.append(width)
-                if stated:
+                if is_stated:
                     ranks.append(float(rank(mu)))
     assert stats.kstest(ranks, "uniform").pvalue > 1e-3
     inside = sum(0.05 < rank < 0.95 for rank in ranks)

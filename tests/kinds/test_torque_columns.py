@@ -13,7 +13,7 @@ RADII = 'input_pulley_radius = { value = 15, unit = "mm" }\noutput_pulley_radius
 
 def folder_of(path, headings, scales, cable):
     lines = [f"wrap_angle_deg,{headings},stroke"]
-    lines += [f"{angle},{scales[0] * one:.8g},{scales[1] * other:.8g},pull" for angle, one, other in ROWS]
+    lines += [f"{angle},{scales[0] * row:.8g},{scales[1] * other:.8g},pull" for angle, row, other in ROWS]
     (path / "forces.csv").write_text("\n".join(lines) + "\n")
     (path / "cable.toml").write_text(
         f'name = "rope"\n[cable]\n{cable}\n[[contact]]\nname = "sheath"\nfriction = "mu"\n'

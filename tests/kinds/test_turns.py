@@ -52,8 +52,8 @@ def test_play_counts_the_same_blocks_as_dahl_and_a_capstan_fit_other_ones_with_a
     np.testing.assert_array_equal(events["play"], events["dahl"])
     np.testing.assert_array_equal(events["play"], events["lugre"])
     assert not np.array_equal(events["play"], events["capstan"])
-    why = kind.why_events_differ("recorded_efficiency", {name: models[name].description for name in ("dahl", "capstan")})
-    assert "--friction play" in why
+    reason = kind.why_events_differ("recorded_efficiency", {name: models[name].description for name in ("dahl", "capstan")})
+    assert "--friction play" in reason
 
 
 def test_friction_models_of_turns_add_their_parameters_and_need_recordings(recording):
@@ -79,8 +79,8 @@ def test_the_likelihood_has_its_top_at_the_stiffness_that_the_recording_was_made
         return term.log_likelihood({name: jnp.asarray(value) for name, value in values.items()}, term.data)[0]
 
     grid = np.array([20.0, 27.0, 30.0, 33.0, 45.0, 1e6])
-    found = np.array([float(by_stiffness(s)) for s in grid])
-    assert grid[int(np.argmax(found))] == 30.0 and found[2] - found[-1] > 100
+    computed = np.array([float(by_stiffness(s)) for s in grid])
+    assert grid[int(np.argmax(computed))] == 30.0 and computed[2] - computed[-1] > 100
 
 
 @pytest.mark.slow
@@ -97,8 +97,10 @@ def test_least_squares_return_what_another_simulator_put_in(rate):
 
 def test_the_summary_says_how_far_the_rope_creeps_or_that_it_cannot_be_told_from_play():
     generator = np.random.default_rng(1)
-    known = Presliding(Interval.of(1 / (25.0 + generator.standard_normal(4000))), float("nan"))
-    assert known.sentence().startswith("After a turn friction builds up by 63 % while the output force changes by 4.0 % (90 %")
+    presliding = Presliding(Interval.of(1 / (25.0 + generator.standard_normal(4000))), float("nan"))
+    assert presliding.sentence().startswith(
+        "After a turn friction builds up by 63 % while the output force changes by 4.0 % (90 %"
+    )
     unknown = Presliding(Interval.of(np.abs(0.01 * generator.standard_normal(4000))), 50.0)
-    assert unknown.is_play and not known.is_play
+    assert unknown.is_play and not presliding.is_play
     assert "cannot tell the presliding stiffness" in unknown.sentence() and "force at 50 N" in unknown.sentence()

@@ -214,8 +214,8 @@ def test_a_half_cauchy_to_a_power_is_that_power_of_one():
     root = _constrained(HalfCauchy(0.1), z)
     for powers in (2.0, 0.5, np.tile([1.0, 2.0, 1.0], 11), np.tile([1.0, 2.0, 3.0], 11)):
         with jax.enable_x64(True):
-            found = np.asarray(HalfCauchy(0.1, powers).constrain(jnp.asarray(z)))
-        np.testing.assert_allclose(found, root**powers, rtol=1e-13)
+            computed = np.asarray(HalfCauchy(0.1, powers).constrain(jnp.asarray(z)))
+        np.testing.assert_allclose(computed, root**powers, rtol=1e-13)
 
 
 def _parameter(name: str, prior: Prior, **more) -> Parameter:

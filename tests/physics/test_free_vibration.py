@@ -13,8 +13,8 @@ RING_DOWN = jax.jit(ring_down, static_argnums=7)
 
 def swung(time, amplitude=0.2, b=0.0, friction=0.1, inertia=J, swings=200):
     with jax.enable_x64(True):
-        each = np.atleast_1d(inertia).astype(float)
-        numbers = map(jnp.asarray, (np.full(len(each), amplitude), each, K, b, friction))
+        terms = np.atleast_1d(inertia).astype(float)
+        numbers = map(jnp.asarray, (np.full(len(terms), amplitude), terms, K, b, friction))
         run = jnp.zeros(len(time), dtype=int)
         return [np.asarray(x) for x in RING_DOWN(jnp.asarray(time), run, *numbers, swings)]
 
@@ -55,8 +55,8 @@ def test_it_is_what_small_steps_give():
         v = np.sign(v) * np.maximum(np.abs(v) - h * friction / J, 0.0)
         x = x + h * v
     for k, expected in enumerate(np.transpose(seen)):
-        found, _ = swung(np.arange(0, n, every) * h, b=b[k], friction=friction[k])
-        np.testing.assert_allclose(found, expected, atol=1e-3 * 0.2)
+        computed, _ = swung(np.arange(0, n, every) * h, b=b[k], friction=friction[k])
+        np.testing.assert_allclose(computed, expected, atol=1e-3 * 0.2)
 
 
 @pytest.mark.extended
@@ -73,5 +73,5 @@ def test_nothing_moves_before_the_release_and_derivatives_are_finite():
 
 
 def test_peaks_change_sides():
-    found = compute_peaks(jnp.array([0.2]), jnp.array([1.0]), jnp.array([0.03]), 6)[:, 0]
-    np.testing.assert_allclose(found, [0.2, -0.14, 0.08, -0.02, -0.02, -0.02], atol=1e-7)
+    peaks = compute_peaks(jnp.array([0.2]), jnp.array([1.0]), jnp.array([0.03]), 6)[:, 0]
+    np.testing.assert_allclose(peaks, [0.2, -0.14, 0.08, -0.02, -0.02, -0.02], atol=1e-7)

@@ -81,10 +81,10 @@ def test_recordings_side_by_side_do_not_touch_each_other():
 
 def test_each_recording_may_have_a_band_of_its_own_at_all_times():
     x, _ = _walk(7, 3)
-    each = np.array([0.1, 0.2, 0.4])
-    y = operator(x, each, np.zeros(3))
+    terms = np.array([0.1, 0.2, 0.4])
+    y = operator(x, terms, np.zeros(3))
     for k in range(3):
-        np.testing.assert_allclose(y[:, k], _plainly(x[:, k], each[k], 0.0)[0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(y[:, k], _plainly(x[:, k], terms[k], 0.0)[0], rtol=0, atol=1e-12)
 
 
 def test_nested_partial_reversals_come_out_as_computed_by_hand():
@@ -238,7 +238,7 @@ def test_an_operator_set_anew_forgets_what_was_before():
     x = jnp.asarray(np.random.default_rng(8).normal(size=200).cumsum() * 0.05)
     restart = jnp.full(200, jnp.nan).at[120].set(float(x[120]) + 0.01)
     y, slope = play_operator(x - BAND, x + BAND, x[0], restart=restart)
-    before, slope_before = with_slope(x[:120], np.asarray(BAND), x[0])
+    initial, slope_before = with_slope(x[:120], np.asarray(BAND), x[0])
     after, slope_after = with_slope(x[120:], np.asarray(BAND), x[120] + 0.01)
-    np.testing.assert_array_equal(y, np.concatenate([before, after]))
+    np.testing.assert_array_equal(y, np.concatenate([initial, after]))
     np.testing.assert_array_equal(slope, np.concatenate([slope_before, slope_after]))

@@ -72,11 +72,11 @@ def _solved(input_force, preload, exponent, stroke):
         return max(input_force, 0.0) + lower, max(-input_force, 0.0) + lower
 
     def too_long(lower):
-        one, other = tensions(lower)
-        return one * pulling[1] + other * returning[1] - 2 * preload
+        first, other = tensions(lower)
+        return first * pulling[1] + other * returning[1] - 2 * preload
 
-    one, other = tensions(brentq(too_long, 0.0, 2 * preload / pulling[1], xtol=1e-14) if too_long(0.0) < 0 else 0.0)
-    return one * pulling[0] - other * returning[0], one * pulling[1], other * returning[1]
+    low, other = tensions(brentq(too_long, 0.0, 2 * preload / pulling[1], xtol=1e-14) if too_long(0.0) < 0 else 0.0)
+    return low * pulling[0] - other * returning[0], low * pulling[1], other * returning[1]
 
 
 def _taut_return(input_force, preload, exponent, stroke):
@@ -143,20 +143,22 @@ def test_exchanging_both_ends_and_sides_leaves_the_loop_as_it_is(stroke):
 @pytest.mark.parametrize("preload", PRELOADS)
 def test_the_branches_meet_where_the_return_side_goes_slack(preload, exponent):
     for stroke in (1.0, -1.0):
-        at = float(slack_at(preload, stroke * exponent))
+        slack_force = float(slack_at(preload, stroke * exponent))
         expected = 2 * preload * exponent / (stroke * -np.expm1(-stroke * exponent))
-        np.testing.assert_allclose(at, expected, rtol=1e-13)
-        below, here, above = (
-            float(output_force(at * (1 + by), preload, exponent, stroke)) for by in (-1e-9, 0.0, 1e-9)
+        np.testing.assert_allclose(slack_force, expected, rtol=1e-13)
+        below, middle, above = (
+            float(output_force(slack_force * (1 + by), preload, exponent, stroke)) for by in (-1e-9, 0.0, 1e-9)
         )
         slope = max(1.0, np.exp(-stroke * exponent))  # the larger one of both branches
-        np.testing.assert_allclose([below, above], here, rtol=0, atol=1.001e-9 * slope * at)
-        np.testing.assert_allclose(here, at - stroke * 2 * preload * exponent, rtol=1e-12)
-        np.testing.assert_allclose(here, at * np.exp(-stroke * exponent), rtol=1e-12)
-        loose = [float(sides(*map(np.asarray, (at * by, preload, exponent, stroke)))[1]) for by in (0.999, 1.001)]
+        np.testing.assert_allclose([below, above], middle, rtol=0, atol=1.001e-9 * slope * slack_force)
+        np.testing.assert_allclose(middle, slack_force - stroke * 2 * preload * exponent, rtol=1e-12)
+        np.testing.assert_allclose(middle, slack_force * np.exp(-stroke * exponent), rtol=1e-12)
+        loose = [float(sides(*map(np.asarray, (slack_force * by, preload, exponent, stroke)))[1]) for by in (0.999, 1.001)]
         assert loose[0] > 0.0 == loose[1]
-        root = brentq(lambda f, s=stroke: _taut_return(f, preload, exponent, s), 0.01 * at, 10 * at, xtol=1e-13)
-        np.testing.assert_allclose(at, root, rtol=CLOSE)
+        root = brentq(
+            lambda f, s=stroke: _taut_return(f, preload, exponent, s), 0.01 * slack_force, 10 * slack_force, xtol=1e-13
+        )
+        np.testing.assert_allclose(slack_force, root, rtol=CLOSE)
 
 
 def test_a_loop_without_preload_is_a_single_cable():
@@ -235,20 +237,20 @@ def test_any_motion_is_a_plain_loop(seed, varying):
     generator = np.random.default_rng(10 + seed)
     change = np.exp(0.2 * generator.standard_normal((2, force.size))) if varying else np.ones(2)
     preload, exponent = 4.0 * change[0], 0.35 * change[1]
-    found = np.asarray(through(force, preload, exponent, np.asarray(200.0)))
-    np.testing.assert_allclose(found, _plainly(force, preload, exponent, 200.0), rtol=1e-12, atol=1e-12)
+    computed = np.asarray(through(force, preload, exponent, np.asarray(200.0)))
+    np.testing.assert_allclose(computed, _plainly(force, preload, exponent, 200.0), rtol=1e-12, atol=1e-12)
     assert force.min() < -8.0 and force.max() > 8.0
-    stands = np.diff(found) == 0.0
+    stands = np.diff(computed) == 0.0
     assert 10 < stands.sum() < 390 or varying  # it stood still in places and moved in others
 
 
 def test_loops_side_by_side_do_not_touch_each_other():
     force = np.stack([_reversals(seed) for seed in (5, 6, 7)], axis=1)
     preload, exponent, start = np.array([0.0, 3.0, 9.0]), np.array([0.5, 0.3, 0.1]), np.array([0.0, 50.0, -50.0])
-    found = np.asarray(through(force, preload, exponent, start))
+    computed = np.asarray(through(force, preload, exponent, start))
     for i in range(3):
         expected = _plainly(force[:, i], preload[i], exponent[i], start[i])
-        np.testing.assert_allclose(found[:, i], expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(computed[:, i], expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("stroke", [1.0, -1.0])
@@ -273,10 +275,10 @@ def test_without_preload_any_motion_is_the_play_of_a_single_cable_on_the_log_of_
 
 def test_a_loop_that_turns_inside_its_band_holds_the_output_force():
     force = np.r_[np.arange(0.0, 15.0), np.arange(13.0, 1.0, -1), np.arange(1.0, -15.0, -1), np.arange(-13.0, -2.0)]
-    found = np.asarray(through(force, 6.0, 0.5, 0.0))
-    np.testing.assert_array_equal(found[14:27], 8.0)  # from 14 N, less 2 P Lambda, down to 2 N
-    np.testing.assert_array_equal(found[27:43], force[27:43] + 6.0)
-    np.testing.assert_array_equal(found[42:], -8.0)
+    computed = np.asarray(through(force, 6.0, 0.5, 0.0))
+    np.testing.assert_array_equal(computed[14:27], 8.0)  # from 14 N, less 2 P Lambda, down to 2 N
+    np.testing.assert_array_equal(computed[27:43], force[27:43] + 6.0)
+    np.testing.assert_array_equal(computed[42:], -8.0)
 
 
 # A rope that beds in ------------------------------------------------------------------------------------------------
@@ -303,11 +305,11 @@ def _bedded(input_force, preload, exponent, stroke, rope):
         return max(input_force, 0.0) + lower, max(-input_force, 0.0) + lower
 
     def too_long(lower):
-        one, other = tensions(lower)
-        return extended(one * pulling[1]) + extended(other * returning[1]) - 2 * extended(preload)
+        first, other = tensions(lower)
+        return extended(first * pulling[1]) + extended(other * returning[1]) - 2 * extended(preload)
 
-    one, other = tensions(brentq(too_long, 0.0, 1e4 * preload, xtol=1e-13) if too_long(0.0) < 0 else 0.0)
-    return one * pulling[0] - other * returning[0]
+    low, other = tensions(brentq(too_long, 0.0, 1e4 * preload, xtol=1e-13) if too_long(0.0) < 0 else 0.0)
+    return low * pulling[0] - other * returning[0]
 
 
 @pytest.mark.parametrize("stroke", [1.0, -1.0])
@@ -352,8 +354,8 @@ def test_the_input_force_of_a_loop_whose_rope_beds_in_is_the_inverse(stroke):
 def test_the_return_side_of_a_rope_that_beds_in_goes_slack_where_the_branches_meet():
     _, preload, exponent, rope = _random_loops(2000)
     load = slack_load(preload, exponent, rope)
-    at = loop_output_force(load, preload, exponent, FORWARD, rope)
-    np.testing.assert_allclose(at, load * jnp.exp(-exponent), rtol=1e-9)
+    output = loop_output_force(load, preload, exponent, FORWARD, rope)
+    np.testing.assert_allclose(output, load * jnp.exp(-exponent), rtol=1e-9)
     below = loop_output_force(0.9 * load, preload, exponent, FORWARD, rope)
     assert np.all(below < 0.9 * load * jnp.exp(-exponent))
     _, returning = side_tensions(load * jnp.array([[0.9], [1.1]]), preload, exponent, FORWARD, rope)

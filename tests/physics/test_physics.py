@@ -90,8 +90,8 @@ def test_both_forms_are_the_same_curve(coefficients, window, z):
 
 def test_the_printed_coefficients_are_peak_place_and_width():
     A, B, C = jnp.asarray(2.0), jnp.asarray(600.0), jnp.asarray(80.0)
-    at = gaussian_wrap_angle(jnp.array([600.0, 520.0, 680.0]), A, B, C)
-    np.testing.assert_allclose(at, [2.0, 2.0 / np.e, 2.0 / np.e], rtol=1e-14)
+    points = gaussian_wrap_angle(jnp.array([600.0, 520.0, 680.0]), A, B, C)
+    np.testing.assert_allclose(points, [2.0, 2.0 / np.e, 2.0 / np.e], rtol=1e-14)
 
 
 def test_without_curvature_the_curve_is_an_exponential_and_has_no_peak():

@@ -31,9 +31,9 @@ def test_a_step_of_any_length_is_lambert_s():
     np.testing.assert_allclose(d - build_up * np.expm1(-stiffness * d), change, rtol=0, atol=1e-10)
     assert np.all((d >= 0) & (d <= change))
     argument = stiffness * build_up * np.exp(np.minimum(stiffness * (build_up - change), 600.0))
-    known = stiffness * (build_up - change) < 600.0
+    mask = stiffness * (build_up - change) < 600.0
     by_scipy = change - build_up + np.real(lambertw(argument)) / stiffness
-    np.testing.assert_allclose(d[known], by_scipy[known], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(d[mask], by_scipy[mask], rtol=0, atol=1e-11)
 
 
 def test_a_step_in_which_friction_is_let_go_solves_its_equation():
@@ -62,9 +62,9 @@ def test_an_infinitely_stiff_rope_is_the_play_operator_with_bands_that_change_an
     x = np.cumsum(0.1 * generator.standard_normal((300, 3)), axis=0)
     pulling, returning = 0.25 + 0.1 * generator.uniform(size=(2, 300, 3))
     restart = np.where(generator.uniform(size=x.shape) < 0.02, x, np.nan)
-    found = presliding_operator(x, (pulling, returning), jnp.full(x.shape, 1e9), jnp.asarray(x[0] + 0.1), restart)
+    computed = presliding_operator(x, (pulling, returning), jnp.full(x.shape, 1e9), jnp.asarray(x[0] + 0.1), restart)
     expected, _ = play_operator(x - pulling, x + returning, jnp.asarray(x[0] + 0.1), restart=restart)
-    np.testing.assert_allclose(found, expected, atol=1e-7)
+    np.testing.assert_allclose(computed, expected, atol=1e-7)
 
 
 def _followed(truth: Truth, time):
@@ -109,8 +109,11 @@ def test_no_step_is_too_long_or_leaves_the_friction_band():
     generator = np.random.default_rng(3)
     x, band = np.cumsum(generator.standard_normal((400, 2)), axis=0), 0.1 + 0.3 * generator.uniform(size=(400, 2))
     for stiffness, damping in ((0.01, 0.0), (30.0, 0.0), (1e12, 0.0), (30.0, 5.0)):
-        found = presliding_operator(x, (band, band), jnp.full(x.shape, stiffness), jnp.asarray(x[0]), None, damping)
-        friction, most = x - np.asarray(found), np.maximum.accumulate(band)  # which friction that is let go falls below in time
+        computed = presliding_operator(x, (band, band), jnp.full(x.shape, stiffness), jnp.asarray(x[0]), None, damping)
+        friction, most = (
+            x - np.asarray(computed),
+            np.maximum.accumulate(band),
+        )  # which friction that is let go falls below in time
         assert np.all(np.abs(friction) <= most * (1 + 2 * damping) + 1e-9) and np.all(np.isfinite(friction))
         if stiffness > 1e9:
             assert np.all(np.abs(friction) <= band + 1e-9)

@@ -55,12 +55,12 @@ mean, unloading = jax.jit(mean_tension), jax.jit(mean_tension_unloading)
 def _gradients(function, arguments):
     """Gradient of a function by every argument in reverse and in forward mode."""
     every = tuple(range(arguments))
-    return jax.jit(lambda *at: [mode(function, argnums=every)(*at) for mode in (jax.jacrev, jax.jacfwd)])
+    return jax.jit(lambda *value: [mode(function, argnums=every)(*value) for mode in (jax.jacrev, jax.jacfwd)])
 
 
 tension_gradients, unloading_gradients = _gradients(tension_from_extension, 4), _gradients(mean_tension_unloading, 3)
-preload_gradients = _gradients(lambda *at: preload_at(*at)[0], 7)
-slack_gradients = _gradients(lambda *at: preload_at(*at)[1], 7)
+preload_gradients = _gradients(lambda *value: preload_at(*value)[0], 7)
+slack_gradients = _gradients(lambda *value: preload_at(*value)[1], 7)
 
 
 def _grid(*axes):
@@ -68,9 +68,9 @@ def _grid(*axes):
     return [a.ravel() for a in np.meshgrid(*axes, indexing="ij")]
 
 
-def _condition(at, *rope):
+def _condition(value, *rope):
     """By how much a relative error of the extension is magnified in the tension that follows from it."""
-    return np.asarray(extended(at, *rope)) / (at * np.asarray(softness(at, *rope)))
+    return np.asarray(extended(value, *rope)) / (value * np.asarray(softness(value, *rope)))
 
 
 def _exact_tension(e, stiffness, bedding_stretch, bedding_load):
@@ -83,10 +83,10 @@ def _exact_tension(e, stiffness, bedding_stretch, bedding_load):
             middle = (low + high) / 2
             above = middle / k + d * (1 - (-middle / c).exp()) > e
             low, high = (low, middle) if above else (middle, high)
-        at = low
+        value = low
         for _ in range(12):  # e(T) is concave: from below Newton's method does not overshoot
-            at += (e - at / k - d * (1 - (-at / c).exp())) / (1 / k + d / c * (-at / c).exp())
-        return float(at)
+            value += (e - value / k - d * (1 - (-value / c).exp())) / (1 / k + d / c * (-value / c).exp())
+        return float(value)
 
 
 def _central(function, values, index, scale=1e-5):
@@ -105,17 +105,17 @@ def _floats(values):
 
 
 def test_the_inverse_returns_the_tension_to_every_digit_that_the_extension_holds():
-    k, d, c, at = _grid(STIFFNESSES, BEDDING_STRETCHES, BEDDING_LOADS, TENSIONS)
-    error = np.abs(np.asarray(tension(extended(at, k, d, c), k, d, c)) / at - 1)
-    condition = _condition(at, k, d, c)
+    k, d, c, points = _grid(STIFFNESSES, BEDDING_STRETCHES, BEDDING_LOADS, TENSIONS)
+    error = np.abs(np.asarray(tension(extended(points, k, d, c), k, d, c)) / points - 1)
+    condition = _condition(points, k, d, c)
     assert np.all(error <= 4 * EPSILON * np.maximum(condition, 1))
     assert np.all(error[condition < 1000] < 1e-12)
     assert np.mean(condition < 1000) > 0.97  # beyond lie ropes whose bedding stretch is 1000 times the elastic one
 
 
 def test_the_inverse_is_to_1e_12_for_every_rope_that_a_bench_would_meet():
-    k, d, c, at = _grid([5.0, 50.0, 500.0], [0.0, 0.1, 2.0], [1.0, 10.0, 100.0], TENSIONS)
-    np.testing.assert_allclose(tension(extended(at, k, d, c), k, d, c), at, rtol=1e-12)
+    k, d, c, points = _grid([5.0, 50.0, 500.0], [0.0, 0.1, 2.0], [1.0, 10.0, 100.0], TENSIONS)
+    np.testing.assert_allclose(tension(extended(points, k, d, c), k, d, c), points, rtol=1e-12)
 
 
 def test_the_tension_found_gives_back_the_extension():
@@ -127,23 +127,23 @@ def test_the_tension_found_is_the_root_with_sixty_digits():
     generator = np.random.default_rng(0)
     k, c = 10 ** generator.uniform([-1, -1], [4, 3], size=(60, 2)).T
     d, e = 30 * generator.random(60) ** 3, 10 ** generator.uniform(-6, 2, 60)
-    found = np.asarray(tension(e, k, d, c))
+    computed = np.asarray(tension(e, k, d, c))
     exact = np.array([_exact_tension(*row) for row in zip(e, k, d, c, strict=True)])
     condition = _condition(exact, k, d, c)
-    assert np.all(np.abs(found / exact - 1) <= 4 * EPSILON * np.maximum(condition, 1))
-    np.testing.assert_allclose(found[condition < 1000], exact[condition < 1000], rtol=1e-12)
+    assert np.all(np.abs(computed / exact - 1) <= 4 * EPSILON * np.maximum(condition, 1))
+    np.testing.assert_allclose(computed[condition < 1000], exact[condition < 1000], rtol=1e-12)
 
 
 @pytest.mark.parametrize("rope", ROPES)
 def test_the_tension_found_is_that_of_a_bracketing_root_finder(rope):
     k, d, c = rope
     for e in (1e-6, 1e-3, 0.1, 1.0, 7.0, 60.0):
-        found = brentq(
-            lambda at, e=e: at / k + d * (1 - np.exp(-at / c)) - e, 0.0, 1.01 * k * e, xtol=1e-300, rtol=1e-14
+        root = brentq(
+            lambda value, e=e: value / k + d * (1 - np.exp(-value / c)) - e, 0.0, 1.01 * k * e, xtol=1e-300, rtol=1e-14
         )
-        slope = 1 / k + d / c * np.exp(-found / c)
+        slope = 1 / k + d / c * np.exp(-root / c)
         lost = 4 * EPSILON * max(d, e) / slope  # by the plain formula, which cancels at low tension
-        np.testing.assert_allclose(tension(e, *rope), found, rtol=1e-12, atol=lost)
+        np.testing.assert_allclose(tension(e, *rope), root, rtol=1e-12, atol=lost)
 
 
 @pytest.mark.parametrize("rope", [(40.0, 1.5, 12.0), (300.0, 0.2, 60.0), (5.0, 2.0, 30.0)])
@@ -175,9 +175,9 @@ def test_a_rope_is_bedded_in_by_its_bedding_stretch_and_softest_at_first():
 
 
 def test_compliance_is_the_derivative_of_extension():
-    k, d, c, at = _grid(STIFFNESSES[::3], BEDDING_STRETCHES[::3], BEDDING_LOADS[::2], TENSIONS[::4])
-    slope = jax.jit(jax.vmap(jax.grad(extension)))(at, k, d, c)
-    np.testing.assert_allclose(softness(at, k, d, c), slope, rtol=1e-12)
+    k, d, c, points = _grid(STIFFNESSES[::3], BEDDING_STRETCHES[::3], BEDDING_LOADS[::2], TENSIONS[::4])
+    slope = jax.jit(jax.vmap(jax.grad(extension)))(points, k, d, c)
+    np.testing.assert_allclose(softness(points, k, d, c), slope, rtol=1e-12)
     row = (7.0, 40.0, 1.5, 12.0)
     np.testing.assert_allclose(softness(*_floats(row)), _central(extended, row, 0), rtol=1e-8)
 
@@ -208,7 +208,7 @@ def test_second_derivatives_of_the_inverse_are_those_of_differences():
     every = (0, 1, 2, 3)
     hessian = np.array(jax.jit(jax.hessian(tension_from_extension, argnums=every))(*values))
     for i, j in np.ndindex(4, 4):
-        by_differences = _central(lambda *at, i=i: tension_gradients(*at)[0][i], values, j)
+        by_differences = _central(lambda *value, i=i: tension_gradients(*value)[0][i], values, j)
         np.testing.assert_allclose(hessian[i, j], by_differences, rtol=1e-6, atol=1e-8)
 
 
@@ -217,25 +217,25 @@ def test_second_derivatives_of_the_inverse_are_those_of_differences():
 
 def test_the_preload_obeys_its_equation_and_slack_is_what_is_missing():
     angle = np.linspace(0.0, 6.0, 25)
-    found, slack = (np.asarray(v) for v in preload(angle, 3.0, 2.5, 0.25, 40.0, 1.5, 12.0))
+    computed, slack = (np.asarray(v) for v in preload(angle, 3.0, 2.5, 0.25, 40.0, 1.5, 12.0))
     wanted = np.asarray(extended(3.0, 40.0, 1.5, 12.0)) + 0.25 * (angle - 2.5)
     taut = wanted > 0
     assert 3 < taut.sum() < 25
-    np.testing.assert_allclose(extended(found[taut], 40.0, 1.5, 12.0), wanted[taut], rtol=1e-12)
-    np.testing.assert_array_equal(found[~taut], 0.0)
+    np.testing.assert_allclose(extended(computed[taut], 40.0, 1.5, 12.0), wanted[taut], rtol=1e-12)
+    np.testing.assert_array_equal(computed[~taut], 0.0)
     np.testing.assert_array_equal(slack[taut], 0.0)
     np.testing.assert_allclose(slack[~taut], -wanted[~taut], rtol=1e-14)
 
 
 def test_at_the_reference_angle_the_preload_is_the_reference():
-    found, slack = preload(np.asarray(1.5), 20.0, 1.5, 0.15, 40.0, 1.5, 12.0)
-    np.testing.assert_allclose(found, 20.0, rtol=1e-14)
+    computed, slack = preload(np.asarray(1.5), 20.0, 1.5, 0.15, 40.0, 1.5, 12.0)
+    np.testing.assert_allclose(computed, 20.0, rtol=1e-14)
     assert slack == 0.0
 
 
 @pytest.mark.parametrize("values", TAUT.values(), ids=TAUT)
 def test_the_gradient_of_the_preload_by_every_argument_is_that_of_differences(values):
-    by_differences = [_central(lambda *at: preload(*at)[0], values, i) for i in range(7)]
+    by_differences = [_central(lambda *value: preload(*value)[0], values, i) for i in range(7)]
     assert preload(*_floats(values))[0] > 0 and np.any(by_differences)
     for gradient in preload_gradients(*_floats(values)):
         np.testing.assert_allclose(gradient, by_differences, rtol=1e-6, atol=1e-8)
@@ -245,7 +245,7 @@ def test_the_gradient_of_the_preload_by_every_argument_is_that_of_differences(va
 
 @pytest.mark.parametrize("values", SLACK.values(), ids=SLACK)
 def test_where_the_rope_is_slack_only_the_slack_has_a_gradient(values):
-    by_differences = [_central(lambda *at: preload(*at)[1], values, i) for i in range(7)]
+    by_differences = [_central(lambda *value: preload(*value)[1], values, i) for i in range(7)]
     assert preload(*_floats(values))[1] > 0 and np.any(by_differences)
     for gradient in slack_gradients(*_floats(values)):
         np.testing.assert_allclose(gradient, by_differences, rtol=1e-6, atol=1e-8)
@@ -264,7 +264,7 @@ def test_preloads_compile_and_map_row_by_row():
     rows = np.array(list(TAUT.values()) + list(SLACK.values()))
     mapped = jax.jit(jax.vmap(preload_at))(*rows.T)
     np.testing.assert_allclose(mapped, preload(*rows.T), rtol=1e-13)
-    gradients = jax.jit(jax.vmap(jax.grad(lambda *at: preload_at(*at)[0], argnums=tuple(range(7)))))(*rows.T)
+    gradients = jax.jit(jax.vmap(jax.grad(lambda *value: preload_at(*value)[0], argnums=tuple(range(7)))))(*rows.T)
     for row, gradient in zip(rows, np.array(gradients).T, strict=True):
         np.testing.assert_allclose(gradient, preload_gradients(*_floats(row))[0], rtol=1e-12, atol=1e-13)
 
@@ -272,9 +272,9 @@ def test_preloads_compile_and_map_row_by_row():
 def test_each_angle_may_have_a_rope_of_its_own_and_the_reference_be_common():
     angle, stiffness = jnp.array([1.0, 2.0, 4.0]), jnp.array([30.0, 40.0, 50.0])
     common = _floats((20.0, 1.5, 0.15))
-    found, _ = preload(angle, *common, stiffness, *_floats((1.5, 12.0)))
+    computed, _ = preload(angle, *common, stiffness, *_floats((1.5, 12.0)))
     alone = [preload(a, *common, k, *_floats((1.5, 12.0)))[0] for a, k in zip(angle, stiffness, strict=True)]
-    np.testing.assert_allclose(found, alone, rtol=1e-14)
+    np.testing.assert_allclose(computed, alone, rtol=1e-14)
 
 
 # Mean tension -----------------------------------------------------------------------------------------------------
@@ -313,10 +313,10 @@ def _cut_rope(loads, friction_exponent, elements):
     """
     tensions, step = np.zeros((elements, *np.shape(loads[0]))), friction_exponent / elements
     for load in loads:
-        before, more = load, np.exp(step / 2)  # half a step to the middle of the first element
+        initial, more = load, np.exp(step / 2)  # half a step to the middle of the first element
         for i in range(elements):
-            tensions[i] = np.clip(tensions[i], before / more, before * more)
-            before, more = tensions[i], np.exp(step)
+            tensions[i] = np.clip(tensions[i], initial / more, initial * more)
+            initial, more = tensions[i], np.exp(step)
     return tensions.mean(axis=0)
 
 
@@ -399,6 +399,6 @@ def test_the_gradient_after_a_peak_is_that_of_differences(values):
 def test_the_gradient_after_a_peak_does_not_jump_as_friction_vanishes():
     slope = jax.jit(jax.vmap(jax.grad(mean_tension_unloading, argnums=2)))
     exponent = jnp.array([0.0, 1e-16, 1e-14, 1e-13, 1e-11, 1e-9, 1e-6])
-    below, at = jnp.full(7, 13.0), jnp.full(7, 40.0)
-    np.testing.assert_allclose(slope(below, at, exponent), 13.0 / 2, rtol=1e-5)  # all of the rope has slid back
-    np.testing.assert_allclose(slope(at, at, exponent), -40.0 / 2, rtol=1e-5)  # none has
+    below, points = jnp.full(7, 13.0), jnp.full(7, 40.0)
+    np.testing.assert_allclose(slope(below, points, exponent), 13.0 / 2, rtol=1e-5)  # all of the rope has slid back
+    np.testing.assert_allclose(slope(points, points, exponent), -40.0 / 2, rtol=1e-5)  # none has

@@ -37,11 +37,11 @@ def forces_by_turns(catheter, displacements):
             else tendon.sliding_after_turn(states[after], travel, jnp.asarray(float(turns.stroke[k])))
         )
         states.append(Turn(travel, force, mean))
-    found = []
+    results = []
     for x, stroke, after, slides in zip(displacements, motion.stroke, motion.after, motion.slides, strict=True):
-        at = jnp.asarray(x - catheter.zero), jnp.asarray(float(stroke))
-        found.append(float((tendon.sliding(*at) if slides else tendon.sliding_after_turn(states[after], *at))[0]))
-    return np.array(found)
+        points = jnp.asarray(x - catheter.zero), jnp.asarray(float(stroke))
+        results.append(float((tendon.sliding(*points) if slides else tendon.sliding_after_turn(states[after], *points))[0]))
+    return np.array(results)
 
 
 @pytest.mark.extended
@@ -51,8 +51,8 @@ def test_forces_after_any_turns_are_those_of_friction_at_every_place_of_the_rope
     catheter, displacements = CATHETERS[name], MOTIONS[motion] + 3.0
     force = forces_by_turns(catheter, displacements)
     # From a slack rope the first stroke is not the one that the turns assume; what follows the first full turn is.
-    known = catheter.pulled(displacements)
-    np.testing.assert_allclose(force[20:], known[20:], rtol=3e-3, atol=2e-3 * known.max())
+    reference = catheter.pulled(displacements)
+    np.testing.assert_allclose(force[20:], reference[20:], rtol=3e-3, atol=2e-3 * reference.max())
 
 
 def test_the_pull_is_over_the_return_between_one_and_two_friction_exponents():

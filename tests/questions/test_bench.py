@@ -171,10 +171,10 @@ def test_gain_and_offsets_have_the_signs_of_the_model():
 def test_delay_of_whole_samples_shifts_the_output_alone(samples):
     clean, late = recorded(), recorded(faults=LoadCellFaults(delay=samples / 500))
     np.testing.assert_array_equal(late.input_force, clean.input_force)
-    at, by = (
+    rows, by = (
         (slice(samples, None), slice(None, -samples)) if samples > 0 else (slice(None, samples), slice(-samples, None))
     )
-    np.testing.assert_allclose(late.output_force[at], clean.output_force[by], atol=1e-9)
+    np.testing.assert_allclose(late.output_force[rows], clean.output_force[by], atol=1e-9)
     np.testing.assert_array_equal(late.stroke, clean.stroke)
 
 
@@ -242,10 +242,10 @@ def test_cells_show_only_their_offsets_before_the_preload_is_put_on():
     quiet = recorded(
         replace(PROFILE, unloaded=0.3), faults=LoadCellFaults(input_offset=1.0, output_offset=-1.0, gain_error=0.1)
     )
-    before = quiet.time < 0.3 - 1e-9
-    assert np.all(quiet.input_force[before] == 1.0) and np.all(quiet.output_force[before] == -1.0)
-    assert np.all(quiet.stroke[before] == 0)
-    assert np.all(quiet.input_force[~before] > 10)
+    initial = quiet.time < 0.3 - 1e-9
+    assert np.all(quiet.input_force[initial] == 1.0) and np.all(quiet.output_force[initial] == -1.0)
+    assert np.all(quiet.stroke[initial] == 0)
+    assert np.all(quiet.input_force[~initial] > 10)
 
 
 def test_raw_recording_carries_all_channels_in_internal_units():
@@ -291,21 +291,23 @@ def plan():
 
 
 def test_the_data_set_is_what_its_plan_and_seed_give(plan, tmp_path):
-    kept = PLAN.parent
-    seed = json.loads((kept / "truth.json").read_text())["seed"]
+    folder = PLAN.parent
+    seed = json.loads((folder / "truth.json").read_text())["seed"]
     made = written(plan, tmp_path, seed)
-    names = {p.relative_to(kept).as_posix() for p in kept.rglob("*") if p.is_file()}
+    names = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     assert names == {*made, "bench.toml", "README.md"}
     for name, text in made.items():
         if name.endswith(".csv"):  # numbers to the last printed digit; other machines may round differently
-            assert_same_numbers(text.decode(), (kept / name).read_text())
-    assert made["cable.toml"] == (kept / "cable.toml").read_bytes()
+            assert_same_numbers(text.decode(), (folder / name).read_text())
+    assert made["cable.toml"] == (folder / "cable.toml").read_bytes()
 
 
 def assert_same_numbers(text, other):
-    rows, kept = ([line.split(",") for line in t.splitlines()] for t in (text, other))
-    assert rows[0] == kept[0] and len(rows) == len(kept)
-    values, kept_values = (np.array([[float(c.replace("<", "-")) for c in row] for row in t[1:]]) for t in (rows, kept))
+    rows, expected_rows = ([line.split(",") for line in t.splitlines()] for t in (text, other))
+    assert rows[0] == expected_rows[0] and len(rows) == len(expected_rows)
+    values, kept_values = (
+        np.array([[float(c.replace("<", "-")) for c in row] for row in t[1:]]) for t in (rows, expected_rows)
+    )
     np.testing.assert_allclose(values, kept_values, atol=0.0101)
 
 
@@ -361,8 +363,8 @@ def test_coefficients_that_the_plan_leaves_open_are_drawn():
     raw = tomllib.loads(PLAN.read_text())
     del raw["truth"]["mu1"], raw["truth"]["sigma_F"]
     with jax.enable_x64(True):
-        one, two = (make_recordings(parse_recordings_plan(raw, ""), seed).truth for seed in (1, 2))
-    assert one["mu1"] != two["mu1"] and one["sigma_F"] != two["sigma_F"] and one["mu2"] == 0.108
+        first, two = (make_recordings(parse_recordings_plan(raw, ""), seed).truth for seed in (1, 2))
+    assert first["mu1"] != two["mu1"] and first["sigma_F"] != two["sigma_F"] and first["mu2"] == 0.108
 
 
 def test_a_cable_at_one_angle_needs_no_lengths(tmp_path):

@@ -75,25 +75,25 @@ def test_holm_s_correction_is_the_textbook_s():
 def replications(n: int, sd: float = 1.0, shift: float = 0.0, seed: int = 0, bad: int = 0) -> list[Replication]:
     """Replications of a normal posterior whose stated spread is `sd` times the right one, shifted by `shift` of it."""
     generator = np.random.default_rng(seed)
-    found = []
+    results = []
     for i in range(n):
         error = 0.3 * generator.standard_normal() + 0.3 * shift
         ranked = RankedTruth(0.0, error, 0.3 * sd, float(stats.norm.cdf(-error / (0.3 * sd))))
         reasons = ("R-hat of mu is 1.2 and should be below 1.03",) if i < bad else ()
-        found.append(
+        results.append(
             Replication(i, {"an efficiency is below 20 %": 1} if i % 7 == 0 else {}, reasons, {"mu": ranked}, 2.0)
         )
-    return found
+    return results
 
 
 def test_right_intervals_are_called_calibrated():
     """By chance, ranks or coverage of the one quantity are called wrong once in fifty seeds or less."""
-    found = summarize_replications(replications(200), {"mu": QuantityLabel(r"$\mu$")})
-    (mu,) = found.quantities
-    assert found.is_calibrated
+    calibration = summarize_replications(replications(200), {"mu": QuantityLabel(r"$\mu$")})
+    (mu,) = calibration.quantities
+    assert calibration.is_calibrated
     assert mu.shrinkage == pytest.approx(1 - 0.09)
-    assert "CALIBRATED: for this description" in calibration_text(found)
-    assert "29 simulated data sets were drawn again" in calibration_text(found)
+    assert "CALIBRATED: for this description" in calibration_text(calibration)
+    assert "29 simulated data sets were drawn again" in calibration_text(calibration)
 
 
 @pytest.mark.parametrize(
@@ -101,22 +101,22 @@ def test_right_intervals_are_called_calibrated():
     [(0.5, 0.0, "intervals too narrow"), (2.0, 0.0, "intervals too wide"), (1.0, 0.7, "estimated too high")],
 )  # fmt: skip
 def test_wrong_intervals_are_said_to_be_wrong_in_their_direction(sd, shift, fault):
-    found = summarize_replications(replications(200, sd, shift), {})
-    assert not found.is_calibrated
-    assert fault in found.faults["mu"]
-    text = calibration_text(found)
+    calibration = summarize_replications(replications(200, sd, shift), {})
+    assert not calibration.is_calibrated
+    assert fault in calibration.faults["mu"]
+    text = calibration_text(calibration)
     assert "NOT CALIBRATED" in text
-    assert f"- mu: {found.faults['mu']}." in text.replace("\n  ", " ")
+    assert f"- mu: {calibration.faults['mu']}." in text.replace("\n  ", " ")
 
 
 def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_leave_nothing_judged():
-    found = summarize_replications(replications(100, bad=5), {})
-    assert found.ranked == 95
-    assert found.is_conclusive
-    assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(found)
-    assert "they are, they would change nothing." in " ".join(calibration_text(found).split())
+    calibration = summarize_replications(replications(100, bad=5), {})
+    assert calibration.ranked == 95
+    assert calibration.is_conclusive
+    assert "5 replications did not converge and are not ranked (numbers 0, 1, 2, 3, 4)" in calibration_text(calibration)
+    assert "they are, they would change nothing." in " ".join(calibration_text(calibration).split())
     spoiled = [
-        replace(each, ranked={"mu": replace(each.ranked["mu"], rank=0.01)}) for each in replications(100, bad=10)[:10]
+        replace(item, ranked={"mu": replace(item.ranked["mu"], rank=0.01)}) for item in replications(100, bad=10)[:10]
     ]
     suspect = summarize_replications([*spoiled, *replications(100, bad=10)[10:]], {})
     assert not suspect.faults
@@ -128,9 +128,9 @@ def test_replications_that_did_not_converge_are_counted_and_named_and_too_many_l
 
 
 def test_a_calibration_s_figures_show_every_quantity():
-    found = summarize_replications(replications(50, 0.5), {"mu": QuantityLabel(r"$\mu$")})
+    calibration = summarize_replications(replications(50, 0.5), {"mu": QuantityLabel(r"$\mu$")})
     for file in (ranks_figure, coverage_figure, sharpness_figure):
-        figure = file.draw(found)
+        figure = file.draw(calibration)
         figure.canvas.draw()
         words = {text.get_text() for axes in figure.axes for text in (*axes.get_yticklabels(), axes.title)}
         assert any(r"$\mu$" in word for word in words)
@@ -145,8 +145,8 @@ def test_replications_are_kept_one_by_one_and_a_torn_line_is_made_again(tmp_path
     folder = tmp_path / "new" / "calibration"
     made = replications(3)
     assert open_replications(folder, FINGERPRINT, resume=False, force=False) == {}
-    for each in made:
-        append_replication(folder, each)
+    for item in made:
+        append_replication(folder, item)
     file = folder / "replications.jsonl"
     file.write_text(file.read_text()[:-20])
     assert open_replications(folder, FINGERPRINT, resume=True, force=False) == {0: made[0], 1: made[1]}
@@ -212,9 +212,9 @@ def two_coefficients(**prior: object) -> Dataset:
 def test_a_small_calibration_of_the_right_likelihood_passes():
     """Of forces with a run effect, twelve times; it fails by chance for one seed in fifty or less."""
     dataset = two_coefficients()
-    found = calibrated(CalibrationPlan(dataset, dataset, 5), 12)
-    assert not found.faults, found.faults
-    assert {q.name for q in found.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
+    calibration = calibrated(CalibrationPlan(dataset, dataset, 5), 12)
+    assert not calibration.faults, calibration.faults
+    assert {q.name for q in calibration.quantities} >= {"mu_edge", "mu_clamp", "tau", "sigma_F"}
 
 
 @pytest.mark.slow
@@ -224,10 +224,10 @@ def test_a_small_calibration_catches_samples_of_a_run_taken_for_independent():
     A right likelihood would be rejected once in a hundred seeds.
     """
     wrong = two_coefficients(tau={"fixed": 1e-6})
-    found = calibrated(CalibrationPlan(two_coefficients(), wrong, 5), 12)
-    assert found.quantities
-    assert {"mu_edge", "mu_clamp"} & set(found.faults)
-    assert "too narrow" in " ".join(found.faults.values())
+    calibration = calibrated(CalibrationPlan(two_coefficients(), wrong, 5), 12)
+    assert calibration.quantities
+    assert {"mu_edge", "mu_clamp"} & set(calibration.faults)
+    assert "too narrow" in " ".join(calibration.faults.values())
 
 
 def angles_alone(undetected: str) -> Dataset:
@@ -242,9 +242,9 @@ def angles_alone(undetected: str) -> Dataset:
 @pytest.mark.slow
 def test_a_small_calibration_catches_zeros_in_the_place_of_angles_too_small_to_detect():
     """Zeros pull the curve down: eight replications reject a parameter at 0.01; a right likelihood, one seed in a hundred."""
-    found = calibrated(CalibrationPlan(angles_alone("censored"), angles_alone("zero"), 5), 8)
-    assert found.quantities
-    assert found.faults
+    calibration = calibrated(CalibrationPlan(angles_alone("censored"), angles_alone("zero"), 5), 8)
+    assert calibration.quantities
+    assert calibration.faults
 
 
 def test_a_replication_depends_on_its_number_alone():
@@ -291,17 +291,17 @@ def test_the_command_line_calibrates_resumes_and_says_when_too_few_replications_
 
 def test_the_page_of_a_calibration_opens_without_a_fault(tmp_path):
     quantity = QuantityLabel(r"$\mu$", meaning="friction of the sheath")
-    found = replace(summarize_replications(replications(50), {"mu": quantity}), name="</title><script>alert(1)</script>")
-    draw_calibration(found, tmp_path)
-    path = write_page(calibration_page(found), tmp_path, tmp_path / "report.html")
+    calibration = replace(summarize_replications(replications(50), {"mu": quantity}), name="</title><script>alert(1)</script>")
+    draw_calibration(calibration, tmp_path)
+    path = write_page(calibration_page(calibration), tmp_path, tmp_path / "report.html")
     with browser() as chromium, opened(chromium, path, width=390) as reader:
         assert reader.faults() == []
         assert reader.page.locator("main img").count() == 3
         assert "CALIBRATED: for this description and these tables" in reader.page.locator("main").inner_text()
-        (mu,) = found.quantities
+        (mu,) = calibration.quantities
         cells = reader.page.locator("details tbody td").all_text_contents()
         assert cells == ["friction of the sheath", f"{mu.p_value:.3f}", f"{mu.corrected:.3f}", f"{mu.shrinkage:.2f}"]
-        assert all(cell in details_text(found) for cell in cells[1:])
+        assert all(cell in details_text(calibration) for cell in cells[1:])
         assert reader.sheets() <= 6
 
 
@@ -342,7 +342,7 @@ def test_two_cores_and_two_processes_give_the_replications_that_one_gives():
     from bowdenfit import calibrate
 
     data = ROOT / "datasets" / "yarn-on-cylinder"
-    one, two = (calibrate(data, replications=40, workers=workers, seed=1) for workers in (1, 2))
+    first, two = (calibrate(data, replications=40, workers=workers, seed=1) for workers in (1, 2))
     with ProcessPoolExecutor(2, get_context("spawn")) as executor:
-        others = calibrate(data, replications=40, workers=2, seed=1, engine=executor)
-    assert [q.ranks for q in one.quantities] == [q.ranks for q in two.quantities] == [q.ranks for q in others.quantities]
+        remaining = calibrate(data, replications=40, workers=2, seed=1, engine=executor)
+    assert [q.ranks for q in first.quantities] == [q.ranks for q in two.quantities] == [q.ranks for q in remaining.quantities]

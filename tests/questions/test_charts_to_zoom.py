@@ -57,9 +57,9 @@ def test_the_charts_of_residuals_name_their_rows(sampled):
         of_runs=False, labels=("row 1", "row 2"), route=np.array([1.0, 2.0]), measured=np.array([0.76, 0.6]),
         predicted=quantiles if sampled else quantiles[2:3], inside=np.array([True, False]),
     )  # fmt: skip
-    beside, off = make_residual_charts(Residuals((points,)))
-    assert beside.to_json()["names"] == ["row 1", "row 2"]
-    series = {(one.label, one.look): one.values for one in off.groups[0].series}
+    measured_chart, off = make_residual_charts(Residuals((points,)))
+    assert measured_chart.to_json()["names"] == ["row 1", "row 2"]
+    series = {(series.label, series.look): series.values for series in off.groups[0].series}
     assert series["Measured", "points"][0] == pytest.approx(1.0)
     assert series["Outside the range of the curves", "hollow"][1] == pytest.approx(-5.0)
     if sampled:

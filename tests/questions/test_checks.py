@@ -60,14 +60,14 @@ def line_through(x, y, sd, seed=0):
 
 def textbook(x, y, sd):
     """Mean and sd of the prediction of each reading from all the others."""
-    found = []
+    results = []
     for i in range(len(x)):
-        rest = np.arange(len(x)) != i
+        others_mask = np.arange(len(x)) != i
         design = np.column_stack([np.ones(len(x)), x])
-        information = design[rest].T @ design[rest]
-        mean = design[i] @ np.linalg.solve(information, design[rest].T @ y[rest])
-        found.append((mean, sd * np.sqrt(1 + design[i] @ np.linalg.solve(information, design[i]))))
-    return np.array(found).T
+        information = design[others_mask].T @ design[others_mask]
+        mean = design[i] @ np.linalg.solve(information, design[others_mask].T @ y[others_mask])
+        results.append((mean, sd * np.sqrt(1 + design[i] @ np.linalg.solve(information, design[i]))))
+    return np.array(results).T
 
 
 def test_predictions_without_a_reading_are_those_of_the_textbook():
@@ -75,12 +75,12 @@ def test_predictions_without_a_reading_are_those_of_the_textbook():
     x = np.linspace(-1, 1, 15)
     y = 1 + 2 * x + 0.3 * np.random.default_rng(1).standard_normal(15)
     log_likelihood, replicated = line_through(x, y, 0.3)
-    found = predict_left_out(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
+    predicted = predict_left_out(log_likelihood, replicated, y, np.zeros(15, dtype=bool), DRAWS)
     mean, sd = textbook(x, y, 0.3)
-    np.testing.assert_allclose((found.mean - mean) / sd, 0.0, atol=0.06)
-    np.testing.assert_allclose(found.sd / sd, 1.0, atol=0.06)
-    np.testing.assert_allclose((found.q95 - found.q05) / (2 * stats.norm.ppf(0.95) * sd), 1.0, atol=0.08)
-    np.testing.assert_allclose(found.up_to, stats.norm.cdf(y, mean, sd), atol=0.03)
+    np.testing.assert_allclose((predicted.mean - mean) / sd, 0.0, atol=0.06)
+    np.testing.assert_allclose(predicted.sd / sd, 1.0, atol=0.06)
+    np.testing.assert_allclose((predicted.q95 - predicted.q05) / (2 * stats.norm.ppf(0.95) * sd), 1.0, atol=0.08)
+    np.testing.assert_allclose(predicted.up_to, stats.norm.cdf(y, mean, sd), atol=0.03)
 
 
 @pytest.mark.parametrize("z", [3.0, 4.0, 5.0])
@@ -97,32 +97,32 @@ def test_a_tail_beyond_all_draws_is_small_but_never_smaller_than_a_normal_one(z)
 def test_a_bound_takes_a_place_below_itself_and_stands_out_only_where_more_was_expected():
     draws = np.random.default_rng(0).normal(20.0, 2.0, (8000, 2))
     at_most = np.array([True, True])
-    found = predict_left_out(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
-    assert found.below[0] == 0.0
-    assert found.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
-    assert found.tail[0] == pytest.approx(found.up_to[0], abs=1e-9)
-    assert found.tail[1] < 1e-3
-    places = [draw_randomized_pit(found, np.random.default_rng(i))[0] for i in range(200)]
+    predicted = predict_left_out(np.zeros_like(draws), draws, np.array([22.0, 10.0]), at_most, 8000)
+    assert predicted.below[0] == 0.0
+    assert predicted.up_to[0] == pytest.approx(stats.norm.cdf(1.0), abs=0.02)
+    assert predicted.tail[0] == pytest.approx(predicted.up_to[0], abs=1e-9)
+    assert predicted.tail[1] < 1e-3
+    places = [draw_randomized_pit(predicted, np.random.default_rng(i))[0] for i in range(200)]
     assert min(places) > 0.0
-    assert max(places) < found.up_to[0]
+    assert max(places) < predicted.up_to[0]
 
 
 def test_a_reading_that_hangs_on_one_draw_is_decisive_and_one_that_says_nothing_is_not():
     draws = np.random.default_rng(0).standard_normal((4000, 2))
     log_likelihood = np.zeros((4000, 2))
     log_likelihood[7, 0] = -800.0
-    found = predict_left_out(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
-    assert np.isinf(found.pareto_k[0])
-    assert found.pareto_k[1] == 0.0
-    np.testing.assert_allclose(found.median, 0.0, atol=0.06)
-    assert (found.tail > 0.9).all()
+    predicted = predict_left_out(log_likelihood, draws, np.zeros(2), np.zeros(2, dtype=bool), 4000)
+    assert np.isinf(predicted.pareto_k[0])
+    assert predicted.pareto_k[1] == 0.0
+    np.testing.assert_allclose(predicted.median, 0.0, atol=0.06)
+    assert (predicted.tail > 0.9).all()
 
 
 def test_readings_that_a_draw_puts_beyond_all_numbers_are_far_out_without_a_warning():
     replicated = np.random.default_rng(1).standard_normal((2000, 1))
     replicated[:3, 0] = np.inf, -np.inf, np.nan
-    found = predict_left_out(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
-    assert abs(found.median[0]) < 0.1 and abs(found.below[0] - stats.norm.cdf(0.5)) < 0.05
+    predicted = predict_left_out(np.zeros((2000, 1)), replicated, np.array([0.5]), np.array([False]), 2000)
+    assert abs(predicted.median[0]) < 0.1 and abs(predicted.below[0] - stats.norm.cdf(0.5)) < 0.05
 
 
 def test_uniform_numbers_stay_in_the_band_and_others_do_not():
@@ -140,10 +140,10 @@ def parameter(name, prior):
     return Parameter(name, "$x$", "a parameter", "friction", prior)
 
 
-def weighed(quantities, drawn, log_likelihood):
+def weighed(quantities, draws, log_likelihood):
     """Sensitivities where every prior is a standard normal."""
-    priors = {name: rescale_prior(Normal(0.0, 1.0), values) for name, values in drawn.items()}
-    return compute_sensitivities(quantities, drawn, log_likelihood, priors)
+    priors = {name: rescale_prior(Normal(0.0, 1.0), values) for name, values in draws.items()}
+    return compute_sensitivities(quantities, draws, log_likelihood, priors)
 
 
 def normal_posterior(reading, sd, seed=0):
@@ -164,11 +164,11 @@ def normal_posterior(reading, sd, seed=0):
 )
 def test_power_scaling_tells_what_decides(reading, sd, expected):
     z, log_likelihood = normal_posterior(reading, sd)
-    drawn = {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}
-    (found,) = weighed({"mu": 0.1 + 0.01 * z}, drawn, log_likelihood)
-    assert found.diagnosis == expected
-    assert found.parameter == "mu"
-    assert (found.prior > SENSITIVE) == (expected != "readings decide")
+    draws = {"mu": z, "other": z[::-1] * 0 + normal_posterior(0, 0.1, 1)[0]}
+    (sensitivity,) = weighed({"mu": 0.1 + 0.01 * z}, draws, log_likelihood)
+    assert sensitivity.diagnosis == expected
+    assert sensitivity.parameter == "mu"
+    assert (sensitivity.prior > SENSITIVE) == (expected != "readings decide")
 
 
 def test_draws_that_are_alike_or_few_are_weighed_without_a_warning():
@@ -177,23 +177,23 @@ def test_draws_that_are_alike_or_few_are_weighed_without_a_warning():
     still = np.where(np.arange(32)[:, None] < 8, 4.0, z)
     for draws in (still, -still, z[:2, :6]):
         at_end = np.where(np.arange(draws.size).reshape(draws.shape) % 50 == 0, 1.0, 0.0)
-        (found, edge) = weighed({"mu": draws, "edge": at_end}, {"mu": draws}, -(draws**2))
-        assert np.isfinite([found.prior, found.likelihood]).all() and np.isnan(edge.widths[0].doubled)
+        (sensitivity, edge) = weighed({"mu": draws, "edge": at_end}, {"mu": draws}, -(draws**2))
+        assert np.isfinite([sensitivity.prior, sensitivity.likelihood]).all() and np.isnan(edge.widths[0].doubled)
 
 
 def test_the_median_with_a_wider_prior_is_that_of_another_fit():
     """Conjugate: a prior twice as wide puts the median at reading / (1 + sd^2 / 4); 8000 draws err by 0.01."""
     z, log_likelihood = normal_posterior(2.0, 0.8)
-    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
-    assert found.median == pytest.approx(2.0 / (1 + 0.8**2), abs=0.03)
-    assert found.wider == pytest.approx(2.0 / (1 + 0.8**2 / 4), abs=0.04)
+    (sensitivity,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
+    assert sensitivity.median == pytest.approx(2.0 / (1 + 0.8**2), abs=0.03)
+    assert sensitivity.wider == pytest.approx(2.0 / (1 + 0.8**2 / 4), abs=0.04)
 
 
 def test_widths_with_the_scale_of_a_prior_doubled_and_halved_are_those_of_other_fits():
     """Conjugate, as above; 8000 draws know a width to 2 %, and the ratio of two from the same draws better."""
     z, log_likelihood = normal_posterior(0.3, 0.8)
-    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
-    (width,) = found.widths
+    (sensitivity,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
+    (width,) = sensitivity.widths
     assert width.doubled == pytest.approx(np.sqrt((1 + 0.8**-2) / (1 / 4 + 0.8**-2)), rel=0.03)
     assert width.halved == pytest.approx(np.sqrt((1 + 0.8**-2) / (4 + 0.8**-2)), rel=0.03)
     assert max(width.k_doubled, width.k_halved) < 0.7
@@ -203,8 +203,8 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
     ratios = {"mu2": (1.4, 0.7), "tau": (1.38, 0.71), "mu1": (1.1, 0.9)}
     widths = tuple(WidthSensitivity(name, *ratio, 0.1, 0.1) for name, ratio in ratios.items())
     sensitivity = Sensitivity("mu2", "mu2", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths)
-    told = [describe_prior_influence(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
-    assert told == [
+    descriptions = [describe_prior_influence(Checks((), (sensitivity,), (), by)) for by in ({"tau": (4, 3)}, {})]
+    assert descriptions == [
         "Interval widths depend on the prior of tau, because 4 readings must also determine 3 coefficients: the 90 % interval "
         "of mu2 would be 1.38 times as wide with twice the scale of that prior and 0.71 times as wide with half of it. "
         "Interval widths also depend on the prior of mu2.",
@@ -231,15 +231,15 @@ def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_
 def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
     """Draws of the prior itself: twice as wide a normal would need weights without a variance."""
     z, log_likelihood = normal_posterior(0.0, 30.0)
-    (found,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
-    (width,) = found.widths
+    (sensitivity,) = weighed({"mu": z}, {"mu": z}, log_likelihood)
+    (width,) = sensitivity.widths
     assert np.isnan(width.doubled) == (width.k_doubled > 0.7)
     assert width.halved == pytest.approx(0.5, rel=0.05)
-    assert found.diagnosis == "prior decides"
+    assert sensitivity.diagnosis == "prior decides"
 
 
 @pytest.mark.parametrize(
-    ("prior", "z", "said"),
+    ("prior", "z", "message"),
     [
         (LogNormal(0.12, 0.7), -3.5, True),
         (LogNormal(0.12, 0.7), 2.9, False),
@@ -250,9 +250,9 @@ def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
         (TruncatedNormal(0.1, 0.004), -4.0, True),
     ],
 )
-def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, said):
-    drawn = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
-    assert bool(find_prior_conflicts(drawn, {"x": parameter("x", prior)})) == said
+def test_a_parameter_beyond_three_sds_of_its_prior_is_named_but_not_at_an_end_that_the_prior_allows(prior, z, message):
+    draws = {"x": z + 0.1 * np.random.default_rng(0).standard_normal((4, 100))}
+    assert bool(find_prior_conflicts(draws, {"x": parameter("x", prior)})) == message
 
 
 QUICK = ("sampler.n_walkers=128", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
@@ -297,10 +297,10 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
 
 def test_in_doubt_influential_readings_are_to_be_repeated(fit):
     influential = [reading.label for reading in fit.checks.readings if reading.pareto_k > 0.7]
-    said = suggest_next_step(fit)
-    shown = [label for label in influential if label in said]
-    assert "if in doubt, first repeat the most influential reading" in said and len(shown) == min(2, len(influential)) > 0
-    assert (f" and {len(influential) - 2} more." in said) == (len(influential) > 2)
+    advice = suggest_next_step(fit)
+    shown = [label for label in influential if label in advice]
+    assert "if in doubt, first repeat the most influential reading" in advice and len(shown) == min(2, len(influential)) > 0
+    assert (f" and {len(influential) - 2} more." in advice) == (len(influential) > 2)
 
 
 def test_every_reading_has_a_row_and_undetected_angles_are_bounds(fit):
@@ -345,16 +345,16 @@ def test_an_angle_misread_by_ten_sds_is_the_one_that_is_named(on_body):
     right = bf.read(on_body, settings=QUICK)
     row = int(np.flatnonzero(right.measurements.table(AngleTable).route == 490.0)[0])
     fit = bf.fit(changed(right, "angles", "angle", (row, 0), np.deg2rad(21.0)), seed=1)
-    found = fit.checks
-    methods, n = methods_section(fit).context["paragraphs"][0], sum(np.sum(t.refitted) for t in found.tables)
+    checks = fit.checks
+    methods, n = methods_section(fit).context["paragraphs"][0], sum(np.sum(t.refitted) for t in checks.tables)
     assert n >= 1
     assert f"], {n} of them against that of a fit without it." in methods
-    (far,) = found.outliers
+    (far,) = checks.outliers
     assert far.label == "free_sheath_angle at 490 mm"
     assert 8.5 < far.z < 9.5 and far.influential
-    text = " ".join(describe_checks(found).split())
+    text = " ".join(describe_checks(checks).split())
     assert "Outlier: free_sheath_angle at 490 mm: measured 61.0 deg, expected" in text
-    figure = checks_figure.draw(checked_tables(found))
+    figure = checks_figure.draw(checked_tables(checks))
     check_words(figure, "an outlier")
     assert "free_sheath_angle at 490 mm" in {text.get_text() for axes in figure.axes for text in axes.texts}
 
@@ -411,15 +411,15 @@ def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prio
     text = said(fit)
     assert ("Prior and readings disagree about mu" in text) == conflict
     assert ("Check the prior, its unit first." in text) == conflict
-    (found,) = fit.checks.sensitivities
-    assert (found.diagnosis == "conflict") == conflict
-    assert not conflict or found.wider < found.median
+    (sensitivity,) = fit.checks.sensitivities
+    assert (sensitivity.diagnosis == "conflict") == conflict
+    assert not conflict or sensitivity.wider < sensitivity.median
 
 
 def many_tables():
     """Figure data of a loop with stretch, and of angles with an outlier at the end of the axis."""
-    rng, at = np.random.default_rng(0), np.linspace(0.02, 0.98, 49)
-    band = 1.5 * np.sqrt(at * (1 - at) / 50)
+    rng, points = np.random.default_rng(0), np.linspace(0.02, 0.98, 49)
+    band = 1.5 * np.sqrt(points * (1 - points) / 50)
 
     def table(name, n, places, groups=("",)):
         numbers = {place: np.linspace(0, 180, n) for place in places}
@@ -429,7 +429,7 @@ def many_tables():
         labels = tuple(f"squeezed_sheath_angle at {i} mm" for i in range(n))
         group = tuple(np.resize(np.array(groups), n).tolist())
         return CheckedTable(
-            name, z, numbers, group, flags[0], flags[1], outlier, labels, at, 0.3 * band, -band, band, 0.99
+            name, z, numbers, group, flags[0], flags[1], outlier, labels, points, 0.3 * band, -band, band, 0.99
         )
 
     return (
@@ -468,8 +468,8 @@ def test_stretch_in_the_wrong_unit_is_seen_before_the_fit(on_body):
         KINDS["stretch"].warnings(d.measurements.table(StretchTable), d.description, d.measurements)
         for d in (wrong, right)
     )
-    (said,) = set(of_wrong) - set(of_right)
-    assert "gives 4030 mm under 99 N more" in said
+    (message,) = set(of_wrong) - set(of_right)
+    assert "gives 4030 mm under 99 N more" in message
     check_words(prior_figure.draw(predict_from_priors(wrong)), "stretch in micrometers")
 
 
@@ -493,9 +493,9 @@ class Checked:
             self.programs[kind] = compile_program(jax.vmap(self.implied(density.model), (0, None)), shape, density.data)
         numbered = np.column_stack([z, np.arange(len(z), dtype=float)]).reshape(-1, ROWS, z.shape[1] + 1)
         parts = [jax.tree.map(np.asarray, self.programs[kind](part, density.data)) for part in numbered]
-        drawn = jax.tree.map(lambda *each: np.stack(each), *parts)
+        draws = jax.tree.map(lambda *item: np.stack(item), *parts)
         posterior = Draws(
-            z.reshape(-1, ROWS, z.shape[1]), drawn["values"], {}, drawn["log_likelihood"], {}, drawn["replicated"], {},
+            z.reshape(-1, ROWS, z.shape[1]), draws["values"], {}, draws["log_likelihood"], {}, draws["replicated"], {},
             {"z": Diagnostics(1.0, 500.0, 500.0, 0.0, 0.0)}, 1, 1, 0.5,
         )  # fmt: skip
         return check_readings(Record(dataset, None, posterior, True, (), Provenance(seed, {})))
@@ -532,7 +532,7 @@ def test_healthy_cables_are_left_in_peace(measured):
     """Each kind of alarm may sound in 1 of 100 healthy fits: of 20 more than 2 in 1 of 1000 runs of this test."""
     checked, alarms = Checked(), []
     for seed in range(20):
-        found = checked(measured(100 + seed), seed)
-        fault = any(t.uniformity is not None and not t.uniformity.holds for t in found.tables)
-        alarms.append((bool(found.outliers), fault, bool(found.conflicts)))
+        checks = checked(measured(100 + seed), seed)
+        fault = any(t.uniformity is not None and not t.uniformity.holds for t in checks.tables)
+        alarms.append((bool(checks.outliers), fault, bool(checks.conflicts)))
     assert (np.sum(alarms, axis=0) <= 2).all(), alarms

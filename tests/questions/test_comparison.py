@@ -56,33 +56,33 @@ def outlier():
 def on_a_grid(outlier):
     """Log likelihood of each reading on a grid of z, and the log prior there."""
     z = np.stack(np.meshgrid(GRID, GRID, indexing="ij"), axis=-1).reshape(-1, 2)
-    each = jax.jit(jax.vmap(lambda at, data: outlier.log_likelihoods(at, data)["efficiency"], (0, None)))(
+    pointwise = jax.jit(jax.vmap(lambda point, data: outlier.log_likelihoods(point, data)["efficiency"], (0, None)))(
         z, outlier.data
     )
-    each = np.asarray(each)
-    return z, each, -0.5 * np.sum(z**2, axis=1)
+    pointwise = np.asarray(pointwise)
+    return z, pointwise, -0.5 * np.sum(z**2, axis=1)
 
 
 @pytest.fixture(scope="module")
 def exact(on_a_grid):
     """Log predictive density of each reading, the others known, by quadrature."""
-    _, each, log_prior = on_a_grid
-    total = log_prior + each.sum(axis=1)
+    _, pointwise, log_prior = on_a_grid
+    total = log_prior + pointwise.sum(axis=1)
 
     def of(i):
-        without = total - each[:, i]
+        without = total - pointwise[:, i]
         top = without.max()
-        return np.log(np.sum(np.exp(without - top + each[:, i]))) - np.log(np.sum(np.exp(without - top)))
+        return np.log(np.sum(np.exp(without - top + pointwise[:, i]))) - np.log(np.sum(np.exp(without - top)))
 
-    return np.array([of(i) for i in range(each.shape[1])])
+    return np.array([of(i) for i in range(pointwise.shape[1])])
 
 
 @pytest.fixture(scope="module")
-def drawn(on_a_grid):
+def posterior_draws(on_a_grid):
     """4000 independent draws of the posterior: points of the grid by their probability, moved inside their cell."""
-    z, each, log_prior = on_a_grid
+    z, pointwise, log_prior = on_a_grid
     generator = np.random.default_rng(1)
-    total = log_prior + each.sum(axis=1)
+    total = log_prior + pointwise.sum(axis=1)
     probability = np.exp(total - total.max())
     chosen = generator.choice(len(z), 4000, p=probability / probability.sum())
     return (z[chosen] + generator.uniform(-0.5, 0.5, (4000, 2)) * (GRID[1] - GRID[0])).reshape(4, 1000, 2)
@@ -97,47 +97,47 @@ def leaving_out(readings, z, share=1.0, seed=5):
     return LooRefits(readings, z, readings.evaluate(z)[1], share, seed)
 
 
-def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, drawn, exact):
+def test_leave_one_out_with_fall_backs_is_what_integrals_give(readings, posterior_draws, exact):
     """Fails by chance for one seed in 2000: eight readings within four standard errors, and 0.005 for the grid."""
-    _, each = readings.evaluate(drawn.reshape(-1, 2))
-    found = leave_one_out(readings, drawn, {"efficiency": each.reshape(4, 1000, -1)}, 4000.0, 5)
-    assert found.how[-1] in {"moment matching", "refit"}
-    assert found.pareto_k[-1] > 0.7
-    assert found.how[:-1] == ("importance sampling",) * 7
-    assert np.all(np.abs(found.elpd - exact) < 4 * found.error + 0.005)
-    plain = psis_loo({"efficiency": each.reshape(4, 1000, -1)}, 4000.0)
-    assert abs(found.elpd[-1] - exact[-1]) < abs(plain.elpd[-1] - exact[-1])
+    _, pointwise = readings.evaluate(posterior_draws.reshape(-1, 2))
+    loo = leave_one_out(readings, posterior_draws, {"efficiency": pointwise.reshape(4, 1000, -1)}, 4000.0, 5)
+    assert loo.how[-1] in {"moment matching", "refit"}
+    assert loo.pareto_k[-1] > 0.7
+    assert loo.how[:-1] == ("importance sampling",) * 7
+    assert np.all(np.abs(loo.elpd - exact) < 4 * loo.error + 0.005)
+    plain = psis_loo({"efficiency": pointwise.reshape(4, 1000, -1)}, 4000.0)
+    assert abs(loo.elpd[-1] - exact[-1]) < abs(plain.elpd[-1] - exact[-1])
 
 
-def test_a_fit_without_a_reading_gives_its_exact_density(readings, drawn, exact):
+def test_a_fit_without_a_reading_gives_its_exact_density(readings, posterior_draws, exact):
     """Fails by chance for one seed in 15 000: two readings within four standard errors, and 0.005 for the grid."""
     for i in (0, 7):
-        elpd, error, settled = leaving_out(readings, drawn.reshape(-1, 2)).refit_without(i)
+        elpd, error, settled = leaving_out(readings, posterior_draws.reshape(-1, 2)).refit_without(i)
         assert settled
         assert 0 < error < 0.1
         assert elpd == pytest.approx(exact[i], abs=4 * error + 0.005)
 
 
-def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, drawn, on_a_grid):
+def test_draws_of_a_fit_without_a_reading_are_those_of_its_posterior(readings, posterior_draws, on_a_grid):
     """Fails by chance for one seed in 4000: means and sds of two parameters within four standard errors."""
-    z, each, log_prior = on_a_grid
-    log_density = log_prior + each[:, :7].sum(axis=1)
+    z, pointwise, log_prior = on_a_grid
+    log_density = log_prior + pointwise[:, :7].sum(axis=1)
     probability = np.exp(log_density - log_density.max())
     probability /= probability.sum()
     mean = probability @ z
     sd = np.sqrt(probability @ (z - mean) ** 2)
-    chain = leaving_out(readings, drawn.reshape(-1, 2)).chain_without(7)
-    found = chain.z.reshape(-1, 2)
+    chain = leaving_out(readings, posterior_draws.reshape(-1, 2)).chain_without(7)
+    draws = chain.z.reshape(-1, 2)
     for i, name in enumerate(p.name for p in readings.posterior.model.space.free):
         error = chain.diagnostics[name].mcse_mean
         assert 0 < error < 0.1 * sd[i]
-        assert found[:, i].mean() == pytest.approx(mean[i], abs=4 * error)
-        assert found[:, i].std() == pytest.approx(sd[i], abs=4 * error)
+        assert draws[:, i].mean() == pytest.approx(mean[i], abs=4 * error)
+        assert draws[:, i].std() == pytest.approx(sd[i], abs=4 * error)
 
 
-def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, drawn):
+def test_a_refit_that_is_stopped_too_early_is_called_rough(outlier, posterior_draws):
     hasty = LooDensity(outlier, REFIT.model_copy(update={"max_steps": 200}))
-    _, _, settled = leaving_out(hasty, drawn.reshape(-1, 2)).refit_without(7)
+    _, _, settled = leaving_out(hasty, posterior_draws.reshape(-1, 2)).refit_without(7)
     assert not settled
     assert LooPrediction(np.zeros(2), np.array([0.9, 0.9]), how=("rough", "refit")).unreliable == 1
 
@@ -154,9 +154,9 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
     mean = np.linalg.solve(precision, (directions.T / sds**2) @ values)
     draws = generator.multivariate_normal(mean, np.linalg.inv(precision), 8000)
 
-    def evaluate(at):
-        each = stats.norm.logpdf(values, at @ directions.T, sds)
-        return each.sum(axis=1) - 0.5 * np.sum(at**2, axis=1), each[:, 0]
+    def evaluate(point):
+        terms = stats.norm.logpdf(values, point @ directions.T, sds)
+        return terms.sum(axis=1) - 0.5 * np.sum(point**2, axis=1), terms[:, 0]
 
     truth = stats.norm.logpdf(4.0, 0.0, 2.0)
     density, likelihood = evaluate(draws)
@@ -167,14 +167,14 @@ def test_moment_matching_finds_a_posterior_that_lies_elsewhere():
     plain = psis_loo({"": likelihood[None, :, None]}, 8000.0)
     assert plain.pareto_k[0] > 0.7
     assert abs(plain.elpd[0] - truth) > 0.3
-    found = find_best_map(draws, density, evaluate, 1.0)
-    np.testing.assert_allclose(found.move_back(found(draws)), draws, atol=1e-9)
+    transform = find_best_map(draws, density, evaluate, 1.0)
+    np.testing.assert_allclose(transform.move_back(transform(draws)), draws, atol=1e-9)
 
 
 def test_an_affine_map_knows_its_volume():
-    found = Affine(np.array([[2.0, 0.0], [1.0, 3.0]]), np.array([1.0, -1.0]), np.array([5.0, 5.0]))
-    np.testing.assert_allclose(found(np.array([[6.0, 5.0]])), [[8.0, 5.0]])
-    assert found.log_volume == pytest.approx(np.log(6.0))
+    transform = Affine(np.array([[2.0, 0.0], [1.0, 3.0]]), np.array([1.0, -1.0]), np.array([5.0, 5.0]))
+    np.testing.assert_allclose(transform(np.array([[6.0, 5.0]])), [[8.0, 5.0]])
+    assert transform.log_volume == pytest.approx(np.log(6.0))
 
 
 def test_few_draws_ask_for_a_smaller_pareto_k():
@@ -214,10 +214,10 @@ def test_weights_prefer_the_model_that_readings_come_from():
     """
     y = np.random.default_rng(4).normal(size=80)
     k = np.zeros(80)
-    found = stacking_weights(
+    weights = stacking_weights(
         {"right": LooPrediction(stats.norm.logpdf(y), k), "wrong": LooPrediction(stats.norm.logpdf(y, 1.0), k)}
     )
-    assert found["right"] > 0.65
+    assert weights["right"] > 0.65
 
 
 def test_with_few_readings_two_standard_errors_lean_and_four_decide():
@@ -262,12 +262,12 @@ def test_the_sentence_says_what_is_preferred_and_what_that_rests_on():
 
 
 def test_a_fit_that_is_not_to_be_trusted_is_named_and_decides_the_exit_code():
-    found = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
-    assert found.trusted
-    assert VERB.reply(found, {"output": None}).exit_code == 0
+    comparison = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0])
+    assert comparison.trusted
+    assert VERB.reply(comparison, {"output": None}).exit_code == 0
 
     def replied(**troubles):
-        reply = VERB.reply(replace(found, troubles=troubles), {"output": None})
+        reply = VERB.reply(replace(comparison, troubles=troubles), {"output": None})
         return reply.exit_code, " ".join(reply.text.split())
 
     code, text = replied(good=(NOT_DESCRIBED,))
@@ -282,14 +282,14 @@ def test_a_fit_that_is_not_to_be_trusted_is_named_and_decides_the_exit_code():
 
 
 def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
-    found = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0], ("rough", "refit", *("importance sampling",) * 4))
+    comparison = by_hand([2.0, 2.1, 1.9, 2.0, 2.1, 2.0], ("rough", "refit", *("importance sampling",) * 4))
     odd = {"good": "</title><script>alert(1)</script>"}
     renamed = {
-        part: {odd.get(name, name): value for name, value in getattr(found, part).items()}
+        part: {odd.get(name, name): value for name, value in getattr(comparison, part).items()}
         for part in ("differences", "weights", "predictions", "descriptions")
     }
-    found = replace(found, **renamed)
-    write_answer(tmp_path, "comparison", found, "", {"comparison": comparison_figure}, page=comparison_page(found))
+    comparison = replace(comparison, **renamed)
+    write_answer(tmp_path, "comparison", comparison, "", {"comparison": comparison_figure}, page=comparison_page(comparison))
     with browser() as chromium, opened(chromium, tmp_path / "comparison.html", width=390) as reader:
         assert reader.faults() == []
         assert reader.page.locator("main img").count() == 1
@@ -298,9 +298,9 @@ def test_the_page_of_a_comparison_opens_without_a_fault(tmp_path):
 
 
 def test_one_reading_that_makes_most_of_a_difference_is_named():
-    found = by_hand([9.0, 1.0, 1.1, 0.9, 1.0, 1.2])
-    found = replace(found, differences=found.differences | {"poor": ElpdDifference(14.2, 2.0, 0)})
-    assert "Most of it comes from one reading, efficiency 400 mm (+9.0)." in " ".join(comparison_text(found).split())
+    comparison = by_hand([9.0, 1.0, 1.1, 0.9, 1.0, 1.2])
+    comparison = replace(comparison, differences=comparison.differences | {"poor": ElpdDifference(14.2, 2.0, 0)})
+    assert "Most of it comes from one reading, efficiency 400 mm (+9.0)." in " ".join(comparison_text(comparison).split())
 
 
 @pytest.fixture(scope="module")
@@ -330,11 +330,11 @@ def test_run_effects_that_are_there_are_preferred_to_none(by_run_effect):
     """Runs scatter by 0.03 where their own readings leave 0.004 open, so that none of 1500 simulated sets of twelve favors
     the model without; its weight passes a half for one set in 1000, and the difference is within chance for one in six.
     """
-    found = bf.compare(by_run_effect)
-    assert found.best == "with"
-    assert found.weights["with"] > 0.45
-    assert sum(found.weights.values()) == pytest.approx(1.0)
-    text = " ".join(comparison_text(found).split())
+    comparison = bf.compare(by_run_effect)
+    assert comparison.best == "with"
+    assert comparison.weights["with"] > 0.45
+    assert sum(comparison.weights.values()) == pytest.approx(1.0)
+    text = " ".join(comparison_text(comparison).split())
     assert "capstan, no run effect" in text
     assert "(score less by" in text
     assert "A run of forces counts as one reading" in text
@@ -378,16 +378,16 @@ def geometries(on_body, tmp_path_factory):
 
 @pytest.mark.slow
 def test_published_and_continuous_geometry_are_compared_on_what_both_have(geometries, run):
-    where = geometries / "comparison"
-    code, text, progress = run("compare", geometries / "continuous", geometries / "published", "--output", where)
+    folder = geometries / "comparison"
+    code, text, progress = run("compare", geometries / "continuous", geometries / "published", "--output", folder)
     assert code == 0
     words = " ".join(text.split())
     assert "Of wrap angle only 17 of 22 readings are compared" in words
     assert "continuous: below the limit, published: zeros, in the published regions" in words
     assert "4 of efficiency" in words
     assert "Influential readings (the fit would change without them) were left out by moment matching" in words
-    assert progress == f"Wrote {where}.\n"  # what is being left out is said in a terminal alone, where it goes again
-    page = json.loads((where / "comparison.json").read_text())
+    assert progress == f"Wrote {folder}.\n"  # what is being left out is said in a terminal alone, where it goes again
+    page = json.loads((folder / "comparison.json").read_text())
     assert sum(row["stacking_weight"] for row in page["fits"]) == pytest.approx(1.0)
     assert len(page["readings"]) == 21
     by_label = {row["label"]: row["fits"] for row in page["readings"]}
@@ -399,12 +399,12 @@ def test_published_and_continuous_geometry_are_compared_on_what_both_have(geomet
     for fit in (fit for fits in by_label.values() for fit in fits.values()):
         assert (fit["how"] == "importance sampling") == (fit["pareto_k"] <= 0.7), fit
     assert page["fits"][1]["elpd_difference"] == pytest.approx(page["fits"][0]["elpd"] - page["fits"][1]["elpd"])
-    assert (where / "comparison.txt").read_text() == text
-    assert {p.name for p in where.iterdir()} == {
+    assert (folder / "comparison.txt").read_text() == text
+    assert {p.name for p in folder.iterdir()} == {
         "comparison.html", "comparison.json", "comparison.txt", "comparison.png", "comparison.svg",
         "comparison.pdf", "captions.txt",
     }  # fmt: skip
-    code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", where)
+    code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", folder)
     assert code != 0
     assert "holds a comparison already; add --force" in error
     code, _, error = run("compare", geometries / "continuous", geometries / "published", "--output", geometries)
@@ -416,13 +416,13 @@ def test_the_order_of_tables_in_a_stored_fit_does_not_matter(geometries):
     fit = bf.load(geometries / "continuous")
     readings, of_table = LooDensity(LogDensity(fit.model)), fit.posterior.log_likelihood
     sound = [i for i, (_, label) in enumerate(readings.names) if "430" not in label and "at 4" in label]
-    found = [
+    loo = [
         leave_one_out(readings, fit.posterior.z, tables, 2000.0, 1, sound)
         for tables in (dict(sorted(of_table.items())), dict(sorted(of_table.items(), reverse=True)))
     ]
-    np.testing.assert_array_equal(found[0].elpd, found[1].elpd)
+    np.testing.assert_array_equal(loo[0].elpd, loo[1].elpd)
     assert len(sound) > 8
-    assert all(table == "wrap_angle" for table, _ in found[0].readings)
+    assert all(table == "wrap_angle" for table, _ in loo[0].readings)
 
 
 def test_fits_of_other_files_or_with_nothing_in_common_are_refused(geometries, by_run_effect, monkeypatch):
@@ -460,11 +460,11 @@ def test_every_reading_of_the_on_body_data_is_predicted_as_by_a_fit_without_it(o
     fit = bf.fit(on_body, seed=1)
     readings = LooDensity(LogDensity(fit.model))
     effective = min(d.ess_bulk for d in fit.posterior.diagnostics.values())
-    found = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
-    assert found.unreliable == 0
+    loo = leave_one_out(readings, fit.posterior.z, fit.posterior.log_likelihood, effective, 1)
+    assert loo.unreliable == 0
     all_readings = leaving_out(readings, fit.posterior.flat_z, 0.15, 9)
-    for i in range(len(found.readings)):
+    for i in range(len(loo.readings)):
         elpd, error, settled = all_readings.refit_without(i)
-        assert settled, found.readings[i]
-        heavy = 0.25 if found.pareto_k[i] > 0.5 else 0.0
-        assert abs(elpd - found.elpd[i]) < 5 * np.hypot(error, found.error[i]) + heavy, found.readings[i]
+        assert settled, loo.readings[i]
+        heavy = 0.25 if loo.pareto_k[i] > 0.5 else 0.0
+        assert abs(elpd - loo.elpd[i]) < 5 * np.hypot(error, loo.error[i]) + heavy, loo.readings[i]

@@ -23,9 +23,9 @@ def fit(quick_fit):
 def expected(fit, length, free_deg, edge_deg):
     """Efficiency of every draw at a length inside the curves, by the capstan equation."""
     curves = for_each_draw(curve_function(fit.model, np.array([float(length)])), fit.model.space.size)(fit.posterior.flat_z)
-    own = np.deg2rad(curves["free_sheath_angle"][:, 0])
+    own_angles = np.deg2rad(curves["free_sheath_angle"][:, 0])
     mu1, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu3"))
-    more = mu1 * (np.deg2rad(free_deg) - own) + mu3 * np.deg2rad(edge_deg - 45)
+    more = mu1 * (np.deg2rad(free_deg) - own_angles) + mu3 * np.deg2rad(edge_deg - 45)
     return curves["efficiency"][:, 0] * np.exp(-more)
 
 
@@ -102,7 +102,7 @@ def test_a_prediction_outside_the_curves_is_what_the_measured_angles_say(fit):
 def test_all_ways_to_ask_outside_the_curves_agree(fit):
     rows = bf.predict(fit, [540, 550])
     assert bf.predict(fit, ["55cm"])[0]["mean"] == rows[1]["mean"]  # whatever stands beside it
-    assert [one.mean for one in fit.efficiency([540, 550])] == pytest.approx([row["mean"] for row in rows], rel=1e-12)
+    assert [estimate.mean for estimate in fit.efficiency([540, 550])] == pytest.approx([row["mean"] for row in rows], rel=1e-12)
     assert "540 mm and 550 mm: outside the curves" in " ".join(str(fit.efficiency([470, 540, 550])).split())
     (bent,) = bf.predict(fit, [550], contact=EDGE, wrap_angles="45deg")
     assert bent["efficiency"] == pytest.approx(rows[1]["efficiency"], rel=1e-12)
@@ -118,10 +118,10 @@ def test_where_no_angle_was_measured_outside_the_curves_a_prediction_is_refused(
         fit.efficiency([470, 560])
     with pytest.raises(UsageError, match="no wrap angle of 'squeezed sheath' was measured"):
         bf.predict(fit, 560, wrap_angles={FREE: "100deg"})
-    (stated,) = bf.predict(fit, 560, wrap_angles={FREE: "100deg", "squeezed sheath": "37deg"})
+    (stated_prediction,) = bf.predict(fit, 560, wrap_angles={FREE: "100deg", "squeezed sheath": "37deg"})
     mu1, mu2, mu3 = (fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3"))
     right = np.exp(-(mu1 * np.deg2rad(100) + mu2 * np.deg2rad(37) + mu3 * np.deg2rad(45)))
-    assert stated["efficiency"] == pytest.approx(np.median(right), rel=1e-6)
+    assert stated_prediction["efficiency"] == pytest.approx(np.median(right), rel=1e-6)
 
 
 # Words and seeds --------------------------------------------------------------------------------------------------
@@ -138,10 +138,10 @@ def test_a_dynamic_range_is_a_ratio_without_a_unit():
 def test_a_column_of_a_gait_is_named_by_the_option_that_there_is(fit, quick_results, refuse, tmp_path):
     path = tmp_path / "stride.csv"
     path.write_text("time_s,theta_deg,knee\n0,45,45\n1,0,0\n")
-    at = {"contact": EDGE, "gait": path}
+    options = {"contact": EDGE, "gait": path}
     (right,) = bf.predict(fit, 470, contact=EDGE, wrap_angles=["45deg", "0deg"])
     for column in ("theta_deg", "knee:deg"):
-        assert bf.predict(fit, 470, **at, gait_column=column)[0]["mean"] == right["mean"]
+        assert bf.predict(fit, 470, **options, gait_column=column)[0]["mean"] == right["mean"]
     typed = ("predict", quick_results, "470", "--contact", EDGE, "--gait", path)
     assert "write it behind the heading, as --gait-column 'knee:deg'" in refuse(*typed, "--gait-column", "knee")
     assert "has no such column; did you mean 'theta_deg'?" in refuse(*typed, "--gait-column", "theta_dg")
@@ -161,12 +161,12 @@ def test_another_seed_leaves_the_posterior_and_draws_other_mountings(fit):
 @pytest.mark.extended
 def test_many_lengths_are_predicted_in_parts_and_too_many_are_refused(fit, monkeypatch):
     lengths = np.linspace(440.0, 520.0, 7)
-    in_one, means = bf.predict(fit, lengths), [one.mean for one in fit.efficiency(lengths)]
+    in_one, means = bf.predict(fit, lengths), [estimate.mean for estimate in fit.efficiency(lengths)]
     bent = bf.predict(fit, lengths[:3], contact=EDGE, wrap_angles=["0deg", "60deg"])
     monkeypatch.setattr(prediction_angles, "_AT_ONCE", 2)
     assert [len(part) for part in prediction_angles.split_lengths(lengths)] == [2, 2, 2, 1]
     assert [row["mean"] for row in bf.predict(fit, lengths)] == pytest.approx([row["mean"] for row in in_one], rel=1e-12)
-    assert [one.mean for one in fit.efficiency(lengths)] == pytest.approx(means, rel=1e-12)
+    assert [estimate.mean for estimate in fit.efficiency(lengths)] == pytest.approx(means, rel=1e-12)
     again = bf.predict(fit, lengths[:3], contact=EDGE, wrap_angles=["0deg", "60deg"])
     assert [row["mean"] for row in again] == pytest.approx([row["mean"] for row in bent], rel=1e-12)
     for ask in (fit.efficiency, lambda many: bf.predict(fit, many)):

@@ -48,18 +48,18 @@ def device(folder, new='ringdown = "../bar"\nmounting', more=("", "")):
 def named(monkeypatch):
     """The results that a device.toml names."""
 
-    def put(found):
-        asked = []
-        monkeypatch.setattr(device_loop, "load", lambda folder: asked.append(folder) or found)
-        return asked
+    def put(computed):
+        requests = []
+        monkeypatch.setattr(device_loop, "load", lambda folder: requests.append(folder) or computed)
+        return requests
 
     return put
 
 
 def test_the_damping_of_the_joint_is_taken_from_every_draw_of_both_together(tmp_path, named):
-    asked = named(Fitted())
+    requests = named(Fitted())
     device_read = read_device_with_ring_down(Fitted(rings=False), device(tmp_path))
-    assert asked == [tmp_path / "../bar"], "as seen from device.toml"
+    assert requests == [tmp_path / "../bar"], "as seen from device.toml"
     keys = "rope.damping", "joint.damping"
     rope, joint = draw_device(device_read.needed("an answer", *keys), 40_000, 7).values()
     assert rope.mean() == pytest.approx(0.014, rel=0.01)
@@ -77,7 +77,7 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
 
 
 @pytest.mark.parametrize(
-    ("own", "other", "change", "says"),
+    ("own_values", "other", "change", "says"),
     [
         (False, Fitted(), {"new": STATED.replace("\n", '\nringdown = "../bar"\n')}, "names a ring-down, which determines it"),
         (True, Fitted(), {"new": STATED}, "the fit itself has a ring-down, which determines it already"),
@@ -87,10 +87,10 @@ def test_the_fits_own_ring_down_counts_and_tells_an_inertia_that_is_not_stated(t
         (False, Fitted(), {"new": "ringdown = 3\nmounting"}, "ringdown"),
     ],
 )  # fmt: skip
-def test_what_a_ring_down_cannot_tell_is_refused(tmp_path, named, own, other, change, says):
+def test_what_a_ring_down_cannot_tell_is_refused(tmp_path, named, own_values, other, change, says):
     named(other)
     with pytest.raises(DescriptionError, match=says):
-        read_device_with_ring_down(Fitted(rings=own), device(tmp_path, **change))
+        read_device_with_ring_down(Fitted(rings=own_values), device(tmp_path, **change))
 
 
 def test_a_fit_that_has_not_settled_is_refused(tmp_path, named):

@@ -37,9 +37,9 @@ def test_the_slope_of_friction_by_speed_is_its_derivative_and_changes_sign_where
     of = 0.3, 5.0, 0.01
     speeds = jnp.asarray([0.1, 1.0, 5.0, 12.0, 40.0])
     derivative = jax.vmap(jax.grad(lambda v: rate_factor(v, *map(jnp.asarray, of))))(speeds)
-    found = rate_slope(speeds, *map(jnp.asarray, of))
-    np.testing.assert_allclose(found, derivative, rtol=1e-5)
-    assert list(np.sign(found)) == [1, -1, -1, 1, 1]
+    computed = rate_slope(speeds, *map(jnp.asarray, of))
+    np.testing.assert_allclose(computed, derivative, rtol=1e-5)
+    assert list(np.sign(computed)) == [1, -1, -1, 1, 1]
 
 
 def test_the_words_of_sticking_and_slipping():
@@ -50,14 +50,14 @@ def test_the_words_of_sticking_and_slipping():
 @pytest.mark.slow
 def test_a_fit_of_a_loop_tells_both(on_body):
     fit = bf.fit(on_body.with_name("synthetic-haptic-loop"), seed=5, settings=QUICK)
-    at = {"wrap_angles": [(90, "deg")], "input_force": (10, "N")}
-    (stiff,) = bf.predict(fit, quantity="stiffness", **at)
-    (soft,) = bf.predict(fit, quantity="stiffness", spring=(5, "N/mm"), **at)
+    options = {"wrap_angles": [(90, "deg")], "input_force": (10, "N")}
+    (stiff,) = bf.predict(fit, quantity="stiffness", **options)
+    (soft,) = bf.predict(fit, quantity="stiffness", spring=(5, "N/mm"), **options)
     assert soft["stiffness_N_per_mm"] == pytest.approx(1 / (1 / stiff["stiffness_N_per_mm"] + 1 / 10), rel=1e-3)
     (friction,) = bf.predict(fit, quantity="friction", wrap_angles=[(90, "deg")])
-    (found,) = bf.predict(fit, quantity="dynamic-range", wrap_angles=[(90, "deg")], input_force=(100, "N"))
+    (prediction,) = bf.predict(fit, quantity="dynamic-range", wrap_angles=[(90, "deg")], input_force=(100, "N"))
     arm = 20.0
-    assert found["dynamic_range"] == pytest.approx(100 / (friction["friction_N_mm"] / arm), rel=1e-3)
+    assert prediction["dynamic_range"] == pytest.approx(100 / (friction["friction_N_mm"] / arm), rel=1e-3)
     with pytest.raises(UsageError, match="needs the largest force"):
         bf.predict(fit, quantity="dynamic-range", wrap_angles=[(90, "deg")])
 

@@ -42,7 +42,7 @@ def saved(fit, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(fit):
+def answer_at_bends(fit):
     return bf.compensate(fit, DEVICE, wrap_angle=RANGE)
 
 
@@ -55,85 +55,85 @@ def device(folder, old, new):
 
 
 def test_parameters_of_a_controller_hold_what_may_be_compensated(fit, tmp_path):
-    said = bf.compensate(fit, DEVICE)  # over all bends that were measured
+    answer = bf.compensate(fit, DEVICE)  # over all bends that were measured
     bf.export(fit, "yaml", tmp_path / "cable.yaml", device=DEVICE, points=5)
     page = yaml.safe_load((tmp_path / "cable.yaml").read_text())["/**"]["ros__parameters"]["bowden"]["compensation"]
-    assert page["wrap_angle_deg"] == [bend.wrap_angle for bend in said.by_bend]
-    assert page["scheduled"]["torque_N_m"] == [bend.scheduled for bend in said.by_bend]
-    assert (page["fixed"]["torque_N_m"], page["fixed"]["share"]) == (said.fixed.torque, said.fixed.share)
-    assert (page["scheduled"]["share"], page["dead_zone_rad_per_s"]) == (said.scheduled.share, said.dead_zone)
-    assert (page["gain"]["safe"], page["gain"]["stable_up_to"]["q05"]) == (said.gain.safe, said.gain.stable.q05)
+    assert page["wrap_angle_deg"] == [bend.wrap_angle for bend in answer.by_bend]
+    assert page["scheduled"]["torque_N_m"] == [bend.scheduled for bend in answer.by_bend]
+    assert (page["fixed"]["torque_N_m"], page["fixed"]["share"]) == (answer.fixed.torque, answer.fixed.share)
+    assert (page["scheduled"]["share"], page["dead_zone_rad_per_s"]) == (answer.scheduled.share, answer.dead_zone)
+    assert (page["gain"]["safe"], page["gain"]["stable_up_to"]["q05"]) == (answer.gain.safe, answer.gain.stable.q05)
     assert page["accepted_probability"] == 0.05 and page["friction_N_m"]["q95"][0] > page["friction_N_m"]["q50"][0]
     with pytest.raises(UsageError, match="a C header describes the cable alone"):
         bf.export(fit, "c", tmp_path / "cable.h", device=DEVICE)
     assert not (tmp_path / "cable.h").exists()
 
 
-def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, found):
-    bends = np.deg2rad([bend.wrap_angle for bend in found.by_bend])
+def test_the_share_keeps_its_risk_over_draws_in_mountings_of_their_own(fit, answer_at_bends):
+    bends = np.deg2rad([bend.wrap_angle for bend in answer_at_bends.by_bend])
     draws = draw_loop(fit, bends, read_device(DEVICE), np.ones(1))
     motor = 0.01 + 2e-3 * 0.8 + 0.0022 * np.random.default_rng(1).standard_normal((len(draws.friction), 1))
-    for fed in ([bend.scheduled for bend in found.by_bend], [found.fixed.torque] * len(bends)):
+    for fed in ([bend.scheduled for bend in answer_at_bends.by_bend], [answer_at_bends.fixed.torque] * len(bends)):
         risk = np.mean(np.any(moves_by_itself(np.array(fed), draws.friction, motor, 1.0), axis=1))
         assert risk == pytest.approx(0.05, abs=0.012), "another draw of the motor than the answer's own"
-    assert found.scheduled.risk <= 0.05
-    assert found.fixed.risk <= 0.05
+    assert answer_at_bends.scheduled.risk <= 0.05
+    assert answer_at_bends.fixed.risk <= 0.05
 
 
-def test_by_bend_more_may_be_fed_forward_than_at_one_value_for_all(found):
-    most = found.most
+def test_by_bend_more_may_be_fed_forward_than_at_one_value_for_all(answer_at_bends):
+    most = answer_at_bends.most
     assert most.wrap_angle == pytest.approx(180)
     assert most.friction.median == pytest.approx(0.23, rel=0.05)
-    assert found.fixed.torque < 0.1 * most.friction.median
-    assert found.fixed.decided_at == pytest.approx(45)
-    assert found.scheduled.left < 0.25 * found.fixed.left
-    assert most.left_fixed == pytest.approx(found.fixed.left)
+    assert answer_at_bends.fixed.torque < 0.1 * most.friction.median
+    assert answer_at_bends.fixed.decided_at == pytest.approx(45)
+    assert answer_at_bends.scheduled.left < 0.25 * answer_at_bends.fixed.left
+    assert most.left_fixed == pytest.approx(answer_at_bends.fixed.left)
 
 
-def test_coefficients_alone_promise_too_much(found):
-    assert found.scheduled.share + 0.03 < found.share_without_scatter < 1
+def test_coefficients_alone_promise_too_much(answer_at_bends):
+    assert answer_at_bends.scheduled.share + 0.03 < answer_at_bends.share_without_scatter < 1
 
 
-def test_more_scatter_of_mountings_allows_less(fit, tmp_path, found):
+def test_more_scatter_of_mountings_allows_less(fit, tmp_path, answer_at_bends):
     scatter = 'mounting_scatter = { value = 0.01, unit = "1" }'
     more = bf.compensate(fit, device(tmp_path, scatter, scatter.replace("0.01", "0.02")), wrap_angle=RANGE)
     none = bf.compensate(fit, device(tmp_path, scatter, scatter.replace("0.01", "0")), wrap_angle=RANGE)
-    assert more.scheduled.share < found.scheduled.share - 0.03 < none.scheduled.share
-    assert none.scheduled.share == pytest.approx(found.share_without_scatter, abs=0.005)
+    assert more.scheduled.share < answer_at_bends.scheduled.share - 0.03 < none.scheduled.share
+    assert none.scheduled.share == pytest.approx(answer_at_bends.share_without_scatter, abs=0.005)
     assert "for this mounting alone" in compensation_text(none)
 
 
-def test_without_a_device_what_helps_counts_as_nothing(fit, found, tmp_path):
+def test_without_a_device_what_helps_counts_as_nothing(fit, answer_at_bends, tmp_path):
     path = tmp_path / "device.toml"
     path.write_text('name = "bare"\n[rope]\nmounting_scatter = { value = 0.01, unit = "1" }\n')
     bare = bf.compensate(fit, path, wrap_angle=RANGE)
-    assert bare.fixed.torque < found.fixed.torque - 0.008
+    assert bare.fixed.torque < answer_at_bends.fixed.torque - 0.008
     assert bare.gain is None
     assert "motor.inertia" in bare.missing
     assert "motor, inertia" in compensation_text(bare)
 
 
-def test_the_gain_is_that_of_the_least_damped_ropes(found):
-    gain = found.gain
+def test_the_gain_is_that_of_the_least_damped_ropes(answer_at_bends):
+    gain = answer_at_bends.gain
     assert gain.decided_by == "the damping of the rope"
     assert gain.decided_share > 0.5
     assert gain.safe <= gain.stable.q05 * 1.0001
     assert 2 < gain.safe / gain.passive < 12
-    assert gain.left.median == pytest.approx(found.most.friction.median / (1 + gain.safe), rel=0.01)
+    assert gain.left.median == pytest.approx(answer_at_bends.most.friction.median / (1 + gain.safe), rel=0.01)
 
 
-def test_what_a_controller_does_besides_is_read_and_counts(fit, found, tmp_path):
-    said = '[controller]\nintegral_gain = { value = 5, unit = "1/s" }\nlinear_dead_zone = true'
-    path = device(tmp_path, "[controller]", f'{said}\nactive_zone = {{ value = 60, unit = "rad/s" }}')
+def test_what_a_controller_does_besides_is_read_and_counts(fit, answer_at_bends, tmp_path):
+    message = '[controller]\nintegral_gain = { value = 5, unit = "1/s" }\nlinear_dead_zone = true'
+    path = device(tmp_path, "[controller]", f'{message}\nactive_zone = {{ value = 60, unit = "rad/s" }}')
     integrated = bf.compensate(fit, path, wrap_angle=RANGE, law="active")
-    assert (found.gain.integral, integrated.gain.integral) == (0.0, 5.0)
-    assert integrated.gain.safe < found.gain.safe
+    assert (answer_at_bends.gain.integral, integrated.gain.integral) == (0.0, 5.0)
+    assert integrated.gain.safe < answer_at_bends.gain.safe
     text = " ".join(compensation_text(integrated).split())
     assert "beside 5 1/s times its integral" in text
     assert "Some hand can make it oscillate at any gain." in text
     assert faults_of_page(compensation_text(integrated)) == []
     none = bf.compensate(
-        fit, device(tmp_path, "[controller]", said.replace("5", "300")), wrap_angle=RANGE, law="active"
+        fit, device(tmp_path, "[controller]", message.replace("5", "300")), wrap_angle=RANGE, law="active"
     )
     assert none.gain.safe == 0
     assert "or integrate less than 300 1/s" in " ".join(compensation_text(none).split())
@@ -144,13 +144,15 @@ def test_scales_of_positions_belong_together(fit, tmp_path):
     apart = scaled.replace("#", 'position_to_master = { value = 1, unit = "1" }\n#')
     with pytest.raises(DescriptionError, match=r"1 is not 1 over coupling.position_to_slave, 0.5: .* write 2"):
         bf.teleoperate(fit, device(tmp_path, "[coupling] ", apart), wrap_angle="90deg")
-    found = bf.teleoperate(fit, device(tmp_path, "[coupling] ", scaled), wrap_angle="90deg")
-    assert found.stated.stiffness.median < 40
-    assert np.all(np.isfinite(found.contact.hand_torque))
+    answer = bf.teleoperate(fit, device(tmp_path, "[coupling] ", scaled), wrap_angle="90deg")
+    assert answer.stated.stiffness.median < 40
+    assert np.all(np.isfinite(answer.contact.hand_torque))
 
 
-def test_less_preload_is_felt_less_until_a_side_is_slack(found):
-    felt, slack = (np.array([getattr(row, name).median for row in found.preloads]) for name in ("friction", "slack_from"))
+def test_less_preload_is_felt_less_until_a_side_is_slack(answer_at_bends):
+    felt, slack = (
+        np.array([getattr(row, name).median for row in answer_at_bends.preloads]) for name in ("friction", "slack_from")
+    )
     assert np.all(np.diff(felt) > 0)
     assert np.all(np.diff(slack) >= 0)
     assert slack[0] == 0 < slack[-1]
@@ -200,9 +202,12 @@ def test_simulated_devices_do_what_was_foretold(fit, schedule, tmp_path):
         assert_answer_readable(file, seen, "Loop")
 
 
-def test_words_fit_a_page_whatever_is_asked(fit, found):
-    asked = (("180deg", None), ("180deg", "karnopp"), ("180deg", "active"), ("0deg:90deg", None))
-    answers = [found, *(estimate_compensation(fit, read_device(DEVICE), bends, law, 0.05)[0] for bends, law in asked)]
+def test_words_fit_a_page_whatever_is_asked(fit, answer_at_bends):
+    requests = (("180deg", None), ("180deg", "karnopp"), ("180deg", "active"), ("0deg:90deg", None))
+    answers = [
+        answer_at_bends,
+        *(estimate_compensation(fit, read_device(DEVICE), bends, law, 0.05)[0] for bends, law in requests),
+    ]
     for answer in answers:
         assert np.isfinite(answer.scheduled.torque if answer.scheduled else answer.gain.safe)
         text = compensation_text(answer)
@@ -216,9 +221,9 @@ def test_words_fit_a_page_whatever_is_asked(fit, found):
 
 
 def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
-    def refused(error, **asked):
+    def refused(error, **request):
         with pytest.raises(error) as raised:
-            bf.compensate(fit, **{"device": DEVICE, "wrap_angle": RANGE} | asked)
+            bf.compensate(fit, **{"device": DEVICE, "wrap_angle": RANGE} | request)
         assert str(raised.value)[-1] in ".?"
         return str(raised.value)
 
@@ -255,17 +260,17 @@ def test_what_cannot_be_answered_is_refused(fit, tmp_path, least_squares_of):
 
 
 def test_the_verb_prints_and_writes_what_the_library_answers(saved, run, tmp_path):
-    asked = ("compensate", saved, "--device", DEVICE, "--wrap-angle", RANGE)
-    code, out, err = run(*asked, "--output", tmp_path / "answer")
+    command = ("compensate", saved, "--device", DEVICE, "--wrap-angle", RANGE)
+    code, out, err = run(*command, "--output", tmp_path / "answer")
     assert code == 0
     assert out.startswith("Feed forward by bend, 0.8")
     assert "compensation.json" in err
-    code, out, _ = run(*asked, "--json", "--law", "active")
+    code, out, _ = run(*command, "--json", "--law", "active")
     assert code == 0
     page = json.loads(out)
     assert page["fixed"] is None
     assert page["gain"]["safe"] > 0
-    assert run(*asked, "--csv")[1].startswith("wrap_angle_deg,friction_N*m")
+    assert run(*command, "--csv")[1].startswith("wrap_angle_deg,friction_N*m")
     assert run("compensate", saved)[0] == 2
 
 
@@ -304,18 +309,18 @@ def test_couplings_stand_in_the_order_that_the_paper_tells(remote):
     four, two, *local = remote.schemes
     assert four.free_torque.median < 0.7 * two.free_torque.median, "four channels are felt less"
     assert two.hardest < 0.5 * four.hardest, "and bear harder walls"
-    assert [each.free_torque.median for each in local] == sorted((each.free_torque.median for each in local), reverse=True)
+    assert [item.free_torque.median for item in local] == sorted((item.free_torque.median for item in local), reverse=True)
     assert four.free_torque.median > local[0].free_torque.median
     assert four.hardest > local[0].hardest > local[1].hardest > 0, "contact with local feedback is less stable"
     assert four.stiffness.median > local[0].stiffness.median
 
 
 def test_what_is_felt_is_what_is_simulated(remote):
-    seen, stated = remote.contact, remote.stated
+    seen, stated_value = remote.contact, remote.stated
     speed = np.gradient(seen.master, seen.time)
     slow = (seen.time > 0.5) & (seen.time < 2) & (np.abs(speed) > 0.5)
     felt = np.mean((seen.hand_torque * np.sign(speed))[slow])
-    assert felt == pytest.approx(stated.free_torque.median, rel=0.25), "with what damping adds"
+    assert felt == pytest.approx(stated_value.free_torque.median, rel=0.25), "with what damping adds"
     assert seen.bounces is False
     assert seen.wall_torque[-1] > 0.5
 
@@ -348,14 +353,14 @@ def test_a_slave_that_leaves_the_wall_late_bounces():
 
 
 def test_words_and_files_of_teleoperation_can_be_read(saved, run, tmp_path):
-    asked = ("teleoperate", saved, DEVICE, "--wrap-angle", "180deg")
-    code, out, _ = run(*asked, "--output", tmp_path / "answer")
+    command = ("teleoperate", saved, DEVICE, "--wrap-angle", "180deg")
+    code, out, _ = run(*command, "--output", tmp_path / "answer")
     assert code == (3 if "They differ about the stated wall" in " ".join(out.split()) else 0)
     assert faults_of_page(out) == []
     page = json.loads((tmp_path / "answer" / "teleoperation.json").read_text())
     assert len(page["schemes"][0]["stable"]) == len(page["walls"]) == len(page["schemes"][0]["bounces_in_simulation"])
     assert (tmp_path / "answer" / "teleoperation.png").stat().st_size > 10_000
-    assert run(*asked, "--csv")[1].startswith("coupling,wall_stiffness_N*m/rad,stable")
+    assert run(*command, "--csv")[1].startswith("coupling,wall_stiffness_N*m/rad,stable")
 
 
 def test_the_figure_of_teleoperation_is_readable(remote):
@@ -378,9 +383,9 @@ def test_gains_that_diverge_are_said_as_such_with_the_limit_that_was_crossed(fit
 
 
 def test_teleoperation_that_cannot_be_answered_is_refused(fit, tmp_path):
-    def refused(error, path=DEVICE, **asked):
+    def refused(error, path=DEVICE, **request):
         with pytest.raises(error) as raised:
-            bf.teleoperate(fit, path, **asked)
+            bf.teleoperate(fit, path, **request)
         return str(raised.value)
 
     assert "leaves the wrap angles measured" in refused(UsageError, wrap_angle="45deg:270deg")

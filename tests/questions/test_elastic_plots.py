@@ -94,9 +94,9 @@ def preload_curve(made, angles=ANGLES):
     extended = extension(made.preload) + made.lengthening * np.deg2rad(angle)
     force = tension(extended)
     slack = np.maximum(-extended, 0.0)
-    at = np.array(angles)
-    read = np.maximum(np.interp(at, angle, half(force)) + np.resize([0.4, -0.6, 0.3], len(at)), 0.0)
-    return PreloadCurve(angle, made.quantiles(force), made.quantiles(slack), (extended < 0).mean(axis=0), at, read)
+    points = np.array(angles)
+    read = np.maximum(np.interp(points, angle, half(force)) + np.resize([0.4, -0.6, 0.3], len(points)), 0.0)
+    return PreloadCurve(angle, made.quantiles(force), made.quantiles(slack), (extended < 0).mean(axis=0), points, read)
 
 
 def efficiency(input_force, preload, exponent):
@@ -128,15 +128,15 @@ def loop_curve(made, angle, recorded=False):
     back = np.maximum(force + 2 * preload * exponent, force * np.exp(exponent))
     goes_slack = 2 * preload / mean_tension(np.ones_like(exponent), exponent)
     rng = np.random.default_rng(int(angle) + 1)
-    at = np.linspace(5.0, 85.0, 600 if recorded else 16)
-    share = np.clip(rng.random(len(at)), 0.05, 0.95)
-    stroke = np.zeros(len(at)) if recorded else np.resize([1, -1], len(at))
-    low, high = np.interp(at, INPUTS, half(forward)), np.interp(at, INPUTS, half(back))
+    points = np.linspace(5.0, 85.0, 600 if recorded else 16)
+    share = np.clip(rng.random(len(points)), 0.05, 0.95)
+    stroke = np.zeros(len(points)) if recorded else np.resize([1, -1], len(points))
+    low, high = np.interp(points, INPUTS, half(forward)), np.interp(points, INPUTS, half(back))
     output = np.where(stroke > 0, low, np.where(stroke < 0, high, low + share * (high - low)))
     return LoopCurve(
         f"{angle:g} deg", INPUTS, made.quantiles(forward), made.quantiles(back),
-        np.median(force * np.exp(-exponent), axis=0), made.quantiles(goes_slack)[:, 0], at,
-        output + 0.6 * rng.standard_normal(len(at)), stroke,
+        np.median(force * np.exp(-exponent), axis=0), made.quantiles(goes_slack)[:, 0], points,
+        output + 0.6 * rng.standard_normal(len(points)), stroke,
     )  # fmt: skip
 
 
@@ -230,9 +230,9 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
     for axes in figure.axes:
         place = axes.get_position()
         below = [a for a in figure.axes if abs(a.get_position().x0 - place.x0) < 0.01]
-        beside = [a for a in figure.axes if abs(a.get_position().y0 - place.y0) < 0.01]
+        neighbors = [a for a in figure.axes if abs(a.get_position().y0 - place.y0) < 0.01]
         assert any("(" in a.get_xlabel() for a in below)
-        assert any("(" in a.get_ylabel() for a in beside)
+        assert any("(" in a.get_ylabel() for a in neighbors)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -240,8 +240,8 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
 def test_no_legend_covers_a_panel_or_a_title(name, case):
     figure = drawn(name, case)
     figure.draw_without_rendering()
-    own = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
-    for legend in (*figure.legends, *own):
+    legends = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+    for legend in (*figure.legends, *legends):
         box = legend.get_window_extent()
         for axes in figure.axes:
             assert not box.padded(-1.0).overlaps(axes.get_window_extent())
@@ -287,9 +287,9 @@ def test_stretch_shows_both_branches_and_fills_what_was_read_while_loading():
     for vertices, quantiles in zip(bands(axes), (curve.loading, curve.unloading), strict=True):
         assert np.isin(quantiles[[0, 2]], vertices[:, 1]).all() and not np.isin(quantiles[1, 9:], vertices[:, 1]).any()
     points = [a for a in axes.get_lines() if a.get_linestyle() == "None" and len(a.get_xdata())]
-    for artist, here in zip(points, (~curve.points_unloading, curve.points_unloading), strict=True):
-        np.testing.assert_array_equal(artist.get_ydata(), curve.points_stretch[here])
-        assert (artist.get_markerfacecolor() == "white") == curve.points_unloading[here].all()
+    for artist, mask in zip(points, (~curve.points_unloading, curve.points_unloading), strict=True):
+        np.testing.assert_array_equal(artist.get_ydata(), curve.points_stretch[mask])
+        assert (artist.get_markerfacecolor() == "white") == curve.points_unloading[mask].all()
 
 
 def test_negative_stretch_is_shown_below_a_line_at_zero():
@@ -433,9 +433,9 @@ def test_loops_show_both_ways_and_the_readings_by_stroke():
     np.testing.assert_array_equal(line(first, "Back, median").get_ydata(), read.back[1])
     np.testing.assert_array_equal(line(first, "Forward, no preload").get_ydata(), read.capstan)
     for stroke, name in ((1, "Read moving forward"), (-1, "Read moving back")):
-        here = read.points_stroke == stroke
+        mask = read.points_stroke == stroke
         np.testing.assert_array_equal(
-            line(first, name).get_xydata().T, [read.points_input[here], read.points_output[here]]
+            line(first, name).get_xydata().T, [read.points_input[mask], read.points_output[mask]]
         )
     dots = line(second, "Recorded")
     assert len(dots.get_xdata()) == len(recorded.points_input) and dots.get_markersize() < 2
@@ -508,7 +508,7 @@ def test_a_window_that_is_not_shown_is_put_in_words():
 
 @pytest.mark.slow
 def test_the_same_data_give_the_same_small_files(tmp_path):
-    before = dict(mpl.rcParams)
+    initial = dict(mpl.rcParams)
     data = CASES["twelve angles"]()
     for folder in ("first", "second"):
         written = [path for name in NAMES for path in write_figure_files(name, data[name], tmp_path / folder)]
@@ -517,7 +517,7 @@ def test_the_same_data_give_the_same_small_files(tmp_path):
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
         assert 1_000 < path.stat().st_size < 500_000, path.name
     assert "Stretch (mm)</text>" in (tmp_path / "first" / "stretch.svg").read_text(encoding="utf-8")
-    assert dict(mpl.rcParams) == before
+    assert dict(mpl.rcParams) == initial
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -36,10 +36,10 @@ def known(description: Description, spread: float = 0.0, n: int = 1, **truth: fl
     z = np.asarray(fit.model.space.unconstrain(values))
     if not spread:
         return replace(fit, least_squares=replace(nothing, z=z))
-    drawn = z + spread * np.random.default_rng(5).standard_normal((1, n, len(z)))
-    shown = [p.shown_scale * np.asarray(p.prior.constrain(drawn[..., i])) for i, p in enumerate(fit.model.space.free)]
+    draws = z + spread * np.random.default_rng(5).standard_normal((1, n, len(z)))
+    shown = [p.shown_scale * np.asarray(p.prior.constrain(draws[..., i])) for i, p in enumerate(fit.model.space.free)]
     named = {p.name: value for p, value in zip(fit.model.space.free, shown, strict=True)}
-    return replace(fit, sampled=Draws(drawn, named, {}, {}, {}, {}, {}, {}, 1, n, 0.3))
+    return replace(fit, sampled=Draws(draws, named, {}, {}, {}, {}, {}, {}, 1, n, 0.3))
 
 
 def extension(tension: Any, stiffness: float, bedding_stretch: float, bedding_load: float) -> Any:
@@ -154,8 +154,8 @@ def test_the_lowest_preload_is_the_smallest_of_all_tried_at_which_no_side_is_sla
     taut = np.all((there >= 0) & (returning(there, bends, force) >= 0), axis=1)
     first = np.argmax(taut)
     assert taut[first:].all()
-    found = elastic.preload_window((bends[0], bends[-1]), force).lowest.median
-    assert FINE[first] - 0.002 <= found <= FINE[first] + 1e-6
+    limit_preload = elastic.preload_window((bends[0], bends[-1]), force).lowest.median
+    assert FINE[first] - 0.002 <= limit_preload <= FINE[first] + 1e-6
 
 
 @pytest.mark.extended
@@ -164,9 +164,9 @@ def test_the_highest_preload_is_the_largest_of_all_tried_that_is_felt_as_no_more
     elastic, bends = known(elastic_cable()).elastic, np.linspace(0.3, 2.0, 25)
     felt = np.max(2 * np.maximum(preloads(bends), 0.0) * MU * bends, axis=1)
     last = np.flatnonzero(felt <= limit)[-1]
-    found = elastic.preload_window((bends[0], bends[-1]), friction=limit).highest
-    assert found is not None
-    assert FINE[last] - 1e-6 <= found.median <= FINE[last] + 0.002
+    limit_preload = elastic.preload_window((bends[0], bends[-1]), friction=limit).highest
+    assert limit_preload is not None
+    assert FINE[last] - 1e-6 <= limit_preload.median <= FINE[last] + 0.002
 
 
 @pytest.mark.extended
@@ -194,8 +194,8 @@ def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
     window = fit.elastic.preload_window((0.0, np.pi), force, friction=limit)
     bends, lowest, felt = np.linspace(0.0, np.pi, 25), [], []
     values = jax.jit(jax.vmap(fit.model.space.constrain))(fit.draws().flat_z)
-    for drawn in zip(*(np.asarray(value) for value in values.values()), strict=True):
-        v = dict(zip(values, map(float, drawn), strict=True))
+    for draws in zip(*(np.asarray(value) for value in values.values()), strict=True):
+        v = dict(zip(values, map(float, draws), strict=True))
         rope = (v["stiffness"], v["bedding_stretch"], v["bedding_load"])
         needed = np.array([force / 2 * share(v["mu"] * bend) for bend in bends])
         shift = v["lengthening"] * (bends - REFERENCE)
@@ -249,9 +249,9 @@ def test_the_stiffness_of_a_loop_is_the_slope_of_its_displacement(load, side):
     rope = (ROPE[0], 0.0, 1.0)
     assert np.all((elastic.slack_load(BENDS)[0] > load) == (side == "taut"))
     expected = [numerical_stiffness(lambda f, x=MU * b: displacement(f, x, 10.0, rope), load) for b in BENDS]
-    found = elastic.stiffness(BENDS, load)[0]
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-    assert found[0] == pytest.approx(ROPE[0] * (2 if side == "taut" else 1))
+    computed = elastic.stiffness(BENDS, load)[0]
+    np.testing.assert_allclose(computed, expected, rtol=1e-6)
+    assert computed[0] == pytest.approx(ROPE[0] * (2 if side == "taut" else 1))
 
 
 @pytest.mark.parametrize("load", [2.0, 10.0, 60.0])

@@ -65,8 +65,8 @@ def test_the_fit_converges_and_holds_the_truth_of_the_data_set(fit):
     """Every parameter within 4 posterior sds: by chance one of ten is not once in 1600 data sets; this one is fixed."""
     assert fit.converged
     for name, value in TRUTH.items():
-        found = fit.parameter(name)
-        assert abs(found.mean - value) < 4 * found.sd, name
+        estimate = fit.parameter(name)
+        assert abs(estimate.mean - value) < 4 * estimate.sd, name
 
 
 def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
@@ -76,9 +76,9 @@ def test_a_saved_fit_gives_the_same_answers_again(fit, folder, tmp_path):
     assert json.loads((folder / "summary.json").read_text())["elastic"] == json.loads(
         json.dumps(fit.summary()["elastic"])
     )
-    measured, before = again.dataset.measurements, fit.dataset.measurements
+    measured, initial = again.dataset.measurements, fit.dataset.measurements
     for table in ("stretch", "preload", "loop"):
-        ours, theirs = (jax.tree.leaves(dataclasses.asdict(m.table(KINDS[table].table))) for m in (measured, before))
+        ours, theirs = (jax.tree.leaves(dataclasses.asdict(m.table(KINDS[table].table))) for m in (measured, initial))
         assert all(
             np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
             for a, b in zip(map(np.asarray, ours), map(np.asarray, theirs), strict=True)
@@ -185,10 +185,10 @@ def test_the_preload_window_is_given_for_bends_and_a_limit(folder, run):
 @pytest.mark.parametrize("quantity", ["preload", "slack-load", "position", "stiffness", "output-force"])
 def test_every_other_quantity_is_a_table_with_intervals(folder, run, quantity):
     force = () if quantity in ("preload", "slack-load") else ("--input-force", "20N")
-    asked = "predict", folder, "--quantity", quantity, *force
-    page = run(*asked)[1]
+    command = "predict", folder, "--quantity", quantity, *force
+    page = run(*command)[1]
     assert max(map(len, page.splitlines())) <= 80 and "highest" in page.splitlines()[0]
-    code, out, _ = run(*asked, "--csv")
+    code, out, _ = run(*command, "--csv")
     assert code == 0
     rows = table(out)
     assert len(rows) == 10  # every wrap angle that anything was measured at
@@ -271,19 +271,19 @@ def test_tables_of_one_cable_seldom_disagree(simulated, solved, count):
     By chance a loop is beyond 3 sds in 3 or 8 of 100 such sets; the other two tables err on the cautious side, because
     theirs is the scatter about the joint fit. The test of uniformity fails once in a thousand seeds.
     """
-    found = [d for seed in range(count) for d in solved(simulated(seed)).disagreements]
-    assert {d.table for d in found} == {"stretch", "measured_preload", "loop_output_force"}
-    assert max(d.sds for d in found) < 3
-    p = [2 * stats.norm.sf(d.sds) for d in found if d.table == "loop_output_force"]
+    disagreements = [d for seed in range(count) for d in solved(simulated(seed)).disagreements]
+    assert {d.table for d in disagreements} == {"stretch", "measured_preload", "loop_output_force"}
+    assert max(d.sds for d in disagreements) < 3
+    p = [2 * stats.norm.sf(d.sds) for d in disagreements if d.table == "loop_output_force"]
     assert stats.kstest(p, "uniform").pvalue > 0.001
 
 
 def test_a_loop_measured_at_another_preload_is_named_with_its_distance(simulated, solved):
     right, other = simulated(1), simulated(1, preload=19.0)
     mixed = right.measurements.with_tables(other.measurements.table(LoopTable))
-    found = solved(dataclasses.replace(right, measurements=mixed)).disagreements
-    loop = next(d for d in found if d.table == "loop_output_force")
-    assert loop.conflict > 0.8 * max(d.conflict for d in found)
+    disagreements = solved(dataclasses.replace(right, measurements=mixed)).disagreements
+    loop = next(d for d in disagreements if d.table == "loop_output_force")
+    assert loop.conflict > 0.8 * max(d.conflict for d in disagreements)
     assert loop.parameter == "preload"
     assert loop.sds > 4
     assert loop.others == pytest.approx(15, abs=0.5)
@@ -319,11 +319,11 @@ def test_a_cable_of_several_contacts_stretches_by_all_its_bends_together(on_body
     )
     (tmp_path / "stretch.csv").write_text((FOLDER / "stretch.csv").read_text())
     fit = bf.fit(tmp_path, mcmc=False)
-    at = {name: e.value for name, e in fit.least_squares.estimates.items()}
-    exponent, load = at["mu_stretch"] * np.pi / 2, 80.0
+    values = {name: e.value for name, e in fit.least_squares.estimates.items()}
+    exponent, load = values["mu_stretch"] * np.pi / 2, 80.0
     share = (1 - np.exp(-exponent)) / exponent
-    bedded = at["bedding_stretch"] / at["bedding_load"] * np.exp(-share * load / at["bedding_load"])
-    expected = 1 / (share * (1 / at["stiffness"] + bedded))
+    bedded = values["bedding_stretch"] / values["bedding_load"] * np.exp(-share * load / values["bedding_load"])
+    expected = 1 / (share * (1 / values["stiffness"] + bedded))
     assert fit.elastic.stiffness([np.pi / 2], load)[0, 0] == pytest.approx(expected, rel=1e-9)
     assert fit.elastic.position([np.pi / 2], load)[1][0, 0] > 0
     with pytest.raises(bf.UsageError, match="3 contacts"):
@@ -341,8 +341,8 @@ def test_a_loop_along_a_route_without_preload_has_the_optimum_of_one_rope(on_bod
     assert float(efficiency_of_loop) == pytest.approx(float(efficiency), rel=1e-12)
     force = loop.cable.friction.conditions.reference_force
     values = loop.space.constrain(z) | {"preload": jax.numpy.asarray(0.4 * force)}
-    at = jax.numpy.asarray(np.linspace(430.0, 530.0, 101))
-    preloaded = np.asarray(loop.cable.efficiency_at(values, at))
-    exponent = np.asarray(single.cable.exponent_at(values, at))
+    points = jax.numpy.asarray(np.linspace(430.0, 530.0, 101))
+    preloaded = np.asarray(loop.cable.efficiency_at(values, points))
+    exponent = np.asarray(single.cable.exponent_at(values, points))
     np.testing.assert_allclose(preloaded, np.minimum(np.exp(-exponent), 1 - 0.8 * exponent), rtol=1e-12)
-    assert at[preloaded.argmax()] == pytest.approx(float(length), abs=1.0)
+    assert points[preloaded.argmax()] == pytest.approx(float(length), abs=1.0)

@@ -85,10 +85,10 @@ def test_stated_errors_replace_the_usual_ones_or_leave_the_budget(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("setting", "said"), [("errors.angle={value=3,unit='N'}", "N"), ("errors.gain=-0.1", "gain"), ("errors.gains=1", "gain")]
+    ("setting", "message"), [("errors.angle={value=3,unit='N'}", "N"), ("errors.gain=-0.1", "gain"), ("errors.gains=1", "gain")]
 )
-def test_an_error_that_cannot_be_is_refused(tmp_path, setting, said):
-    with pytest.raises(bf.BowdenfitError, match=said):
+def test_an_error_that_cannot_be_is_refused(tmp_path, setting, message):
+    with pytest.raises(bf.BowdenfitError, match=message):
         bf.read(bench(tmp_path / "table.csv"), settings=[setting])
 
 

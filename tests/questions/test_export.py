@@ -58,32 +58,32 @@ def test_the_lookup_table_says_what_predict_says(fit, tmp_path):
 
 @pytest.mark.parametrize("stroke", ["pull", "return"])
 def test_quantiles_of_friction_give_the_intervals_of_predictions(of_load, stroke):
-    found = tabulate_transmission(of_load, points=3)
-    at, reference = found.points.values, found.reference_force
-    rows = bf.predict(of_load, wrap_angles=[(x, "rad") for x in at], input_force=(reference, "N"), stroke=stroke)
+    tables = tabulate_transmission(of_load, points=3)
+    route_points, reference = tables.points.values, tables.reference_force
+    rows = bf.predict(of_load, wrap_angles=[(x, "rad") for x in route_points], input_force=(reference, "N"), stroke=stroke)
     row, sign = (0, 1) if stroke == "pull" else (1, -1)
-    assert found.depends_on_load
+    assert tables.depends_on_load
     quantiles = ("q95", "output_force_N", "q05")[::sign]
     for level, quantile in zip(("q05", "q50", "q95"), quantiles, strict=True):
-        one = found.levels[LEVELS.index(level)]
-        scale = one.load_exponent, one.drag, reference
-        shift = sign * one.exponent[row]
-        there = (reference + one.drag) * np.exp(-shift) - one.drag
+        level_table = tables.levels[LEVELS.index(level)]
+        scale = level_table.load_exponent, level_table.drag, reference
+        shift = sign * level_table.exponent[row]
+        there = (reference + level_table.drag) * np.exp(-shift) - level_table.drag
         assert scale[0] == 0
         np.testing.assert_allclose(there, [r[quantile] for r in rows], rtol=1e-6)
 
 
 def test_draws_are_cables_of_the_posterior_in_mountings_of_their_own(fit):
-    found = tabulate_transmission(fit, points=2, draws=400)
-    drawn = np.array([level.exponent[0] for level in found.levels[len(LEVELS) :]])
-    of_mountings = [found.levels[LEVELS.index(f"mounting_{q}")].exponent[0] for q in ("q05", "q95")]
-    inside = np.mean((drawn > of_mountings[0]) & (drawn < of_mountings[1]))
+    tables = tabulate_transmission(fit, points=2, draws=400)
+    draws = np.array([level.exponent[0] for level in tables.levels[len(LEVELS) :]])
+    of_mountings = [tables.levels[LEVELS.index(f"mounting_{q}")].exponent[0] for q in ("q05", "q95")]
+    inside = np.mean((draws > of_mountings[0]) & (draws < of_mountings[1]))
     assert (
         0.9 - 4.4 * 0.011 < inside < 0.9 + 4.4 * 0.011
     )  # binomial of 800, half of them dependent: less than 1 in 10^4
-    columns = read_back(draws_table(found))
+    columns = read_back(draws_table(tables))
     assert len(columns["draw"]) == 800
-    np.testing.assert_array_equal(np.array(columns["friction_exponent_pull"], dtype=float).reshape(-1, 2), drawn)
+    np.testing.assert_array_equal(np.array(columns["friction_exponent_pull"], dtype=float).reshape(-1, 2), draws)
 
 
 def test_every_file_says_fit_seed_version_and_range(fit, tmp_path):
@@ -115,13 +115,13 @@ def test_a_loop_is_exported_with_its_stiffness_at_the_wrap_angle_asked_for(tmp_p
     assert code in (0, 3)
     assert "Friction is that at wrap_angle 100 deg.\nIt holds up to" in out
     text = (tmp_path / "synthetic_haptic_loop.xml").read_text()
-    found = tabulate_transmission(fit, 5)
+    tables = tabulate_transmission(fit, 5)
     rows = bf.predict(
-        fit, quantity="stiffness", wrap_angles=[(x, "rad") for x in found.points.values], input_force=(1e-6, "N")
+        fit, quantity="stiffness", wrap_angles=[(x, "rad") for x in tables.points.values], input_force=(1e-6, "N")
     )
-    np.testing.assert_allclose(found.median.stiffness, [row["stiffness_N_per_mm"] for row in rows], rtol=1e-6)
-    assert found.radii == (20.0, 20.0)
-    assert repr(2000 * float(np.interp(np.deg2rad(100), found.points.values, found.median.stiffness))) in text
+    np.testing.assert_allclose(tables.median.stiffness, [row["stiffness_N_per_mm"] for row in rows], rtol=1e-6)
+    assert tables.radii == (20.0, 20.0)
+    assert repr(2000 * float(np.interp(np.deg2rad(100), tables.points.values, tables.median.stiffness))) in text
     assert "is asked of mujoco" in refuse("export", "fits", "--to", "c", "--at", "100deg")
     assert "--at 100mm" in refuse("export", "fits", "--to", "mujoco", "--force", "--at", "100mm")
 

@@ -61,8 +61,8 @@ COMPILERS = [
 def build(request, tmp_path):
     """Compile the header of a cable with a program that asks it."""
 
-    def make(found):
-        (tmp_path / "bowden.h").write_text(c_header(found))
+    def make(computed):
+        (tmp_path / "bowden.h").write_text(c_header(computed))
         (tmp_path / "driver.c").write_text(DRIVER)
         program = tmp_path / "driver"
         done = subprocess.run(
@@ -71,9 +71,9 @@ def build(request, tmp_path):
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
 
-        def ask(asked, *mode):
+        def ask(request, *mode):
             names = ("level", "place", "speed", "force", "stroke")
-            rows = np.column_stack([np.asarray(asked[name], dtype=float) for name in names])
+            rows = np.column_stack([np.asarray(request[name], dtype=float) for name in names])
             replied = subprocess.run([program, *mode], input=rows.tobytes(), capture_output=True, check=True).stdout
             return np.frombuffer(replied).reshape(-1, 5).T
 
@@ -84,31 +84,31 @@ def build(request, tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_c_says_what_the_equations_say_at_twenty_thousand_points(case, build):
-    found = cable(case)
-    asked = points(found, 20_000, seed=3)
-    output, needed, back, compensation, flags = build(found)(asked)
-    np.testing.assert_allclose(output, of_equations(found, asked), rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(needed, of_equations(found, asked, inverse=True), rtol=1e-12, atol=1e-12)
+    tables = cable(case)
+    inputs = points(tables, 20_000, seed=3)
+    output, needed, back, compensation, flags = build(tables)(inputs)
+    np.testing.assert_allclose(output, of_equations(tables, inputs), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(needed, of_equations(tables, inputs, inverse=True), rtol=1e-12, atol=1e-12)
     there = output != 0
-    np.testing.assert_allclose(back[there], asked["force"][there], rtol=1e-9)
-    least = of_equations(found, asked | {"level": np.full(20_000, LEVELS.index("mounting_q05"))}, inverse=True)
-    np.testing.assert_allclose(compensation, least - asked["force"], rtol=1e-12, atol=1e-10)
-    at = found.points.values
-    outside = ((asked["place"] < at[0]) | (asked["place"] > at[-1])) & (case != "one place")
+    np.testing.assert_allclose(back[there], inputs["force"][there], rtol=1e-9)
+    least = of_equations(tables, inputs | {"level": np.full(20_000, LEVELS.index("mounting_q05"))}, inverse=True)
+    np.testing.assert_allclose(compensation, least - inputs["force"], rtol=1e-12, atol=1e-10)
+    route_points = tables.points.values
+    outside = ((inputs["place"] < route_points[0]) | (inputs["place"] > route_points[-1])) & (case != "one place")
     np.testing.assert_array_equal(flags.astype(int) & 1, outside)
-    np.testing.assert_array_equal((flags.astype(int) & 2) == 2, (output == 0) & (not found.is_loop))
+    np.testing.assert_array_equal((flags.astype(int) & 2) == 2, (output == 0) & (not tables.is_loop))
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_c_follows_twenty_thousand_steps_as_the_play_operator_does(case, build):
-    found, n = cable(case), 20_000
-    force, ask = motion(found, n), build(found)
+    tables, n = cable(case), 20_000
+    force, ask = motion(tables, n), build(tables)
     for level in (1, 4, 6):
-        place, speed = float(np.mean(found.points.values)) + 0.01, 31.0
+        place, speed = float(np.mean(tables.points.values)) + 0.01, 31.0
         same = {"level": level, "place": place, "speed": speed, "stroke": 1.0}
-        asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force}
-        stepped, state, *_ = ask(asked, "step")
-        np.testing.assert_allclose(stepped, followed(found, level, place, speed, force), rtol=1e-12, atol=1e-11)
+        inputs = {name: np.full(n, value) for name, value in same.items()} | {"force": force}
+        stepped, state, *_ = ask(inputs, "step")
+        np.testing.assert_allclose(stepped, followed(tables, level, place, speed, force), rtol=1e-12, atol=1e-11)
         np.testing.assert_array_equal(stepped, state)
         assert np.ptp(stepped) > 50  # it moved, and stood still
         assert np.mean(np.diff(stepped) == 0) > 0.02
@@ -116,44 +116,44 @@ def test_c_follows_twenty_thousand_steps_as_the_play_operator_does(case, build):
 
 @pytest.mark.parametrize("case", CREEPING)
 def test_c_follows_a_rope_that_creeps_as_the_package_does(case, build):
-    found, n, step = cable(case), 20_000, 0.001
-    force, ask = motion(found, n), build(found)
+    tables, n, step = cable(case), 20_000, 0.001
+    force, ask = motion(tables, n), build(tables)
     for level in (1, 4, 6):
-        place, speed = float(np.mean(found.points.values)), changing_speed(n)
+        place, speed = float(np.mean(tables.points.values)), changing_speed(n)
         same = {"level": level, "place": place, "stroke": step}
-        asked = {name: np.full(n, value) for name, value in same.items()} | {"force": force, "speed": speed}
-        stepped, state, *_ = ask(asked, "step")
-        np.testing.assert_allclose(stepped, crept(found, level, place, speed, force, step), rtol=1e-10, atol=1e-9)
+        inputs = {name: np.full(n, value) for name, value in same.items()} | {"force": force, "speed": speed}
+        stepped, state, *_ = ask(inputs, "step")
+        np.testing.assert_allclose(stepped, crept(tables, level, place, speed, force, step), rtol=1e-10, atol=1e-9)
         np.testing.assert_array_equal(stepped, state)
         assert np.ptp(stepped) > 50 and np.mean(np.diff(stepped) == 0) < 0.02
 
 
 def test_a_rope_that_creeps_recovers_from_what_is_no_number_and_from_slack(build):
-    found = cable("dahl")
+    tables = cable("dahl")
     force = np.array([50.0, np.nan, 60.0, 0.0, 40.0, 80.0])
-    asked = {"level": [1] * 6, "place": [1.0] * 6, "speed": [0.0] * 6, "force": force, "stroke": [0.0] * 6}
-    stepped, state, _, _, flags = build(found)(asked, "step")
+    inputs = {"level": [1] * 6, "place": [1.0] * 6, "speed": [0.0] * 6, "force": force, "stroke": [0.0] * 6}
+    stepped, state, _, _, flags = build(tables)(inputs, "step")
     np.testing.assert_array_equal(flags, [0, 4, 0, 2, 0, 0])
     assert np.isnan(stepped[1]) and state[1] == state[0] and stepped[3] == 0.0
     assert np.all(np.isfinite(stepped[[0, 2, 4, 5]])) and stepped[5] > stepped[4] > 0
 
 
 def test_c_tells_what_it_cannot_answer(build):
-    found = cable("load")
-    asked = {
+    tables = cable("load")
+    inputs = {
         "level": [1, 99, -1, 1], "place": [np.nan, 1.0, 1.0, 1.0], "speed": [0.0] * 4, "force": [10.0, 10.0, 10.0, np.nan],
         "stroke": [1] * 4,
     }  # fmt: skip
-    output, *_, flags = build(found)(asked)
+    output, *_, flags = build(tables)(inputs)
     assert np.all(np.isnan(output))
     assert np.all(flags == 4)
 
 
 def test_hostile_names_are_harmless_in_c(build):
-    found = cable("rope", name=HOSTILE)
-    about = replace(found.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    table_points = replace(found.points, variable=HOSTILE, unit=HOSTILE)
-    output, *_ = build(replace(found, about=about, points=table_points))(points(found, 10, seed=1))
+    tables = cable("rope", name=HOSTILE)
+    about = replace(tables.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
+    table_points = replace(tables.points, variable=HOSTILE, unit=HOSTILE)
+    output, *_ = build(replace(tables, about=about, points=table_points))(points(tables, 10, seed=1))
     assert np.all(np.isfinite(output))
 
 

@@ -49,9 +49,9 @@ OUTPUTS = (
 )
 
 
-def in_c(found, rows, folder):
+def in_c(computed, rows, folder):
     """What the header says, compiled with another compiler than the unit where there is one."""
-    (folder / "bowden.h").write_text(c_header(found))
+    (folder / "bowden.h").write_text(c_header(computed))
     (folder / "driver.c").write_text(DRIVER)
     command = shutil.which("clang") or shutil.which("gcc") or "cc"
     subprocess.run([command, "-O1", "-ffp-contract=off", "-o", "driver", "driver.c", "-lm"], cwd=folder, check=True)
@@ -59,38 +59,38 @@ def in_c(found, rows, folder):
     return np.frombuffer(replied).reshape(-1, 6)
 
 
-def written(found, folder, name="a cable"):
+def written(computed, folder, name="a cable"):
     path = folder / "cable.fmu"
-    path.write_bytes(build_fmu(found, name))
+    path.write_bytes(build_fmu(computed, name))
     return path
 
 
 @pytest.mark.parametrize("case", ["loop", "load", "rate", "one place"])
 def test_a_unit_driven_by_fmpy_says_what_c_says_to_the_last_bit(case, tmp_path):
-    found, n, level = cable(case), 2000, 3
-    path = written(found, tmp_path)
+    tables, n, level = cable(case), 2000, 3
+    path = written(tables, tmp_path)
     assert validation.validate_fmu(str(path)) == []
-    time, at = np.arange(n) * 1e-3, found.points.values
-    place = np.linspace(at[0] - 0.2, at[-1] + 0.2, n)
+    time, route_points = np.arange(n) * 1e-3, tables.points.values
+    place = np.linspace(route_points[0] - 0.2, route_points[-1] + 0.2, n)
     names = ("time", "input_force", "place", "speed", "wanted_force")
-    columns = (time, motion(found, n), place, 40 * np.sin(7 * time), 20 + motion(found, n))
-    given = np.array(list(zip(*columns, strict=True)), dtype=[(name, float) for name in names])
+    columns = (time, motion(tables, n), place, 40 * np.sin(7 * time), 20 + motion(tables, n))
+    records = np.array(list(zip(*columns, strict=True)), dtype=[(name, float) for name in names])
     run = fmpy.simulate_fmu(
-        str(path), validate=False, start_values={"level": level}, input=given, output=[*OUTPUTS, "flags"], stop_time=time[-1],
+        str(path), validate=False, start_values={"level": level}, input=records, output=[*OUTPUTS, "flags"], stop_time=time[-1],
         output_interval=1e-3, step_size=1e-3, fmi_call_logger=None,
     )  # fmt: skip
     assert len(run) == n
     rows = np.column_stack([*columns[1:], np.full(n, level)])
     # inputs at a step's beginning: the row of t + h holds the play of t, and what follows at once from the inputs of t
-    expected = in_c(found, rows, tmp_path)
+    expected = in_c(tables, rows, tmp_path)
     for k, name in enumerate((*OUTPUTS, "flags")):
         np.testing.assert_array_equal(run[name][1:], expected[:-1, k], err_msg=name)
     assert np.ptp(run["output_force"]) > 50
 
 
 def test_a_unit_can_be_reset_copied_and_told_wrong_things(tmp_path):
-    found = cable("rope")
-    path = written(found, tmp_path)
+    tables = cable("rope")
+    path = written(tables, tmp_path)
     description, folder = fmpy.read_model_description(str(path)), fmpy.extract(str(path), str(tmp_path / "unpacked"))
     made = fmpy.fmi2.FMU2Slave(
         guid=description.guid, unzipDirectory=folder, instanceName="x",
@@ -103,14 +103,14 @@ def test_a_unit_can_be_reset_copied_and_told_wrong_things(tmp_path):
     made.setReal([0, 1], [100.0, 1.0])
     made.doStep(0.0, 1e-3)
     (first,) = made.getReal([4])
-    kept = made.getFMUState()
+    saved_state = made.getFMUState()
     made.setReal([0], [200.0])
     made.doStep(1e-3, 1e-3)
     assert made.getReal([4])[0] > first
-    made.setFMUState(kept)
+    made.setFMUState(saved_state)
     assert made.getReal([4]) == [first]
-    assert made.serializeFMUstate(made.deSerializeFMUstate(made.serializeFMUstate(kept))) == made.serializeFMUstate(
-        kept
+    assert made.serializeFMUstate(made.deSerializeFMUstate(made.serializeFMUstate(saved_state))) == made.serializeFMUstate(
+        saved_state
     )
     for wrong in (
         lambda: made.setInteger([0], [99]),
@@ -127,9 +127,9 @@ def test_a_unit_can_be_reset_copied_and_told_wrong_things(tmp_path):
 
 
 def test_hostile_names_are_harmless_in_an_fmu(tmp_path):
-    found = cable("rope", name=HOSTILE)
-    about = replace(found.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    hostile = replace(found, about=about, points=replace(found.points, variable=HOSTILE, unit="<&\"'"))
+    tables = cable("rope", name=HOSTILE)
+    about = replace(tables.about, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
+    hostile = replace(tables, about=about, points=replace(tables.points, variable=HOSTILE, unit="<&\"'"))
     path = written(hostile, tmp_path, HOSTILE)
     assert validation.validate_fmu(str(path)) == []
     assert all(name.isascii() and ".." not in name for name in zipfile.ZipFile(path).namelist())

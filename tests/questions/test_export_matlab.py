@@ -61,33 +61,33 @@ end
 
 @needs_octave
 def test_octave_says_what_the_equations_say_and_follows_the_play_operator(tmp_path):
-    asked, names = {}, [f"bowden_{case.replace(' ', '_')}" for case in CASES]
+    requests, names = {}, [f"bowden_{case.replace(' ', '_')}" for case in CASES]
     for case, name in zip(CASES, names, strict=True):
-        found = cable(case, name=HOSTILE if case == "rope" else "plain")
-        asked[case] = points(found, 1000, seed=4)
-        (tmp_path / f"{name}.m").write_text(matlab_function(found, name))
+        tables = cable(case, name=HOSTILE if case == "rope" else "plain")
+        requests[case] = points(tables, 1000, seed=4)
+        (tmp_path / f"{name}.m").write_text(matlab_function(tables, name))
         columns = [
-            asked[case][key] + (1 if key == "level" else 0) for key in ("level", "place", "speed", "force", "stroke")
+            requests[case][key] + (1 if key == "level" else 0) for key in ("level", "place", "speed", "force", "stroke")
         ]
         np.savetxt(tmp_path / f"{name}.csv", np.column_stack(columns), delimiter=",", fmt="%.17g")
-        np.savetxt(tmp_path / f"{name}.motion", [3, *motion(found, 4000)[::100]], fmt="%.17g")
+        np.savetxt(tmp_path / f"{name}.motion", [3, *motion(tables, 4000)[::100]], fmt="%.17g")
     (tmp_path / "ask.m").write_text(SCRIPT % ", ".join(f"'{name}'" for name in names))
     assert OCTAVE is not None
     done = subprocess.run([OCTAVE, "--norc", "--quiet", "ask.m"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert set(done.stderr.splitlines()) <= {ON_LEAVING}
     for case, name in zip(CASES, names, strict=True):
-        found, questions = cable(case), asked[case]
+        tables, questions = cable(case), requests[case]
         output, needed, compensation, flags = np.loadtxt(tmp_path / f"{name}.out", delimiter=",").T
-        np.testing.assert_allclose(output, of_equations(found, questions), rtol=1e-9, atol=1e-9, err_msg=case)
-        np.testing.assert_allclose(needed, of_equations(found, questions, inverse=True), rtol=1e-9, atol=1e-9)
-        least = of_equations(found, questions | {"level": np.full(1000, LEVELS.index("mounting_q05"))}, inverse=True)
+        np.testing.assert_allclose(output, of_equations(tables, questions), rtol=1e-9, atol=1e-9, err_msg=case)
+        np.testing.assert_allclose(needed, of_equations(tables, questions, inverse=True), rtol=1e-9, atol=1e-9)
+        least = of_equations(tables, questions | {"level": np.full(1000, LEVELS.index("mounting_q05"))}, inverse=True)
         np.testing.assert_allclose(compensation, least - questions["force"], rtol=1e-9, atol=1e-8)
-        at = found.points.values
-        outside = ((questions["place"] < at[0]) | (questions["place"] > at[-1])) & (case != "one place")
+        route_points = tables.points.values
+        outside = ((questions["place"] < route_points[0]) | (questions["place"] > route_points[-1])) & (case != "one place")
         np.testing.assert_array_equal(flags.astype(int) & 1, outside)
         place = float(questions["place"][0])
-        expected = followed(found, 2, place, 31.0, motion(found, 4000)[::100])
+        expected = followed(tables, 2, place, 31.0, motion(tables, 4000)[::100])
         np.testing.assert_allclose(np.loadtxt(tmp_path / f"{name}.stepped"), expected, rtol=1e-9, atol=1e-9)
 
 
@@ -121,9 +121,9 @@ end
 @needs_octave
 def test_octave_follows_a_rope_that_creeps_as_the_package_does(tmp_path):
     for case in CREEPING:
-        found = cable(case)
-        (tmp_path / f"{case}.m").write_text(matlab_function(found, case))
-        np.savetxt(tmp_path / f"{case}.motion", [3, *motion(found, 4000)[::100]], fmt="%.17g")
+        tables = cable(case)
+        (tmp_path / f"{case}.m").write_text(matlab_function(tables, case))
+        np.savetxt(tmp_path / f"{case}.motion", [3, *motion(tables, 4000)[::100]], fmt="%.17g")
     (tmp_path / "ask.m").write_text(CREEPS % ", ".join(f"'{name}'" for name in CREEPING))
     assert OCTAVE is not None
     done = subprocess.run([OCTAVE, "--norc", "--quiet", "ask.m"], cwd=tmp_path, capture_output=True, text=True)

@@ -39,11 +39,11 @@ def swings(amplitude):
     return angle, np.gradient(angle, STEP)
 
 
-def loop_of(found, place):
+def loop_of(computed, place):
     """The device's loop in newtons and meters."""
-    median, at = found.median, found.points.values
+    median, route_points = computed.median, computed.points.values
     exponent, lost, k = (
-        np.interp(place, at, table) for table in (median.exponent[0], median.taut_loss, median.stiffness)
+        np.interp(place, route_points, table) for table in (median.exponent[0], median.taut_loss, median.stiffness)
     )
     return Loop(jnp.asarray(1000 * k), jnp.asarray(lost / (2 * exponent)), jnp.asarray(exponent))
 
@@ -52,9 +52,9 @@ def by_node(loop, motor):
     """Forces at both ends [N] along a path of the motor's end of the rope [m], the other held at 0."""
     with jax.enable_x64(True):
 
-        def step(node, at):
-            node = loop.settled_node(node, at, jnp.zeros(()))
-            return node, jnp.stack(loop.torques(node, at, jnp.zeros(())))
+        def step(node, value):
+            node = loop.settled_node(node, value, jnp.zeros(()))
+            return node, jnp.stack(loop.torques(node, value, jnp.zeros(())))
 
         return np.asarray(jax.lax.scan(step, jnp.zeros(()), jnp.asarray(motor))[1])
 
@@ -75,13 +75,13 @@ def driven(simulated, motion, forces):
 @pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
 @pytest.mark.parametrize("stiffness", [20.0, 300.0])
 def test_a_taut_loop_in_mjcf_follows_the_node_to_a_small_part_of_its_hysteresis(tmp_path, integrator, stiffness):
-    found, place = with_rope(cable("loop"), stiffness), 1.3
+    tables, place = with_rope(cable("loop"), stiffness), 1.3
     path = tmp_path / "cable.xml"
-    path.write_text(mujoco_model(found, place, path)[0])
+    path.write_text(mujoco_model(tables, place, path)[0])
     text = MAIN.format(step=STEP, integrator=integrator, include='<include file="cable.xml"/>')
     (tmp_path / "main.xml").write_text(text)
     simulated = mujoco.MjModel.from_xml_path(str(tmp_path / "main.xml"))
-    loop, radius = loop_of(found, place), found.radii[0] / 1000
+    loop, radius = loop_of(tables, place), tables.radii[0] / 1000
     motion = swings(0.45 * float(2 * loop.preload / loop.stiffness) / radius)
     tendons = [simulated.tendon(f"bowden_{name}_side").id for name in ("motor", "joint")]
     stiffness = [np.ravel(simulated.tendon_stiffness[tendon])[0] for tendon in tendons]
@@ -95,9 +95,9 @@ def test_a_taut_loop_in_mjcf_follows_the_node_to_a_small_part_of_its_hysteresis(
 
 @pytest.mark.parametrize("stiffness", [20.0, 300.0])
 def test_a_slack_loop_as_a_callback_is_the_node_itself(tmp_path, stiffness, no_callback):
-    found, place = with_rope(cable("loop"), stiffness), 1.3
-    made, simulated = called_back(found, place, tmp_path)
-    loop, radius = loop_of(found, place), found.radii[0] / 1000
+    tables, place = with_rope(cable("loop"), stiffness), 1.3
+    made, simulated = called_back(tables, place, tmp_path)
+    loop, radius = loop_of(tables, place), tables.radii[0] / 1000
     motion = swings(4.0 * float(loop.preload / loop.stiffness) / radius)
     mujoco.set_mjcb_passive(made)
     ends = driven(simulated, motion, lambda data: [made.motor_force, made.joint_force])
@@ -107,9 +107,9 @@ def test_a_slack_loop_as_a_callback_is_the_node_itself(tmp_path, stiffness, no_c
     np.testing.assert_allclose(ends[start:], expected[start:], atol=1e-9 * float(loop.preload))
 
 
-def called_back(found, place, folder, **options):
+def called_back(computed, place, folder, **options):
     path = folder / "cable.py"
-    path.write_text(mujoco_model(found, place, path)[0])
+    path.write_text(mujoco_model(computed, place, path)[0])
     spec = importlib.util.spec_from_file_location("exported_cable", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -119,18 +119,18 @@ def called_back(found, place, folder, **options):
 
 @pytest.mark.parametrize("case", ["rope", "stroke", "rate"])
 def test_a_single_rope_as_a_callback_keeps_to_the_capstan_equation(case, tmp_path, no_callback):
-    found = with_rope(cable(case))
-    made, simulated = called_back(found, 1.3, tmp_path, level="q95")
+    tables = with_rope(cable(case))
+    made, simulated = called_back(tables, 1.3, tmp_path, level="q95")
     mujoco.set_mjcb_passive(made)
     angle, speed = swings(0.3)
     ends = driven(simulated, (angle, speed), lambda data: [made.motor_force, made.joint_force])
-    level, at = found.levels[2], found.points.values
+    level, route_points = tables.levels[2], tables.points.values
     factor = 1.0
     if case == "rate":
         a, v, c = level.rate
         of = lambda speed: 1 + a * np.exp(-((speed / v) ** 2)) + c * np.abs(speed)  # noqa: E731
-        factor = of(15 * speed) / of(found.reference_speed)
-    up, down = (factor * np.interp(1.3, at, level.exponent[row]) for row in (0, 1))
+        factor = of(15 * speed) / of(tables.reference_speed)
+    up, down = (factor * np.interp(1.3, route_points, level.exponent[row]) for row in (0, 1))
     pulled = angle > 0
     assert pulled.any() and not pulled.all()
     assert np.all(ends[~pulled] == 0)  # a rope does not push
@@ -138,23 +138,23 @@ def test_a_single_rope_as_a_callback_keeps_to_the_capstan_equation(case, tmp_pat
     up, down = (np.broadcast_to(x, angle.shape)[pulled] for x in (up, down))
     assert np.all(share <= up * (1 + 1e-9)) and np.all(share >= -down * (1 + 1e-9))
     assert np.mean(np.abs(share - up) < 1e-9) > 0.2 and np.mean(np.abs(share + down) < 1e-9) > 0.1  # it slid both ways
-    k = 1000 * np.interp(1.3, at, level.stiffness)
+    k = 1000 * np.interp(1.3, route_points, level.stiffness)
     np.testing.assert_allclose(ends[pulled].sum(axis=1) / (2 * k), 0.015 * angle[pulled], rtol=1e-9)
 
 
 def test_a_callback_clamps_its_place_and_says_so(tmp_path):
-    found = with_rope(cable("loop"))
-    made, _ = called_back(found, 1.3, tmp_path)
-    made.place = found.points.values[-1] + 1
+    tables = with_rope(cable("loop"))
+    made, _ = called_back(tables, 1.3, tmp_path)
+    made.place = tables.points.values[-1] + 1
     beyond = made.forces(0.01, 0.0)
     assert made.clamped
     made.reset()
-    made.place = found.points.values[-1]
+    made.place = tables.points.values[-1]
     assert made.forces(0.01, 0.0) == beyond and not made.clamped
 
 
 def test_what_mujoco_cannot_express_is_refused_with_what_can():
-    for found, file, words in (
+    for tables, file, words in (
         (with_rope(cable("rope")), "cable.xml", "cannot express the friction of a single rope.*--output cable.py"),
         (with_rope(cable("load")), "cable.py", "depends on the load; --to c, fmu and matlab can"),
         (cable("loop"), "cable.xml", "how the rope stretches.*--to c or fmu"),
@@ -162,24 +162,24 @@ def test_what_mujoco_cannot_express_is_refused_with_what_can():
         (with_rope(cable("loop")), "cable.txt", "from cable.xml, or a callback from cable.py"),
     ):
         with pytest.raises(UsageError, match=words):
-            mujoco_model(found, None, Path(file))
+            mujoco_model(tables, None, Path(file))
     with pytest.raises(UsageError, match="outside the range of this fit, which is wrap_angle"):
         mujoco_model(with_rope(cable("loop")), 9.0, Path("cable.xml"))
 
 
 def test_both_files_say_where_they_are_from_and_where_they_hold():
-    found = with_rope(cable("loop"))
+    tables = with_rope(cable("loop"))
     for file in ("cable.xml", "cable.py"):
-        text, remarks = mujoco_model(found, None, Path(file))
+        text, remarks = mujoco_model(tables, None, Path(file))
         assert all(words in text for words in ("seed 7", "bowdenfit 0.1.0", "Range: wrap_angle"))
         assert "the middle of the range; --at names another place" in remarks[0]
-    assert "above which the return side goes slack" in mujoco_model(found, 1.0, Path("x.xml"))[1][1]
+    assert "above which the return side goes slack" in mujoco_model(tables, 1.0, Path("x.xml"))[1][1]
 
 
 def test_hostile_names_are_harmless_in_mujoco(tmp_path):
-    found = with_rope(cable("loop"))
-    about = replace(found.about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
-    hostile = replace(found, about=about, points=replace(found.points, variable=HOSTILE + '"""', unit=HOSTILE))
+    tables = with_rope(cable("loop"))
+    about = replace(tables.about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE)
+    hostile = replace(tables, about=about, points=replace(tables.points, variable=HOSTILE + '"""', unit=HOSTILE))
     text, _ = mujoco_model(hostile, None, Path("cable.xml"))
     assert text.isascii()
     assert ElementTree.fromstring(text).tag == "mujocoinclude"

@@ -14,36 +14,36 @@ from bowdenfit.questions.export.python import python_module
 from bowdenfit.recordings.rope_strokes import fit_loop
 
 
-def module_of(found) -> types.ModuleType:
+def module_of(computed) -> types.ModuleType:
     """The exported module, loaded."""
     module = types.ModuleType("exported_cable")
-    exec(compile(python_module(found), "exported_cable.py", "exec"), module.__dict__)
+    exec(compile(python_module(computed), "exported_cable.py", "exec"), module.__dict__)
     return module
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("case", [*CASES, *CREEPING])
 def test_python_says_what_the_equations_say(case):
-    found = cable(case)
-    module, asked = module_of(found), points(found, 300, seed=3)
-    names = [level.name for level in found.levels]
-    rows = list(zip(*(asked[name] for name in ("level", "place", "force", "stroke", "speed")), strict=True))
+    tables = cable(case)
+    module, inputs = module_of(tables), points(tables, 300, seed=3)
+    names = [level.name for level in tables.levels]
+    rows = list(zip(*(inputs[name] for name in ("level", "place", "force", "stroke", "speed")), strict=True))
     answers = [module.output(names[level], *more) for level, *more in rows]
-    np.testing.assert_allclose(answers, of_equations(found, asked), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(answers, of_equations(tables, inputs), rtol=1e-12, atol=1e-12)
     needed = [module.input_force(names[level], *more) for level, *more in rows]
-    np.testing.assert_allclose(needed, of_equations(found, asked, inverse=True), rtol=1e-12, atol=1e-12)
-    assert module.is_outside(found.points.values[-1] + 1) == (case != "one place")
+    np.testing.assert_allclose(needed, of_equations(tables, inputs, inverse=True), rtol=1e-12, atol=1e-12)
+    assert module.is_outside(tables.points.values[-1] + 1) == (case != "one place")
 
 
 @pytest.mark.extended
 @pytest.mark.parametrize("case", [*CASES, *CREEPING])
 def test_python_follows_any_motion(case):
-    found, place = cable(case), float(np.mean(cable(case).points.values)) + 0.01
-    force, follow = motion(found, 4000)[::4], module_of(found).Motion("q95", place)
+    tables, place = cable(case), float(np.mean(cable(case).points.values)) + 0.01
+    force, follow = motion(tables, 4000)[::4], module_of(tables).Motion("q95", place)
     speed = changing_speed(len(force)) if case in CREEPING else np.full(len(force), 31.0)
     output = np.array([follow.step(f, v, 0.01) for f, v in zip(force, speed, strict=True)])
-    known = crept(found, 2, place, speed, force, 0.01) if case in CREEPING else followed(found, 2, place, 31.0, force)
-    np.testing.assert_allclose(output, known, rtol=1e-10, atol=1e-9)
+    reference = crept(tables, 2, place, speed, force, 0.01) if case in CREEPING else followed(tables, 2, place, 31.0, force)
+    np.testing.assert_allclose(output, reference, rtol=1e-10, atol=1e-9)
 
 
 def test_hostile_names_are_harmless_in_python_and_what_is_no_number_is_refused():
@@ -96,9 +96,9 @@ def test_the_estimate_goes_where_fits_of_windows_go_while_the_route_changes():
     for start in (6.0, 12.0, 42.0, 48.0, 54.0):  # windows in which the route stays
         window = slice(int(start / STEP), int((start + 6.0) / STEP), 4)
         batch = fit_loop(force[window], output[window]).exponent
-        at = int((start + 6.0) / STEP) - 1
-        assert low[at] - 0.003 < batch < high[at] + 0.003
-        assert abs(exponent[at] - batch) < 0.006
+        index = int((start + 6.0) / STEP) - 1
+        assert low[index] - 0.003 < batch < high[index] + 0.003
+        assert abs(exponent[index] - batch) < 0.006
     after = time > 3.0
     assert np.max(np.abs(exponent - _ramp(time))[after]) < 0.03  # it lags by a standing phase of the ramp
     inside = (low <= _ramp(time)) & (_ramp(time) <= high)
@@ -129,19 +129,19 @@ def test_when_nothing_slides_the_estimate_stays_and_its_interval_widens():
         (50.0 + NOISE * generator.standard_normal(800), 40.0 + NOISE * generator.standard_normal(800)),
     ):
         tracker = module_of(cable("rope")).Tracker(1.0, 0.01, NOISE)
-        before, variance = tracker.exponent, tracker.variance
+        initial, variance = tracker.exponent, tracker.variance
         exponent, low, high, slid = _track(tracker, force, output)
-        assert not slid.any() and np.all(exponent == before)
+        assert not slid.any() and np.all(exponent == initial)
         assert np.all(np.diff(high - low) >= 0) and tracker.variance == pytest.approx(variance + 0.01**2 * 800 * STEP)
 
 
 def test_it_begins_at_the_posterior_of_any_one_mounting():
-    found = cable("rope")
-    tracker = module_of(found).Tracker(1.5, 0.01, NOISE)
-    at = {level.name: float(np.interp(1.5, found.points.values, level.exponent[0])) for level in found.levels}
-    assert tracker.exponent == pytest.approx(at["q50"], rel=1e-12)
-    half = (at["mounting_q95"] - at["mounting_q05"]) / 2
-    assert tracker.interval[1] == pytest.approx(at["q50"] + half, rel=1e-12)
+    tables = cable("rope")
+    tracker = module_of(tables).Tracker(1.5, 0.01, NOISE)
+    route_points = {level.name: float(np.interp(1.5, tables.points.values, level.exponent[0])) for level in tables.levels}
+    assert tracker.exponent == pytest.approx(route_points["q50"], rel=1e-12)
+    half = (route_points["mounting_q95"] - route_points["mounting_q05"]) / 2
+    assert tracker.interval[1] == pytest.approx(route_points["q50"] + half, rel=1e-12)
 
 
 TRACKS = r"""
@@ -174,8 +174,8 @@ int main(void)
     [pytest.param(c, marks=pytest.mark.skipif(shutil.which(c) is None, reason=f"{c} is not here")) for c in ("gcc", "clang")],
 )
 def test_c_follows_friction_as_python_does(case, compiler, tmp_path):
-    found = cable(case)
-    (tmp_path / "bowden.h").write_text(c_header(found))
+    tables = cable(case)
+    (tmp_path / "bowden.h").write_text(c_header(tables))
     (tmp_path / "track.c").write_text(TRACKS)
     strict = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2")
     call = [compiler, *strict, "-o", "track", "track.c", "-lm"]
@@ -185,14 +185,14 @@ def test_c_follows_friction_as_python_does(case, compiler, tmp_path):
     force[500:520], output[700] = np.nan, 0.0
     rows = np.column_stack([np.full_like(force, 25.0), force, output])
     replied = subprocess.run([tmp_path / "track"], input=rows.tobytes(), capture_output=True, check=True).stdout
-    expected = _track(module_of(found).Tracker(1.5, 0.01, 0.1), force, output, 25.0)
+    expected = _track(module_of(tables).Tracker(1.5, 0.01, 0.1), force, output, 25.0)
     np.testing.assert_allclose(np.frombuffer(replied).reshape(-1, 4).T, expected, rtol=1e-9, atol=1e-12)
     assert expected[3].mean() > 0.05
 
 
 def test_the_module_needs_nothing_but_python(tmp_path):
     (tmp_path / "bowden.py").write_text(python_module(cable("lugre")))
-    asked = "import sys, bowden; print(bowden.output('q50', 1.0, 10.0, 1), 'numpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {asked}"],
+    program = "import sys, bowden; print(bowden.output('q50', 1.0, 10.0, 1), 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {program}"],
                           capture_output=True, text=True)  # fmt: skip
     assert done.returncode == 0 and done.stdout.endswith("False\n"), done.stderr

@@ -19,10 +19,10 @@ def read(text):
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_number_is_read_back_to_its_last_bit(case):
-    found = cable(case)
-    page = read(yaml_parameters(found))
-    np.testing.assert_array_equal(page["place"]["values"], found.points.values)
-    for level in found.levels:
+    tables = cable(case)
+    page = read(yaml_parameters(tables))
+    np.testing.assert_array_equal(page["place"]["values"], tables.points.values)
+    for level in tables.levels:
         for row, stroke in enumerate(("pull", "return")):
             np.testing.assert_array_equal(page["friction_exponent"][stroke][level.name], level.exponent[row])
         if case == "loop":
@@ -38,11 +38,11 @@ def test_every_number_is_read_back_to_its_last_bit(case):
 
 
 def test_what_may_be_fed_forward_is_a_torque_where_the_pulley_is_known():
-    found = replace(cable("loop"), radii=(20.0, 15.0))
-    page = read(yaml_parameters(found))
-    least = found.levels[LEVELS.index("mounting_q05")].taut_loss
+    tables = replace(cable("loop"), radii=(20.0, 15.0))
+    page = read(yaml_parameters(tables))
+    least = tables.levels[LEVELS.index("mounting_q05")].taut_loss
     np.testing.assert_allclose(page["feed_forward"]["coulomb_N_m"], 0.015 * least, rtol=1e-15)
-    np.testing.assert_allclose(page["coulomb_N_m"]["q50"], 0.015 * found.median.taut_loss, rtol=1e-15)
+    np.testing.assert_allclose(page["coulomb_N_m"]["q50"], 0.015 * tables.median.taut_loss, rtol=1e-15)
     assert page["feed_forward"]["probability_that_friction_exceeds_it"] == 0.95
     assert "coulomb_N_m" not in read(yaml_parameters(cable("loop")))
 
@@ -57,8 +57,8 @@ def test_hostile_names_are_harmless_in_yaml():
     about = replace(
         cable("rope").about, cable=HOSTILE, group=HOSTILE, distrust=HOSTILE, version=HOSTILE, created=HOSTILE
     )
-    found = replace(cable("rope"), about=about, points=replace(cable("rope").points, variable=HOSTILE, unit=HOSTILE))
-    text = yaml_parameters(found, {HOSTILE: HOSTILE, "share": {"q05": 1e-7}})
+    tables = replace(cable("rope"), about=about, points=replace(cable("rope").points, variable=HOSTILE, unit=HOSTILE))
+    text = yaml_parameters(tables, {HOSTILE: HOSTILE, "share": {"q05": 1e-7}})
     page = read(text)
     assert text.isascii()
     assert set(page) == {*read(yaml_parameters(cable("rope"), {"x": 1})), "warning", "group"}

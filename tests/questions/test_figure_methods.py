@@ -31,13 +31,13 @@ def test_the_figures_that_a_fit_has_are_listed_and_no_others(fit):
 
 
 def test_a_figure_is_matplotlibs_and_shows_itself(fit):
-    before = dict(mpl.rcParams)
+    initial = dict(mpl.rcParams)
     figure = fit.plot.efficiency()
     assert isinstance(figure, Figure)
     (data, size), wide = figure._repr_png_(), fit.plot("efficiency", width=(5, "in"))
     assert data.startswith(b"\x89PNG") and size["width"] == int(100 * figure.get_size_inches()[0])
     assert wide.get_size_inches()[0] == pytest.approx(5.0) == fit.plot.efficiency(width="127 mm").get_size_inches()[0]
-    assert dict(mpl.rcParams) == before
+    assert dict(mpl.rcParams) == initial
 
 
 @pytest.mark.extended
@@ -67,8 +67,8 @@ def test_a_figure_chooses_no_backend_and_loads_no_pyplot(on_body):
         "import matplotlib as m; chosen = m.rcParams._get('backend') is not m.rcsetup._auto_backend_sentinel; "
         "print('matplotlib.pyplot' in sys.modules, chosen)"
     )
-    found = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
-    assert found.stdout.split() == ["False", "False"], found
+    process = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert process.stdout.split() == ["False", "False"], process
 
 
 def test_a_figure_is_drawn_on_axes_of_the_user(fit):
@@ -95,10 +95,10 @@ def test_the_legend_of_a_page_goes_beside_that_of_a_panel():
     page.legend(handles=[Line2D([], [], label="Reading of the bench"), Line2D([], [], label="no panel's")])
     axes = page.subplots()
     handle = axes.errorbar([1], [1], [1], fmt="D", label="Reading of\nthe bench")
-    own = axes.legend([handle], ["own"])
+    legends = axes.legend([handle], ["own"])
     move_legend(page.legends[0], axes, [axes])
-    assert own in axes.get_children() and _words(axes.get_legend()) == ["Reading of the bench", "no panel's"]
-    assert isinstance(axes.get_legend().legend_handles[0], type(own.legend_handles[0]))  # a mark with its bar
+    assert legends in axes.get_children() and _words(axes.get_legend()) == ["Reading of the bench", "no panel's"]
+    assert isinstance(axes.get_legend().legend_handles[0], type(legends.legend_handles[0]))  # a mark with its bar
 
 
 def _words(legend):

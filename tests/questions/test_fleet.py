@@ -41,19 +41,19 @@ def test_the_shipped_fleet_is_what_its_plan_makes(run, tmp_path):
 
 def test_every_inspection_finds_its_truth(fitted):
     """Within 4.5 standard deviations of the draws: of twelve coefficients one is outside by chance once in ten thousand."""
-    found, results = fitted
-    assert found.is_trusted
+    answer, results = fitted
+    assert answer.is_trusted
     page = json.loads((FLEET / "truth.json").read_text())
-    population, drawn = page["population"], read_fleet_draws(results)
-    (meanings,) = drawn.about["meanings"].values()
+    population, fleet = page["population"], read_fleet_draws(results)
+    (meanings,) = fleet.about["meanings"].values()
     assert meanings == {"mu_sheath": "friction of sheath", "mu_edge": "friction of edge"}
-    for i, cable in enumerate(drawn.cable):
+    for i, cable in enumerate(fleet.cable):
         truth = page["cables"][cable]
-        more = truth["wear"] * drawn.cycles[i] / population["reference_cycles"]
-        more += population["lubrication"] * drawn.lubricated[i]
-        more += population["per_degree"] * (drawn.temperature[i] - population["reference_temperature"])
+        more = truth["wear"] * fleet.cycles[i] / population["reference_cycles"]
+        more += population["lubrication"] * fleet.lubricated[i]
+        more += population["per_degree"] * (fleet.temperature[i] - population["reference_temperature"])
         for name, start in truth["log_start"].items():
-            logs = np.log(drawn.values[name][i])
+            logs = np.log(fleet.values[name][i])
             assert abs(logs.mean() - start - more) < 4.5 * logs.std()
 
 
@@ -61,15 +61,15 @@ def test_every_inspection_finds_its_truth(fitted):
 def test_the_draws_are_those_of_single_fits(fitted):
     """Means to 0.1 and standard deviations to 15 %: what both know them to; one data set, one seed."""
     _, results = fitted
-    drawn = read_fleet_draws(results)
+    fleet = read_fleet_draws(results)
     table = FLEET / "readings" / "cable-01-0.csv"
     settings = ['tables.forces.file="readings/cable-01-0.csv"']
     single = bf.fit(FLEET / "fleet.toml", seed=1, settings=settings).posterior.values
     assert table.exists()
     for name in ("mu_sheath", "mu_edge", "tau", "sigma_F"):
-        one, other = np.log(drawn.values[name][0]), np.log(single[name].ravel())
-        assert abs(one.mean() - other.mean()) < 0.1 * other.std()
-        assert abs(one.std() / other.std() - 1) < 0.15
+        first, other = np.log(fleet.values[name][0]), np.log(single[name].ravel())
+        assert abs(first.mean() - other.mean()) < 0.1 * other.std()
+        assert abs(first.std() / other.std() - 1) < 0.15
 
 
 def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_path):
@@ -77,9 +77,9 @@ def test_draws_depend_neither_on_order_nor_on_what_else_is_fitted(fitted, tmp_pa
     together = read_fleet_draws(results)
     bf.fleet(some(tmp_path / "fleet", (4,)), output=tmp_path / "one", seed=7)
     alone = read_fleet_draws(tmp_path / "one")
-    where = together.label.index(alone.label[0])
+    index = together.label.index(alone.label[0])
     for name, draws in alone.values.items():
-        np.testing.assert_array_equal(draws[0], together.values[name][where])
+        np.testing.assert_array_equal(draws[0], together.values[name][index])
 
 
 @pytest.mark.extended

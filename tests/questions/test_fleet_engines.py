@@ -31,9 +31,9 @@ MORE = {  # a contact that hardly any run tells from the others
 def fleet(tmp_path_factory) -> Path:
     """A fleet of cables with three coefficients, of which a quarter go on from weighted draws to walkers."""
     folder, text = tmp_path_factory.mktemp("fleet"), BENCH.read_text()
-    for before, after in MORE.items():
-        assert before in text
-        text = text.replace(before, after)
+    for initial, after in MORE.items():
+        assert initial in text
+        text = text.replace(initial, after)
     (folder / "bench.toml").write_text(text)
     plan = read_fleet_plan(folder / "bench.toml")
     write_fleet(plan, *simulate_fleet(plan, 5), folder / "fleet")
@@ -53,8 +53,8 @@ def cluster():
     """A Dask cluster on this machine: two workers, which are replaced when they die."""
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as found:
-        yield found
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local_cluster:
+        yield local_cluster
 
 
 def by_dask(cluster) -> str:
@@ -99,14 +99,14 @@ def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(whole, fleet
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["local", "dask"])
 def test_a_client_that_is_killed_goes_on_and_writes_the_same_file(whole, fleet, tmp_path, engine, request):
-    where = by_dask(request.getfixturevalue("cluster")) if engine == "dask" else engine
-    words = [sys.executable, "-m", "bowdenfit", "fleet", fleet, "-o", tmp_path / "results", "--engine", where]
+    engine_used = by_dask(request.getfixturevalue("cluster")) if engine == "dask" else engine
+    words = [sys.executable, "-m", "bowdenfit", "fleet", fleet, "-o", tmp_path / "results", "--engine", engine_used]
     pieces = tmp_path / "results" / PIECES_FOLDER
     with subprocess.Popen([*words, "--seed", str(SEED)], stderr=subprocess.DEVNULL) as client:
         while client.poll() is None and not list(pieces.glob("*.npz")):
             time.sleep(0.005)
         client.kill()
     assert client.returncode == -signal.SIGKILL and not (tmp_path / "results" / FLEET_DRAWS).exists()
-    kept = len(list(pieces.glob("*.npz")))
+    count = len(list(pieces.glob("*.npz")))
     subprocess.run([*words, "--resume"], check=True, capture_output=True)
-    assert kept > 0 and (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole
+    assert count > 0 and (tmp_path / "results" / FLEET_DRAWS).read_bytes() == whole

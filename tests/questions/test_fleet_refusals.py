@@ -35,7 +35,7 @@ def fleet(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         ((ROWS[0], ROWS[1], ROWS[0]), "cable-01 after 0 cycles appears twice: fleet.csv, row 2 and fleet.csv, row 4"),
         ((ROWS[1], ROWS[0]), "cycles run backwards: fleet.csv, row 3 (cable-01: 0 after 25000 in row 2)"),
@@ -45,24 +45,24 @@ def fleet(tmp_path):
         ((ROWS[0].replace("readings/", "gone/"),), "none of 1 inspections can be fitted"),
     ],
 )
-def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path, rows, said):
-    assert said in refuse("fleet", fleet(*rows), "-o", tmp_path / "results")
+def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path, rows, message):
+    assert message in refuse("fleet", fleet(*rows), "-o", tmp_path / "results")
 
 
 @pytest.mark.parametrize(
-    ("engine", "code", "said"),
+    ("engine", "code", "message"),
     [
         ("dask://127.0.0.1:9", 1, "does not answer"),
         ("slurm", 2, "there is no Slurm here"),
         ("ray", 2, "there is no engine 'ray'"),
     ],
 )
-def test_an_engine_that_cannot_be_had_leaves_nothing_behind(run, fleet, tmp_path, monkeypatch, engine, code, said):
+def test_an_engine_that_cannot_be_had_leaves_nothing_behind(run, fleet, tmp_path, monkeypatch, engine, code, message):
     monkeypatch.setenv("PATH", str(tmp_path))  # no Slurm on any machine
     monkeypatch.setattr(engines, "_CONNECT_SECONDS", 1.0)
     results = tmp_path / "results"
-    found, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)
-    assert found == code and said in " ".join(error.split()) and "Traceback" not in error
+    exit_code, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)
+    assert exit_code == code and message in " ".join(error.split()) and "Traceback" not in error
     assert not results.exists()
 
 
@@ -71,23 +71,23 @@ def test_broken_inspections_are_named_and_the_others_go_on(fleet):
     other = fleet(ROWS[0], *ROWS[3:5], ROWS[6].replace("cable-03-0", "cable-01-0"), "own,0,20,no,own")
     (other / "readings" / "cable-02-0.csv").unlink()
     (other / "readings" / "cable-02-25000.csv").write_bytes(b"\x00\xff\x13 no table")
-    own = other / "own"
-    (own / "readings").mkdir(parents=True)
+    own_density = other / "own"
+    (own_density / "readings").mkdir(parents=True)
     text = (
         (FLEET / "fleet.toml")
         .read_text()
         .replace("mu_edge", "mu_ring")
         .replace("forces.csv", "readings/cable-04-0.csv")
     )
-    (own / "cable.toml").write_text(text)
-    shutil.copy(FLEET / "readings" / "cable-04-0.csv", own / "readings")
-    found = list(read_cases(other, read_inspections(other), {}))
-    broken = {each.inspection: each.why for each in found if hasattr(each, "why")}
+    (own_density / "cable.toml").write_text(text)
+    shutil.copy(FLEET / "readings" / "cable-04-0.csv", own_density / "readings")
+    cases = list(read_cases(other, read_inspections(other), {}))
+    broken = {case.inspection: case.why for case in cases if hasattr(case, "why")}
     assert set(broken) == {"cable-02 after 0 cycles", "cable-02 after 25000 cycles", "cable-03 after 0 cycles"}
     assert "has the readings of cable-01 after 0 cycles to the last digit" in broken["cable-03 after 0 cycles"]
-    fitted = [each for each in found if not hasattr(each, "why")]
-    assert [each.inspection.cable for each in fitted] == ["cable-01", "own"]
-    assert len({each.shaped.key for each in fitted}) == 2
+    fitted = [case for case in cases if not hasattr(case, "why")]
+    assert [item.inspection.cable for item in fitted] == ["cable-01", "own"]
+    assert len({item.shaped.key for item in fitted}) == 2
 
 
 class Dying(ThreadPoolExecutor):
@@ -159,8 +159,8 @@ def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
 
 def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
     """The work says with which versions it was made."""
-    here = installed_versions()
-    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.installed_versions", lambda: here | {"jax": "0.0.1"})
+    installed = installed_versions()
+    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.installed_versions", lambda: installed | {"jax": "0.0.1"})
     with pytest.raises(bf.UsageError, match=r"a worker has other versions: jax .* \(here 0\.0\.1\)"):
         bf.fleet(fleet(ROWS[0]), seed=1)
 
@@ -168,12 +168,12 @@ def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
 def test_a_full_disk_is_a_sentence_and_what_was_kept_goes_on(run, fleet, tmp_path, monkeypatch):
     folder, results = fleet(*ROWS[:20]), tmp_path / "results"
     begin = ("fleet", folder, "-o", results, "--seed", 7)
-    kept, keep = list[int](), FleetStore.keep
+    history, keep = list[int](), FleetStore.keep
 
     def full(store, fits):
-        if kept:
+        if history:
             raise OSError(errno.ENOSPC, "No space left on device")
-        kept.append(len(fits))
+        history.append(len(fits))
         keep(store, fits)
 
     with monkeypatch.context() as disk:

@@ -28,18 +28,18 @@ def _here(label, mu, load, trusted_law, strokes=(1, -1, 0), shown=True, sign=(1.
     return ForcesAtBend(label, force, read, stroke, off, mu * slides, load, law, apparent, mu, shown)
 
 
-def _forces(n=1, lowest=1.0, highest=10.0, trusted=True, drawn=True, logarithmic=False, names="{} deg"):
+def _forces(n=1, lowest=1.0, highest=10.0, trusted=True, draws=True, logarithmic=False, names="{} deg"):
     load = np.geomspace(lowest, highest, 21)
     places = tuple(_here(names.format(30 * i), 0.1 + 0.01 * i, load, trusted, shown=i < MOST_PLACES) for i in range(n))
-    if not drawn:
+    if not draws:
         places = tuple(replace(p, law=p.law[1:2], apparent_law=p.apparent_law[1:2]) for p in places)
-    spread = np.full(21, 3.0) if drawn else np.zeros(0)
+    spread = np.full(21, 3.0) if draws else np.zeros(0)
     return ForcesData(places, load, spread, "capstan", trusted, "" if trusted else LONG, logarithmic, 0 if n == 1 else 9600)
 
 
 CASES = {
     "one bend": _forces(),
-    "three bends without draws": _forces(3, drawn=False),
+    "three bends without draws": _forces(3, draws=False),
     "many bends": _forces(9),
     "one newton, not trusted": _forces(2, 0.01, 1.0, trusted=False, logarithmic=True),
     "ten kilonewtons": _forces(2, 10.0, 20_000.0, trusted=False, logarithmic=True),
@@ -55,19 +55,19 @@ def test_nothing_overlaps_or_leaves_the_page(case):
 
 @pytest.mark.parametrize(("wide", "shown"), [(0.9, True), (40.0, False)], ids=["wide", "no end"])
 def test_the_band_of_the_coefficient_is_seen_whole_unless_readings_would_shrink_to_a_line(wide, shown):
-    (here,) = _forces().places
-    band = here.apparent_law[1] * np.array([1 - wide, 1.0, 1 + wide])[:, None, None]
-    beside = forces_figure.draw(replace(_forces(), places=(replace(here, apparent_law=band),))).axes[2]
-    low, high = beside.get_ylim()
+    (panel,) = _forces().places
+    band = panel.apparent_law[1] * np.array([1 - wide, 1.0, 1 + wide])[:, None, None]
+    neighbors = forces_figure.draw(replace(_forces(), places=(replace(panel, apparent_law=band),))).axes[2]
+    low, high = neighbors.get_ylim()
     assert (low <= band.min() and band.max() <= high) == shown
     assert high - low < 0.3  # of a coefficient of 0.1
 
 
 @pytest.mark.parametrize("trusted", [True, False])
 def test_the_verdict_stands_above_the_readings(trusted):
-    said = " ".join(text for text, _ in words(forces_figure.draw(_forces(trusted=trusted)))).replace("\n", " ")
-    assert ("follow the fitted law (capstan)" in said) == trusted
-    assert ("Not trusted. The model does not describe force runs" in said) != trusted and "and so on" not in said
+    message = " ".join(text for text, _ in words(forces_figure.draw(_forces(trusted=trusted)))).replace("\n", " ")
+    assert ("follow the fitted law (capstan)" in message) == trusted
+    assert ("Not trusted. The model does not describe force runs" in message) != trusted and "and so on" not in message
 
 
 @pytest.fixture(scope="module")
@@ -84,25 +84,25 @@ def drag(tmp_path_factory):
 def test_the_law_goes_through_the_readings_only_where_it_is_theirs(drag):
     right, wrong = drag["drag"], drag["capstan"]
     assert right.trusted and not wrong.trusted and right.logarithmic
-    assert [here.label for here in right.places] == ["90 deg", "180 deg"]
-    for here in right.places:
-        assert np.abs(here.off).max() < 0.5
+    assert [place.label for place in right.places] == ["90 deg", "180 deg"]
+    for panel in right.places:
+        assert np.abs(panel.off).max() < 0.5
         for i, stroke in enumerate((1, -1)):
-            mine = here.stroke == stroke
-            law = np.exp(np.interp(np.log(here.input_force[mine]), np.log(here.load), np.log(here.law[0, i])))
-            np.testing.assert_allclose(law, here.output_force[mine], rtol=0.01)
-    assert max(np.abs(here.off).max() for here in wrong.places) > 10
+            mask = panel.stroke == stroke
+            law = np.exp(np.interp(np.log(panel.input_force[mask]), np.log(panel.load), np.log(panel.law[0, i])))
+            np.testing.assert_allclose(law, panel.output_force[mask], rtol=0.01)
+    assert max(np.abs(place.off).max() for place in wrong.places) > 10
 
 
 def test_apparent_friction_is_the_log_ratio_over_the_bend_and_falls_with_the_load_of_a_drag(drag):
-    here = drag["drag"].places[1]
-    pulled = here.stroke == 1
-    ratio = np.log(here.input_force[pulled] / here.output_force[pulled])
-    np.testing.assert_allclose(here.apparent[pulled], ratio / np.pi)
-    assert here.apparent[pulled][0] > 1.5 * here.apparent[pulled][-1]
-    assert here.apparent_law[0, 0, 0] > 1.5 * here.apparent_law[0, 0, -1]
+    panel = drag["drag"].places[1]
+    pulled = panel.stroke == 1
+    ratio = np.log(panel.input_force[pulled] / panel.output_force[pulled])
+    np.testing.assert_allclose(panel.apparent[pulled], ratio / np.pi)
+    assert panel.apparent[pulled][0] > 1.5 * panel.apparent[pulled][-1]
+    assert panel.apparent_law[0, 0, 0] > 1.5 * panel.apparent_law[0, 0, -1]
     level = drag["capstan"].places[1].apparent_law[0]
-    assert np.ptp(level) < 1e-6 and level[0, 0] == pytest.approx(here.capstan, rel=0.2)
+    assert np.ptp(level) < 1e-6 and level[0, 0] == pytest.approx(panel.capstan, rel=0.2)
 
 
 @pytest.mark.extended
@@ -114,6 +114,6 @@ def test_held_readings_have_no_residual_and_of_many_some_are_shown(tmp_path):
     held = [line.replace("pull", "hold") if number == 0 else line for line, number in zip(text[1:], stroke, strict=True)]
     (folder / "forces.csv").write_text("\n".join([text[0], *held]) + "\n")
     forces = dict(collect_figure_data(bf.fit(folder, mcmc=False), ["forces"]))["forces"]
-    (here,) = forces.places
-    assert forces.count == len(rows.stroke) > len(here.stroke) == MOST_READINGS
-    assert np.isnan(here.off[here.stroke == 0]).all() and np.isfinite(here.off[here.stroke != 0]).all()
+    (panel,) = forces.places
+    assert forces.count == len(rows.stroke) > len(panel.stroke) == MOST_READINGS
+    assert np.isnan(panel.off[panel.stroke == 0]).all() and np.isfinite(panel.off[panel.stroke != 0]).all()

@@ -127,8 +127,8 @@ def test_bad_gaits_are_refused_in_words(fit, quick_results, swing, refuse, tmp_p
 
 
 def test_springs_and_dynamic_ranges_that_cannot_be_told_are_refused(fit):
-    at = {"wrap_angles": [(90, "deg")]}
-    for asked, words in (
+    options = {"wrap_angles": [(90, "deg")]}
+    for request, words in (
         ({"quantity": "stiffness", "spring": (5, "N")}, "does not measure a stiffness"),
         ({"quantity": "friction", "spring": (5, "N/mm")}, "does not depend on --spring, which is asked of stiffness; leave"),
         ({"quantity": "friction", "input_force": (50, "N")}, "does not depend on --input-force, which is asked of eff"),
@@ -138,4 +138,4 @@ def test_springs_and_dynamic_ranges_that_cannot_be_told_are_refused(fit):
         ({"quantity": "dynamic-range"}, "asked of pull-pull loops"),
     ):
         with pytest.raises(UsageError, match=words):
-            bf.predict(fit, **asked, **at)
+            bf.predict(fit, **request, **options)

@@ -46,9 +46,9 @@ def test_a_contrast_is_said_in_summary_json_and_notebook(fitted):
     assert contrast.difference.median == pytest.approx(np.median(draws)) == pytest.approx(-0.04, abs=0.015)
     assert contrast.probability == pytest.approx(np.mean(draws < 0))
     page = (fitted / "by-group" / "summary.txt").read_text()
-    said = " ".join(page.split())
+    text = " ".join(page.split())
     assert faults(page) == []
-    assert f"new minus old: {contrast.difference.median:.4f}, 90 % interval" in said and "different (lower) with prob" in said
+    assert f"new minus old: {contrast.difference.median:.4f}, 90 % interval" in text and "different (lower) with prob" in text
     (page,) = json.loads((fitted / "by-group" / "summary.json").read_text())["groups"]["contrasts"]
     assert page["difference"]["q95"] == contrast.difference.q95 and page["in_words"] == str(contrast)
     other = fit.groups.contrast("old", "new").difference
@@ -66,21 +66,21 @@ def test_groups_that_share_a_coefficient_and_should_not_are_not_trusted(fitted):
 
 
 def test_compare_tells_whether_groups_differ(fitted, accept):
-    found = bf.compare({name: bf.load(fitted / name) for name in ("capstan", "by-group")})
-    assert found.best == "by-group"
+    comparison = bf.compare({name: bf.load(fitted / name) for name in ("capstan", "by-group")})
+    assert comparison.best == "by-group"
     assert "by-group" in accept("compare", fitted / "capstan", fitted / "by-group")
 
 
 def test_groups_that_do_not_differ_are_not_said_to(tmp_path):
     """The same readings in both groups: either sign is as probable, and shared coefficients describe them."""
     dataset = _folder(tmp_path / "alike", true={"new": 0.12, "old": 0.12}, alike=True)
-    found = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
-    assert found.probability < 0.55 and abs(found.difference.median) < 0.1 * found.difference.sd
+    contrast = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
+    assert contrast.probability < 0.55 and abs(contrast.difference.median) < 0.1 * contrast.difference.sd
     assert bf.fit(dataset, seed=1, mcmc=False).verdict().trusted
 
 
 def test_one_mounting_of_each_group_is_warned_of_and_leaves_them_alike(tmp_path, accept):
     dataset = _folder(tmp_path / "once", mountings=1)
     assert "new and old: measured in one mounting of the cable each" in accept("check", dataset, "--friction", "by-group")
-    known = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
-    assert known.difference.sd > 0.01  # a mounting's scatter, whose prior alone speaks, over 180 deg
+    reference = bf.fit(dataset, friction="by-group", seed=1, settings=QUICK).groups.contrast("new", "old")
+    assert reference.difference.sd > 0.01  # a mounting's scatter, whose prior alone speaks, over 180 deg

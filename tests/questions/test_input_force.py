@@ -52,17 +52,17 @@ def test_the_input_force_for_an_output_force_gives_that_output_force(friction, s
     mounting = np.linspace(-0.05, 0.05, len(z))
     with jax.enable_x64(True):
         (needed,) = output_force_at(model, z, np.zeros(1), 70.0, stroke, (mounting,), inverse=True)
-        for one in (0, 7, 19):
-            mine = slice(one, one + 1)
-            (back,) = output_force_at(model, z[mine], np.zeros(1), float(needed[one, 0]), stroke, (mounting[mine],))
+        for row in (0, 7, 19):
+            rows = slice(row, row + 1)
+            (back,) = output_force_at(model, z[rows], np.zeros(1), float(needed[row, 0]), stroke, (mounting[rows],))
             assert back[0, 0] == pytest.approx(70.0, rel=1e-9)
 
 
 @settings(deadline=None)
 @given(st.floats(-200, 200), st.floats(0, 50), st.floats(0, 2), st.sampled_from([1.0, -1.0]))
 def test_the_input_force_of_a_loop_gives_the_output_force_back(output, preload, exponent, stroke):
-    rest = jnp.asarray(preload), jnp.asarray(exponent), jnp.asarray(stroke)
-    back = loop_output_force(loop_input_force(jnp.asarray(output), *rest), *rest)
+    remainder = jnp.asarray(preload), jnp.asarray(exponent), jnp.asarray(stroke)
+    back = loop_output_force(loop_input_force(jnp.asarray(output), *remainder), *remainder)
     assert float(back) == pytest.approx(output, rel=1e-9, abs=1e-9)
 
 
@@ -86,7 +86,7 @@ def test_a_force_that_takes_more_than_was_measured_says_so(fit):
 
 
 @pytest.mark.parametrize(
-    ("asked", "says"),
+    ("options", "says"),
     [
         ({"output_force": (70.0, "N"), "input_force": (70.0, "N")}, "leave one of them out"),
         ({"output_force": (70.0, "mm")}, "--output-force"),
@@ -95,6 +95,6 @@ def test_a_force_that_takes_more_than_was_measured_says_so(fit):
         ({"quantity": "input-force"}, "as --output-force 100N"),
     ],
 )
-def test_what_does_not_go_together_is_refused(fit, asked, says):
+def test_what_does_not_go_together_is_refused(fit, options, says):
     with pytest.raises(UsageError, match=says):
-        bf.predict(fit, **asked)
+        bf.predict(fit, **options)

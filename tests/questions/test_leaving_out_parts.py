@@ -48,14 +48,14 @@ def test_leaving_out_a_part_is_the_likelihood_of_the_other_readings(tmp_path, fr
         z = 0.5 * np.random.default_rng(2).standard_normal((5, posterior.model.space.size))
         assert len(parts.labels) == (3 * 2 * 8 if unit == "load" else 180)
         i = len(parts.labels) // 2
-        kept = _without(term.rows, i, unit)
-        others = replace(term, data=sum_runs(term.cable, kept), rows=kept)
-        found, _ = readings.evaluate(z, i)
-        for density, each in zip(found, z, strict=True):
-            values = posterior.model.space.constrain(jnp.asarray(each))
-            exact = jnp.sum(others.log_likelihood(values, others.data)) - 0.5 * each @ each
+        selected_rows = _without(term.rows, i, unit)
+        remaining = replace(term, data=sum_runs(term.cable, selected_rows), rows=selected_rows)
+        computed, _ = readings.evaluate(z, i)
+        for density, item in zip(computed, z, strict=True):
+            values = posterior.model.space.constrain(jnp.asarray(item))
+            exact = jnp.sum(remaining.log_likelihood(values, remaining.data)) - 0.5 * item @ item
             assert density == pytest.approx(float(exact), abs=1e-8)
-        assert parts.event_keys[i, 0] == len(term.rows.run) - len(kept.run)
+        assert parts.event_keys[i, 0] == len(term.rows.run) - len(selected_rows.run)
 
 
 def _without(rows, i, unit):
@@ -64,12 +64,12 @@ def _without(rows, i, unit):
     groups = []
     for r in np.unique(run):
         for stroke in (-1, 1):
-            mine = np.flatnonzero((run == r) & (rows.stroke == stroke))
-            mine = mine[np.argsort(rows.input_force[mine], kind="stable")]
-            groups += np.array_split(mine, 8) if unit == "load" else [np.array([k]) for k in np.sort(mine)]
-    kept = ~np.isin(np.arange(len(run)), groups[i])
-    arrays = {name: value[kept] for name, value in vars(rows).items() if name not in ("angles", "unused")}
-    return replace(rows, **arrays, angles={name: value[kept] for name, value in rows.angles.items()})
+            mask = np.flatnonzero((run == r) & (rows.stroke == stroke))
+            mask = mask[np.argsort(rows.input_force[mask], kind="stable")]
+            groups += np.array_split(mask, 8) if unit == "load" else [np.array([k]) for k in np.sort(mask)]
+    selected = ~np.isin(np.arange(len(run)), groups[i])
+    arrays = {name: value[selected] for name, value in vars(rows).items() if name not in ("angles", "unused")}
+    return replace(rows, **arrays, angles={name: value[selected] for name, value in rows.angles.items()})
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +80,10 @@ def one_run(tmp_path_factory):
 
 @pytest.mark.slow
 def test_with_one_run_its_loads_are_left_out_and_the_right_model_is_preferred(one_run):
-    found = bf.compare(one_run)
-    assert found.best == "drag" and found.verdict("capstan") == "clear"
-    assert found.left_out == "load" and len(found.readings) == 16
-    text = " ".join(comparison_text(found).split())
+    comparison = bf.compare(one_run)
+    assert comparison.best == "drag" and comparison.verdict("capstan") == "clear"
+    assert comparison.left_out == "load" and len(comparison.readings) == 16
+    text = " ".join(comparison_text(comparison).split())
     assert "there is one run" in text and "The data prefer drag over capstan" in text
     assert "inf" not in text.replace("inform", "")
 

@@ -44,8 +44,8 @@ def test_drag_is_said_as_the_hidden_tension_and_as_the_force_that_it_costs(drag)
     lost_force = compute_lost_force(drag[0])
     assert abs(lost_force.hidden_tension.median - HIDDEN) < 4 * lost_force.hidden_tension.sd < 0.8
     assert abs(lost_force.lost.median - HIDDEN * 0.25) < 4 * lost_force.lost.sd < 0.2
-    said = " ".join((drag[1] / "details.txt").read_text().split())
-    assert "of the force is lost at any load, as if 2." in said and "of tension did not show at the cells" in said
+    text = " ".join((drag[1] / "details.txt").read_text().split())
+    assert "of the force is lost at any load, as if 2." in text and "of tension did not show at the cells" in text
     page = json.loads((drag[1] / "summary.json").read_text())
     assert page["drag"]["lost_force_N"]["median"] == pytest.approx(lost_force.lost.median)
     assert page["drag"]["hidden_tension_N"]["median"] == pytest.approx(lost_force.hidden_tension.median)
@@ -64,14 +64,14 @@ def test_the_force_lost_is_what_a_bench_without_hidden_tension_would_deliver_mor
 def test_an_efficiency_that_depends_on_the_load_is_said_with_its_force(drag):
     rows = json.loads((drag[1] / "summary.json").read_text())["measured"]
     assert all(LOADS[0] < row["input_force_N"] <= 1.02 * LOADS[-1] for row in rows)
-    said = " ".join((drag[1] / "details.txt").read_text().split())
-    assert "at input" in said and "measured efficiencies hold at the force given with them" in said
+    text = " ".join((drag[1] / "details.txt").read_text().split())
+    assert "at input" in text and "measured efficiencies hold at the force given with them" in text
 
 
 def test_predictions_outside_the_loads_measured_are_marked_in_text_and_json(drag, accept):
-    def notes(*asked):
-        rows = json.loads(accept("predict", drag[1], *asked, "--json"))
-        text = " ".join(accept("predict", drag[1], *asked).split())
+    def notes(*request):
+        rows = json.loads(accept("predict", drag[1], *request, "--json"))
+        text = " ".join(accept("predict", drag[1], *request).split())
         assert all(row["note"] in text for row in rows)
         return rows
 
@@ -109,7 +109,7 @@ def test_the_figure_of_the_efficiency_says_at_which_force_its_curve_holds(tmp_pa
     lengths = (440.0, 480.0, 520.0, 540.0)
     rows = pull(np.random.default_rng(6), lengths, [0.5, 0.4, 0.3, 0.25], LOADS, noise=(0.05, 0.05), drag=HIDDEN)
     write(tmp_path, rows, LENGTHS.replace("gaussian", "line"), "cable_length_mm")
-    angles = "\n".join(f"{at},{180 - (at - 440) * 0.9}" for at in range(440, 541, 10))
+    angles = "\n".join(f"{length},{180 - (length - 440) * 0.9}" for length in range(440, 541, 10))
     (tmp_path / "angles.csv").write_text(f"cable_length_mm,sheath_angle_deg\n{angles}\n")
     for friction, says in (("drag", "curve at 14 N"), ("capstan", "")):
         figure = draw(data(bf.fit(tmp_path, friction=friction, mcmc=False)))

@@ -35,8 +35,8 @@ def recorded(seconds=12.0, rate=50.0, exponent=0.3):
     force = 60 + 40 * np.sin(2 * np.pi * time / 4)
     output = np.empty_like(force)
     state = force[0] * np.exp(-exponent)
-    for i, each in enumerate(force):
-        state = min(max(state, each * np.exp(-exponent)), each * np.exp(exponent))
+    for i, value in enumerate(force):
+        state = min(max(state, value * np.exp(-exponent)), value * np.exp(exponent))
         output[i] = state
     return time, force + 0.1 * GENERATOR.normal(size=len(time)), output + 0.1 * GENERATOR.normal(size=len(time))
 
@@ -95,8 +95,8 @@ def test_tensions_called_t1_and_t2_are_no_clocks(tmp_path):
 def test_few_rows_with_a_slow_clock_could_be_either_and_each_command_works(run, tmp_path, step, n):
     path = write(tmp_path, ("time (s)", "F_in (N)", "F_out (N)"), (step * np.arange(n), *trials(n)))
     _, out, _ = run("check", path)
-    said = f"a table of readings or a recording; it has a column of time, 'time (s)', but only {n} rows"
-    assert said in " ".join(out.split())
+    message = f"a table of readings or a recording; it has a column of time, 'time (s)', but only {n} rows"
+    assert message in " ".join(out.split())
     of_table, of_recording = command(out)
     assert "--column" in of_table and "--channel" in of_recording
     assert run("check", *of_table[1:])[0] == 0
@@ -112,10 +112,10 @@ def test_a_time_column_beside_runs_or_strokes_leaves_readings(tmp_path):
     assert "run" in guess.why
 
 
-@pytest.mark.parametrize("beside", ["direction", "run", "Efficiency (%)"])
-def test_samples_of_a_fast_clock_are_not_taken_for_readings_whatever_stands_beside_them(tmp_path, beside):
+@pytest.mark.parametrize("extra", ["direction", "run", "Efficiency (%)"])
+def test_samples_of_a_fast_clock_are_not_taken_for_readings_whatever_stands_beside_them(tmp_path, extra):
     time, force, output = recorded()
-    columns = ("time (s)", beside, "Cell A (N)", "Cell B (N)"), (time, 50.0 + 0 * time, force, output)
+    columns = ("time (s)", extra, "Cell A (N)", "Cell B (N)"), (time, 50.0 + 0 * time, force, output)
     assert guess_file_kind(write(tmp_path, *columns)).kind == "recordings"
     with pytest.raises(bf.DatasetError, match="could be a table of readings or a recording"):
         bf.read(write(tmp_path, *columns), wrap_angle=(180, "deg"))
@@ -262,10 +262,10 @@ def test_what_the_command_could_not_fit_ends_with_2_and_says_so(run, tmp_path):
     without_unit = write(tmp_path, ("Fin (N)", "Fout"), (load, output), "both.csv")
     above_one = write(tmp_path, ("cable_length_mm", "efficiency_percent"), ((440, 470), (77, 177)), "above.csv")
     both = ("does not state its unit", "are swapped")
-    for path, said in ((more_out_than_in, ("are swapped",)), (without_unit, both), (above_one, ("is above 1",))):
+    for path, message in ((more_out_than_in, ("are swapped",)), (without_unit, both), (above_one, ("is above 1",))):
         code, out, _ = run("check", path)
         assert code == 2 and "To fit it once that is corrected:" in out
-        assert all(words in " ".join(out.split()) for words in said), out
+        assert all(words in " ".join(out.split()) for words in message), out
         (words,) = command(out)
         assert run(*words, "--no-mcmc", "--output", tmp_path / "fit")[0] == 2
 

@@ -17,27 +17,27 @@ def fit(quick_fit):
 
 
 def test_shares_are_coefficient_times_angle_over_their_sum_draw_by_draw(fit):
-    found = loss_by_contact(fit)
-    at = float(np.median(fit.posterior.optimum["optimal_length"]))
+    losses = loss_by_contact(fit)
+    best_length = float(np.median(fit.posterior.optimum["optimal_length"]))
     grid, curves = fit.along_route.grid, fit.along_route.curves
 
     def angle(column):
-        return np.deg2rad(np.array([np.interp(at, grid, row) for row in curves[column]]))
+        return np.deg2rad(np.array([np.interp(best_length, grid, row) for row in curves[column]]))
 
-    drawn = {name: fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3")}
+    draws = {name: fit.posterior.values[name].ravel() for name in ("mu1", "mu2", "mu3")}
     lost = {
-        "free sheath": drawn["mu1"] * angle("free_sheath_angle"),
-        "squeezed sheath": drawn["mu2"] * angle("squeezed_sheath_angle"),
-        "bracket edge": drawn["mu3"] * np.pi / 4,
+        "free sheath": draws["mu1"] * angle("free_sheath_angle"),
+        "squeezed sheath": draws["mu2"] * angle("squeezed_sheath_angle"),
+        "bracket edge": draws["mu3"] * np.pi / 4,
     }
     total = sum(lost.values())
-    for contact in found.contacts:
+    for contact in losses.contacts:
         share = lost[contact.contact] / total
         assert contact.share.median == pytest.approx(np.median(share), abs=1e-4)  # the grid is interpolated here
         assert contact.share.q05 == pytest.approx(np.quantile(share, 0.05), abs=1e-4)
-    assert [c.contact for c in found.contacts] == ["bracket edge", "squeezed sheath", "free sheath"]
-    assert sum(c.share.mean for c in found.contacts) == pytest.approx(1)
-    assert sum(c.probability_largest for c in found.contacts) == pytest.approx(1)
+    assert [c.contact for c in losses.contacts] == ["bracket edge", "squeezed sheath", "free sheath"]
+    assert sum(c.share.mean for c in losses.contacts) == pytest.approx(1)
+    assert sum(c.probability_largest for c in losses.contacts) == pytest.approx(1)
 
 
 def test_the_answer_says_where_to_work_on_the_cable(fit):

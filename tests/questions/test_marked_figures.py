@@ -25,19 +25,19 @@ def unfinished(on_body, tmp_path_factory):
 
 def unmarked(folder):
     """Drawings of a folder without the mark."""
-    drawn = sorted(folder.glob("*.svg"))
-    assert drawn
-    return [path.stem for path in drawn if MARK not in path.read_text()]
+    figures = sorted(folder.glob("*.svg"))
+    assert figures
+    return [path.stem for path in figures if MARK not in path.read_text()]
 
 
 @pytest.mark.slow
 def test_all_figures_of_a_refused_fit_and_their_captions_are_marked(unfinished, tmp_path):
     fit, folder = unfinished
     assert warning_mark(fit.verdict().troubles) == "Do not use: this fit is not converged and not identifiable."
-    drawn = list((folder / "figures").glob("*.png"))
+    figures = list((folder / "figures").glob("*.png"))
     bf.plot(fit, tmp_path / "again", formats=["png", "svg"])
     assert unmarked(tmp_path / "again") == []
-    assert len(drawn) > 5 and all(path.read_bytes() == (tmp_path / "again" / path.name).read_bytes() for path in drawn)
+    assert len(figures) > 5 and all(path.read_bytes() == (tmp_path / "again" / path.name).read_bytes() for path in figures)
     captions = (folder / "figures" / "captions.txt").read_text().split("\n\n")
     assert all(MARK in " ".join(caption.split()) for caption in captions)
 
@@ -59,8 +59,8 @@ def test_figures_of_a_notebook_and_of_the_report_are_marked(unfinished, tmp_path
 
 def test_no_figure_of_a_good_fit_is_marked(quick_fit, quick_results, tmp_path):
     bf.plot(quick_results, tmp_path / "again", formats=["svg"])
-    drawn = list((tmp_path / "again").glob("*.svg"))
-    assert drawn and not any("Do not use" in path.read_text() for path in drawn)
+    figures = list((tmp_path / "again").glob("*.svg"))
+    assert figures and not any("Do not use" in path.read_text() for path in figures)
     assert "Do not use" not in (quick_results / "figures" / "captions.txt").read_text()
     assert not any("Do not use" in text.get_text() for text in quick_fit.plot.pairs().findobj(Text))
 

@@ -39,8 +39,8 @@ def test_a_hidden_tension_is_told_by_the_lowest_load(advice):
 
 @pytest.mark.slow
 def test_the_advice_says_which_load_and_stroke(fit, advice):
-    said = " ".join(next_measurement_text(advice, 5).split())
-    assert "That is a run like those made so far: 6 readings at" in said and "pulling and returning" in said and "64 N" in said
+    text = " ".join(next_measurement_text(advice, 5).split())
+    assert "That is a run like those made so far: 6 readings at" in text and "pulling and returning" in text and "64 N" in text
     assert bf.next_measurement(fit, "drag", ["force@180deg,4N,pull"]).within is None
 
 

@@ -72,8 +72,8 @@ def pretended(dataset: Dataset, center: np.ndarray | dict[str, float], spread: f
     shown = for_each_draw(value_function(model), model.space.size)(z)
     best = for_each_draw(make_optimizer(model), model.space.size)(z) if model.description.route else ()
     optimum = {name: b[None] for name, b in zip(("optimal_length", "optimal_efficiency"), best, strict=False)}
-    drawn = Draws(z[None], {k: v[None] for k, v in shown.items()}, optimum, {}, {}, {}, {}, {}, 1, n, 0.3)
-    return Fit(dataset, None, drawn, True, (), Origin(1, {}))  # type: ignore[arg-type]
+    draws = Draws(z[None], {k: v[None] for k, v in shown.items()}, optimum, {}, {}, {}, {}, {}, 1, n, 0.3)
+    return Fit(dataset, None, draws, True, (), Origin(1, {}))  # type: ignore[arg-type]
 
 
 # How much a reading explains --------------------------------------------------------------------------------------
@@ -84,16 +84,16 @@ def test_a_linear_reading_explains_the_squared_correlation():
     generator = np.random.default_rng(1)
     answer = generator.standard_normal(N)
     for noise in (0.3, 1.0, 3.0):
-        found = explained_share((answer + noise * generator.standard_normal(N))[:, None], answer)
-        assert abs(found.share - 1 / (1 + noise**2)) < 4.5 * found.error
-        assert 0 < found.error < 0.02
+        share = explained_share((answer + noise * generator.standard_normal(N))[:, None], answer)
+        assert abs(share.share - 1 / (1 + noise**2)) < 4.5 * share.error
+        assert 0 < share.error < 0.02
 
 
 def test_curved_dependence_counts_where_correlation_sees_nothing():
     x, noise = np.random.default_rng(2).standard_normal((2, N))
-    found = explained_share((x + 0.1 * noise)[:, None], x**2)
+    share = explained_share((x + 0.1 * noise)[:, None], x**2)
     assert abs(np.corrcoef(x, x**2)[0, 1]) < 0.05
-    assert found.share > 0.95
+    assert share.share > 0.95
 
 
 def test_two_columns_tell_together_what_neither_tells_alone():
@@ -115,12 +115,12 @@ def test_noise_does_not_look_like_information():
 def test_the_stated_error_is_the_scatter_of_the_shares():
     """Of 80 repetitions, so that the ratio is known to 8 %; it leaves 0.7 to 1.4 about once in 10 000 runs."""
     generator = np.random.default_rng(5)
-    found = []
+    results = []
     for _ in range(80):
         answer = generator.standard_normal(1280)
-        found.append(explained_share((answer + generator.standard_normal(1280))[:, None], answer))
-    stated, scatter = np.mean([f.error for f in found]), np.std([f.share for f in found])
-    assert 0.7 < stated / scatter < 1.4
+        results.append(explained_share((answer + generator.standard_normal(1280))[:, None], answer))
+    stated_error, scatter = np.mean([f.error for f in results]), np.std([f.share for f in results])
+    assert 0.7 < stated_error / scatter < 1.4
 
 
 def test_draws_that_stay_alike_for_long_have_a_larger_error():
@@ -135,16 +135,16 @@ def test_draws_that_stay_alike_for_long_have_a_larger_error():
 
 def test_a_reading_that_is_always_the_same_explains_nothing():
     answer = np.random.default_rng(7).standard_normal(N)
-    found = explained_share(np.full((N, 2), 10.0), answer)
-    assert (found.share, found.error) == (0.0, pytest.approx(0.0, abs=1e-3))
+    share = explained_share(np.full((N, 2), 10.0), answer)
+    assert (share.share, share.error) == (0.0, pytest.approx(0.0, abs=1e-3))
     assert explained_share(answer[:, None], np.full(N, 3.0)).share == 0.0
 
 
 def test_shares_from_the_same_draws_differ_by_less_than_each_errs():
     x, y = np.random.default_rng(8).standard_normal((2, N))
-    one, other = (explained_share((x + y + 0.01 * i)[:, None], x) for i in (0, 1))
-    assert error_of_difference(one, other) < 0.05 * one.error
-    assert error_of_difference(one, explained_share(y[:, None], x)) > 0.5 * one.error
+    first, other = (explained_share((x + y + 0.01 * i)[:, None], x) for i in (0, 1))
+    assert error_of_difference(first, other) < 0.05 * first.error
+    assert error_of_difference(first, explained_share(y[:, None], x)) > 0.5 * first.error
 
 
 def test_mean_and_scatter_of_three_readings_on():
@@ -181,10 +181,10 @@ def test_the_expected_reduction_is_what_weighting_the_draws_by_each_outcome_give
     Draws are weighted by the likelihood of the reading, written down here anew; about half of the squeezed sheath's angles
     are too small to detect there.
     """
-    at = 490.0
-    found = rank_measurements(wide, answer, [format_candidate(Candidate(kind, at))])
+    length = 490.0
+    ranking = rank_measurements(wide, answer, [format_candidate(Candidate(kind, length))])
     model, z = wide.model, wide.draws().flat_z
-    curves = for_each_draw(curve_function(model, np.array([at])), model.space.size)(z)
+    curves = for_each_draw(curve_function(model, np.array([length])), model.space.size)(z)
     shown = {k: v.ravel() for k, v in wide.draws().values.items()}
     generator = np.random.default_rng(11)
     outcomes = generator.choice(len(z), 400, replace=False)
@@ -199,8 +199,8 @@ def test_the_expected_reduction_is_what_weighting_the_draws_by_each_outcome_give
             reading = (curves[name][:, 0] + sd * generator.standard_normal(len(z)))[outcomes, None]
             seen = stats.norm.logpdf(reading, curves[name][:, 0], sd)
             total += np.where(reading > LIMIT, seen, stats.norm.logcdf((LIMIT - curves[name][:, 0]) / sd))
-    left, error = _left_by_weighting(found.answer.draws, total)
-    (ranked,) = found.ranked
+    left, error = _left_by_weighting(ranking.answer.draws, total)
+    (ranked,) = ranking.ranked
     assert abs((1 - ranked.share) - left) < 4.5 * np.hypot(error, ranked.error)
     assert ranked.share > 0.02  # something to compare
 
@@ -218,7 +218,7 @@ def test_readings_of_the_published_geometry_are_of_the_curves_that_hold_there(on
     dataset = load_dataset(on_body, ['geometry="published"'])
     model = build_model(dataset)
     z = 0.1 * np.random.default_rng(1).standard_normal((8, model.space.size))
-    candidates = [Candidate("angle", at) for at in (440.0, 470.0, 520.0)]
+    candidates = [Candidate("angle", length) for length in (440.0, 470.0, 520.0)]
     readings = simulate_readings(model, dataset.measurements, candidates, z, 1)
     assert [r.shape[2] for r in readings] == [1, 2, 1]
 
@@ -234,7 +234,7 @@ def _quiet(design: Design = DESIGN, **more: Any) -> tuple[Dataset, Model]:
 def _runs(dataset: Dataset, model: Model, *values: dict[str, float], repeats: int = 1) -> np.ndarray:
     """Runs at 500 mm of each cable, repeats by columns."""
     middle = {p.name: float(p.prior.constrain(jnp.zeros(()))) for p in model.space.free}
-    z = np.array([model.space.unconstrain(middle | each) for each in values])
+    z = np.array([model.space.unconstrain(middle | value) for value in values])
     (runs,) = simulate_readings(model, dataset.measurements, [Candidate("force", 500.0)], z, 1, repeats=repeats)
     return runs
 
@@ -276,9 +276,9 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
     assert run.noise == "sigma_block"
     assert set(run.stroke) == {-1.0, 1.0}
     assert len(run.input_force) == 24 < run.n_effective.sum()
-    found = list_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
-    assert {c.kind for c in found} == {"angle", "force"}
-    assert Candidate("force", 430.0) in found
+    candidates = list_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
+    assert {c.kind for c in candidates} == {"angle", "force"}
+    assert Candidate("force", 430.0) in candidates
 
 
 # Candidates -------------------------------------------------------------------------------------------------------
@@ -287,7 +287,7 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
 def test_by_default_candidates_are_what_the_tables_can_hold(fit):
     names = [format_candidate(c) for c in list_candidates(fit)]
     lengths = range(430, 540, 10)
-    assert names == [f"angle@{at}" for at in lengths] + [f"efficiency@{at}" for at in (*lengths, 540, 550)]
+    assert names == [f"angle@{length}" for length in lengths] + [f"efficiency@{length}" for length in (*lengths, 540, 550)]
 
 
 def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
@@ -297,10 +297,10 @@ def test_a_cable_without_a_route_is_measured_again_at_its_wrap_angles():
     dataset = Dataset(description, empty_tables(description, design), {})
     fit = pretended(dataset, {"mu": 0.1, "tau": 0.01, "sigma_F": 0.5}, n=3200)
     assert [format_candidate(c) for c in list_candidates(fit)] == ["force@30deg", "force@90deg", "force@180deg"]
-    found = rank_measurements(fit)
-    assert found.answer.name == "mu"
-    assert found.best.name == "force@180deg"  # the same error of the exponent is least of the largest angle
-    assert "wrap angles in the columns" not in next_measurement_text(found, 5)
+    ranking = rank_measurements(fit)
+    assert ranking.answer.name == "mu"
+    assert ranking.best.name == "force@180deg"  # the same error of the exponent is least of the largest angle
+    assert "wrap angles in the columns" not in next_measurement_text(ranking, 5)
 
 
 def test_elastic_cables_have_stretch_preload_and_loop_readings():
@@ -310,16 +310,16 @@ def test_elastic_cables_have_stretch_preload_and_loop_readings():
     names = [format_candidate(c) for c in list_candidates(fit)]
     assert {name.partition("@")[0] for name in names} == {"stretch", "preload", "loop"}
     assert all("," in name for name in names if not name.startswith("preload"))
-    asked = ["stretch@90deg,50N", "stretch@0deg,0.1kN", "preload@1.5rad", "loop@90deg,30N"]
-    found = rank_measurements(fit, "stiffness", asked)
-    assert {r.name for r in found.ranked} == {
+    candidates = ["stretch@90deg,50N", "stretch@0deg,0.1kN", "preload@1.5rad", "loop@90deg,30N"]
+    ranking = rank_measurements(fit, "stiffness", candidates)
+    assert {r.name for r in ranking.ranked} == {
         "stretch@90deg,50N",
         "stretch@0deg,100N",
         "preload@85.9437deg",
         "loop@90deg,30N",
     }
-    assert found.ranked[0].candidate.kind == "stretch"
-    assert [r.words for r in found.ranked if r.candidate.kind == "loop"] == [
+    assert ranking.ranked[0].candidate.kind == "stretch"
+    assert [r.words for r in ranking.ranked if r.candidate.kind == "loop"] == [
         "the loop's output force at 90 deg under 30 N"
     ]
 
@@ -402,15 +402,15 @@ def test_for_the_best_length_efficiencies_far_from_it_are_worth_most(for_length)
 
 
 def test_for_the_coefficient_of_the_bracket_edge_the_length_of_least_other_friction_is_best(fit):
-    found = rank_measurements(fit, "mu3", [f"efficiency@{at}" for at in (430, 450, 480, 510, 530)])
-    assert found.best.name == "efficiency@480"
+    ranking = rank_measurements(fit, "mu3", [f"efficiency@{length}" for length in (430, 450, 480, 510, 530)])
+    assert ranking.best.name == "efficiency@480"
 
 
 def test_an_efficiency_is_best_known_by_measuring_it(fit):
-    found = rank_measurements(fit, "efficiency@500", [f"efficiency@{at}" for at in (430, 470, 500, 530)])
-    assert found.best.name == "efficiency@500"
-    assert found.answer.unit == "points"
-    assert found.repeats.to_halve(found.answer.sd) is not None
+    ranking = rank_measurements(fit, "efficiency@500", [f"efficiency@{length}" for length in (430, 470, 500, 530)])
+    assert ranking.best.name == "efficiency@500"
+    assert ranking.answer.unit == "points"
+    assert ranking.repeats.to_halve(ranking.answer.sd) is not None
 
 
 def test_the_standard_deviation_falls_from_step_to_step_and_with_every_repeat(for_length):
@@ -435,11 +435,11 @@ def test_the_ranking_is_in_order_and_says_what_is_as_good(for_length):
 
 def test_costs_change_the_ranking_but_do_not_bring_up_what_does_nothing(fit):
     named = ["angle@470", "efficiency@430", "efficiency@510"]
-    found = rank_measurements(fit, None, named, {"angle": 1e-6, "efficiency": 5.0})
-    assert found.best.name == "efficiency@430"
-    assert found.ranked[-1].name == "angle@470"
-    assert found.best.worth == pytest.approx(found.best.share / 5)
-    assert "for its cost" in next_measurement_text(found, 5)
+    ranking = rank_measurements(fit, None, named, {"angle": 1e-6, "efficiency": 5.0})
+    assert ranking.best.name == "efficiency@430"
+    assert ranking.ranked[-1].name == "angle@470"
+    assert ranking.best.worth == pytest.approx(ranking.best.share / 5)
+    assert "for its cost" in next_measurement_text(ranking, 5)
 
 
 @pytest.mark.parametrize(
@@ -491,7 +491,7 @@ def test_the_advice_comes_first_and_in_one_sentence(for_length):
 
 
 def test_the_command_prints_the_ranking_and_writes_its_folder(folder, tmp_path, run):
-    named = [part for at in (430, 470, 510) for part in ("--candidate", f"efficiency@{at}")]
+    named = [part for length in (430, 470, 510) for part in ("--candidate", f"efficiency@{length}")]
     code, out, err = run("next", folder, *named, "--top", 2, "--output", tmp_path / "plan")
     assert code == 0
     assert "and 1 more, ranked lower; --top 3 shows all" in out
@@ -528,21 +528,21 @@ def test_a_fit_without_a_posterior_is_told_to_sample(on_body_squares):
 # Against refits ---------------------------------------------------------------------------------------------------
 
 
-def _with_efficiency(dataset: Dataset, at: float, reading: float) -> Dataset:
+def _with_efficiency(dataset: Dataset, length: float, reading: float) -> Dataset:
     rows = dataset.measurements.table(EfficiencyTable)
     n = len(rows.route) + 1
     nothing = np.full((n, len(rows.own.names)), np.nan)
     table = EfficiencyTable(
-        np.append(rows.route, at), np.append(rows.efficiency, reading), np.zeros(n),
+        np.append(rows.route, length), np.append(rows.efficiency, reading), np.zeros(n),
         OwnAngles(rows.own.names, nothing, nothing), _origin(n),
     )  # fmt: skip
     return replace(dataset, measurements=dataset.measurements.with_tables(table))
 
 
-def _with_angles(dataset: Dataset, at: float, reading: np.ndarray) -> Dataset:
+def _with_angles(dataset: Dataset, length: float, reading: np.ndarray) -> Dataset:
     rows = dataset.measurements.table(AngleTable)
     angle = np.vstack([rows.angle, np.deg2rad(reading)])
-    table = AngleTable(np.append(rows.route, at), rows.names, angle, np.full(angle.shape, np.nan), _origin(len(angle)))
+    table = AngleTable(np.append(rows.route, length), rows.names, angle, np.full(angle.shape, np.nan), _origin(len(angle)))
     return replace(dataset, measurements=dataset.measurements.with_tables(table))
 
 
@@ -562,19 +562,19 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     laboratory, density = Laboratory(), Density(build_model(dataset))
     z = laboratory.draws(density, 1)
     length = for_each_draw(make_optimizer(density.model), density.model.space.size)
-    before, generator = length(z)[0], np.random.default_rng(2)
+    initial, generator = length(z)[0], np.random.default_rng(2)
     candidates = [Candidate("efficiency", 400.0), Candidate("efficiency", 500.0), Candidate("angle", 500.0)]
     readings = simulate_readings(density.model, dataset.measurements, candidates, z, 1)
     realized, expected = {}, {}
     for candidate, reading in zip(candidates, readings, strict=True):
-        expected[candidate] = explained_share(reading[:, 0], before).share
+        expected[candidate] = explained_share(reading[:, 0], initial).share
         left = []
         for k, draw in enumerate(generator.choice(len(z), 10, replace=False)):
             add = _with_efficiency if candidate.kind == "efficiency" else _with_angles
             value = reading[draw, 0, 0] if candidate.kind == "efficiency" else reading[draw, 0]
             terms = build_model(add(dataset, candidate.route, value)).terms
             extended = Density(Model(density.model.cable, density.model.space, terms))
-            left.append(np.var(length(laboratory.draws(extended, k))[0]) / np.var(before))
+            left.append(np.var(length(laboratory.draws(extended, k))[0]) / np.var(initial))
         realized[candidate] = 1 - np.mean(left), np.std(left) / np.sqrt(10)
     for candidate, (share, error) in realized.items():
         assert abs(share - expected[candidate]) < 4.5 * np.hypot(error, 0.02), (candidate, realized, expected)
@@ -592,13 +592,13 @@ def test_an_interval_after_an_outcome_is_as_wide_as_the_conditional_one():
 
 def test_the_range_after_a_second_mounting_is_the_same_for_every_seed():
     """Though the tail of tau is so long that standard deviations have no limit."""
-    rng, stated = np.random.default_rng(4), []
+    rng, stated_sds = np.random.default_rng(4), []
     for _ in range(4):
         tau = 0.02 * np.abs(rng.standard_cauchy(5_000))
         mu = 0.1 - tau * rng.standard_normal(5_000)
         readings = (mu + tau * rng.standard_normal((3, 5_000))).T[..., None]
-        stated.append(np.quantile(widths_after_outcomes(readings, mu), (0.05, 0.5, 0.95)))
-    assert np.ptp(np.log(stated), axis=0) == pytest.approx([0, 0, 0], abs=0.35)
+        stated_sds.append(np.quantile(widths_after_outcomes(readings, mu), (0.05, 0.5, 0.95)))
+    assert np.ptp(np.log(stated_sds), axis=0) == pytest.approx([0, 0, 0], abs=0.35)
 
 
 @pytest.mark.parametrize(

@@ -50,9 +50,9 @@ def coefficient(name, symbol, middle, sd, unit="1", estimate=None):
     return Coefficient(symbol, unit, draws, prior, middle if estimate is None else estimate, sd)
 
 
-def positive(one):
+def positive(item):
     """A coefficient as the pair plot and the paths of the ensembles show it."""
-    return SampledQuantity(one.symbol if one.unit == "1" else f"{one.symbol} ({one.unit})", one.draws, (0.0, np.inf))
+    return SampledQuantity(item.symbol if item.unit == "1" else f"{item.symbol} ({item.unit})", item.draws, (0.0, np.inf))
 
 
 def best(lengths, efficiency):
@@ -334,9 +334,9 @@ def test_efficiency_marks_points_outside_with_their_prediction():
 
 def test_optimum_window_and_choices_stand_below_the_efficiency():
     data = paper_data()
-    _, strip, where, which = drawn("efficiency", data).axes
+    _, strip, location, which = drawn("efficiency", data).axes
     np.testing.assert_allclose(strip.get_lines()[0].get_ydata(), -0.2, atol=1e-9)
-    window = next(p for p in where.patches if "best with 95 %" in p.get_label())
+    window = next(p for p in location.patches if "best with 95 %" in p.get_label())
     assert (window.get_x(), window.get_x() + window.get_width()) == (455.0, 484.0)
     heights = [bar.get_height() for bar in which.containers[0]]
     assert heights == [100 * choice.probability_best for choice in data["efficiency"].optimum.choices]
@@ -369,8 +369,8 @@ def test_an_optimum_at_the_edge_is_said_to_be_there():
 def test_what_is_said_of_an_edge_stands_beside_the_density(width):
     figure = FIGURES["efficiency"].draw(at_the_edge()["efficiency"], width)
     figure.draw_without_rendering()
-    said = [(axes, text) for axes in figure.axes for text in axes.texts if text.get_text().startswith("at an end of")]
-    ((axes, text),) = said
+    message = [(axes, text) for axes in figure.axes for text in axes.texts if text.get_text().startswith("at an end of")]
+    ((axes, text),) = message
     assert text.get_window_extent().width <= 0.45 * axes.get_window_extent().width
 
 
@@ -517,12 +517,12 @@ def test_an_axis_has_two_numbers_which_make_a_scale(width):
 
 @pytest.mark.extended
 def test_all_figures_are_written_in_every_format_and_nothing_else(tmp_path):
-    before = dict(mpl.rcParams)
+    initial = dict(mpl.rcParams)
     written = [path for name, data in paper_data().items() for path in write_figure_files(name, data, tmp_path / "figures")]
     assert [path.name for path in written] == [f"{name}.{ending}" for name in paper_data() for ending in FORMATS]
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert all(1_000 < path.stat().st_size < 500_000 for path in written)
-    assert dict(mpl.rcParams) == before
+    assert dict(mpl.rcParams) == initial
 
 
 def test_only_the_formats_asked_for_are_written(tmp_path):

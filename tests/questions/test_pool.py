@@ -34,9 +34,9 @@ pytestmark = pytest.mark.extended
 ASKED = ServiceLimit(0.6, {"mu_0": np.pi, "mu_1": 0.3}, 100_000.0)
 
 
-def pool(drawn, asked=None, seed=1):
+def pool(draws, request=None, seed=1):
     with jax.enable_x64(True):
-        return pool_cables(drawn, asked, seed)
+        return pool_cables(draws, request, seed)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def fleet():
 
 
 @pytest.fixture(scope="module")
-def found(fleet):
+def pool_answer(fleet):
     return pool(fleet[0], ASKED)
 
 
@@ -59,124 +59,124 @@ def few():
 @pytest.fixture(scope="module")
 def population(fleet):
     """What is known of the fleet, and draws of its population."""
-    known = select_inspections(fleet[0])
-    return known, draw_population(known.inspected, 1)
+    selected = select_inspections(fleet[0])
+    return selected, draw_population(selected.inspected, 1)
 
 
 @pytest.mark.slow
-def test_the_population_and_every_cable_are_found(fleet, found):
+def test_the_population_and_every_cable_are_found(fleet, pool_answer):
     """Within 4 standard deviations: of 40 numbers one is outside by chance in 400 runs; the seed is fixed."""
     truth = fleet[1]
-    assert found.is_trusted
-    for cable, values in zip(found.cables, truth, strict=True):
-        known = [cable.coefficients["mu_0"], cable.coefficients["mu_1"], cable.wear]
-        for interval, value in zip(known, (*np.exp(values[:2]), np.expm1(values[2])), strict=True):
+    assert pool_answer.is_trusted
+    for cable, values in zip(pool_answer.cables, truth, strict=True):
+        expected = [cable.coefficients["mu_0"], cable.coefficients["mu_1"], cable.wear]
+        for interval, value in zip(expected, (*np.exp(values[:2]), np.expm1(values[2])), strict=True):
             assert abs(interval.mean - value) < 4 * interval.sd
-    (oil,) = found.effects
+    (oil,) = pool_answer.effects
     assert abs(oil.share.mean - np.expm1(-0.2)) < 4 * oil.share.sd < 0.1
 
 
 @pytest.mark.slow
-def test_cables_unlike_the_rest_are_named_and_no_others(found):
-    assert {each.cable for each in found.outliers} == {"cable-03", "cable-08"}
-    assert "mu" in found.cable("cable-03").departure and "above" in found.cable("cable-03").departure
-    assert "wear lies" in found.cable("cable-08").departure
-    assert found.mixtures == {}, "those that are named are no heap of another make"
+def test_cables_unlike_the_rest_are_named_and_no_others(pool_answer):
+    assert {outlier.cable for outlier in pool_answer.outliers} == {"cable-03", "cable-08"}
+    assert "mu" in pool_answer.cable("cable-03").departure and "above" in pool_answer.cable("cable-03").departure
+    assert "wear lies" in pool_answer.cable("cable-08").departure
+    assert pool_answer.mixtures == {}, "those that are named are no heap of another make"
 
 
-def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, found):
+def test_cables_unlike_the_rest_are_said_by_their_own_inspections(fleet, pool_answer):
     """Of one line through both coefficients, by least squares: within half a standard deviation, as errors have heavy tails."""
     for i, name in ((2, "cable-03"), (7, "cable-08")):
-        odd, rows = found.cable(name), slice(3 * i, 3 * i + 3)
+        odd, rows = pool_answer.cable(name), slice(3 * i, 3 * i + 3)
         seen = [
-            np.median(np.log(each[rows]), axis=1) + 0.2 * fleet[0].lubricated[rows] for each in fleet[0].values.values()
+            np.median(np.log(value[rows]), axis=1) + 0.2 * fleet[0].lubricated[rows] for value in fleet[0].values.values()
         ]
         design = np.column_stack([np.repeat(np.eye(2), 3, axis=0), np.tile(fleet[0].cycles[rows] / REFERENCE, 2)])
         weight = np.repeat([2.0, 1.0], 3)  # errors of the second are twice as large
         line, *_ = np.linalg.lstsq(design * weight[:, None], np.concatenate(seen) * weight, rcond=None)
-        assert odd.pooled == () and found.cable("cable-01").pooled == ("mu_0", "mu_1", "wear")
+        assert odd.pooled == () and pool_answer.cable("cable-01").pooled == ("mu_0", "mu_1", "wear")
         for interval, value in zip(
             (*odd.coefficients.values(), odd.wear), (*np.exp(line[:2]), np.expm1(line[2])), strict=True
         ):
             assert abs(interval.median - value) < 0.5 * interval.sd
     assert all(
-        each.median < 0.4 for each in found.spreads.values()
+        spread.median < 0.4 for spread in pool_answer.spreads.values()
     )  # of the others; 0.5 with the one that is five times off
-    text = " ".join(pool_text(found).split())
+    text = " ".join(pool_text(pool_answer).split())
     assert "They are shown by their own inspections alone" in text and "said without them" in text
     assert "Only the wear" not in text
-    cables = tuple(replace(each, pooled=("wear",)) if each.cable == "cable-03" else each for each in found.cables)
+    cables = tuple(replace(cable, pooled=("wear",)) if cable.cable == "cable-03" else cable for cable in pool_answer.cables)
     assert "Only the wear of cable-03 is that of the others" in " ".join(
-        pool_text(replace(found, cables=cables)).split()
+        pool_text(replace(pool_answer, cables=cables)).split()
     )
-    rows = csv.DictReader(io.StringIO(found.to_csv()))
-    said = {row["cable"]: row["pooled"] for row in rows if row["quantity"] == "wear"}
-    assert (said["cable-01"], said["cable-03"]) == ("yes", "no")
+    rows = csv.DictReader(io.StringIO(pool_answer.to_csv()))
+    pooled_by_cable = {row["cable"]: row["pooled"] for row in rows if row["quantity"] == "wear"}
+    assert (pooled_by_cable["cable-01"], pooled_by_cable["cable-03"]) == ("yes", "no")
 
 
-def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(found):
-    assert "all cables are alike" not in pool_text(found) and "All cables differ" not in pool_text(found)
-    no_spread = {name: replace(each, q05=0.001, q95=0.02) for name, each in found.spreads.items()}
-    text = pool_text(replace(found, spreads=no_spread))
+def test_cables_that_are_all_alike_or_all_unlike_are_said_to_be(pool_answer):
+    assert "all cables are alike" not in pool_text(pool_answer) and "All cables differ" not in pool_text(pool_answer)
+    no_spread = {name: replace(spread, q05=0.001, q95=0.02) for name, spread in pool_answer.spreads.items()}
+    text = pool_text(replace(pool_answer, spreads=no_spread))
     assert "all cables are alike: they differ by at most 2.0 %" in " ".join(text.split())
-    known = {**no_spread, "wear": found.spreads["wear"]}
-    assert "all cables are alike" not in pool_text(replace(found, spreads=known))
-    wide = replace(found.coefficients["mu_1"], q05=0.02, q95=0.2)
-    apart = replace(found, coefficients={"mu_0": wide, "mu_1": wide}, mixtures={})
+    expected = {**no_spread, "wear": pool_answer.spreads["wear"]}
+    assert "all cables are alike" not in pool_text(replace(pool_answer, spreads=expected))
+    wide = replace(pool_answer.coefficients["mu_1"], q05=0.02, q95=0.2)
+    apart = replace(pool_answer, coefficients={"mu_0": wide, "mu_1": wide}, mixtures={})
     assert "All cables differ" not in pool_text(apart)
-    nobody = tuple(replace(each, departure="") for each in found.cables)
+    nobody = tuple(replace(cable, departure="") for cable in pool_answer.cables)
     assert "All cables differ in mu_0 (" in " ".join(pool_text(replace(apart, cables=nobody)).split())
     assert "mu_1 (0.02 to 0.2 of nine in ten)" in " ".join(pool_text(replace(apart, cables=nobody)).split())
 
 
-def test_words_answer_first_and_keep_to_the_page(found):
-    text = pool_text(found)
+def test_words_answer_first_and_keep_to_the_page(pool_answer):
+    text = pool_text(pool_answer)
     assert text.startswith("made: ") and "below 60 % after" in text.splitlines()[0]
     assert max(len(line.encode()) for line in text.splitlines()) <= 80
     assert "cable-03 is an outlier" in text and "Inspect cable-" in text
     assert not any(word in text.lower() for word in ("posterior", "draws", "r-hat", "hyper", "log "))
 
 
-def test_cables_are_drawn_toward_the_rest_as_far_as_their_data_allow(fleet, found):
+def test_cables_are_drawn_toward_the_rest_as_far_as_their_data_allow(fleet, pool_answer):
     """Wear is nearer to the truth than what a line through a cable's own inspections says of it."""
-    own = []
+    collected = []
     for i in range(12):
         rows = slice(3 * i, 3 * i + 3)
         seen = np.median(np.log(fleet[0].values["mu_0"][rows]), axis=1) + 0.2 * fleet[0].lubricated[rows]
-        own.append(np.polyfit(fleet[0].cycles[rows] / REFERENCE, seen, 1)[0])
+        collected.append(np.polyfit(fleet[0].cycles[rows] / REFERENCE, seen, 1)[0])
     alike = [i for i in range(12) if i != 7]
-    pooled_errors = [np.log1p(found.cables[i].wear.mean) - fleet[1][i, 2] for i in alike]
-    assert np.std(pooled_errors) < 0.9 * np.std([own[i] - fleet[1][i, 2] for i in alike])
+    pooled_errors = [np.log1p(pool_answer.cables[i].wear.mean) - fleet[1][i, 2] for i in alike]
+    assert np.std(pooled_errors) < 0.9 * np.std([collected[i] - fleet[1][i, 2] for i in alike])
 
 
-def test_figures_can_be_read(found):
-    drawn = [(name, width, figure) for width in (None, NARROW) for name, figure in draw_figures(found, width).items()]
-    assert len(drawn) == 6
-    wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
+def test_figures_can_be_read(pool_answer):
+    figures = [(name, width, figure) for width in (None, NARROW) for name, figure in draw_figures(pool_answer, width).items()]
+    assert len(figures) == 6
+    wrong = [f"{name} at {width}: {fault}" for name, width, figure in figures for fault in faults(figure)]
     assert not wrong, "\n".join(wrong)
-    assert all("n = 12 cables" in said for said in captions(found).values())
+    assert all("n = 12 cables" in sentence for sentence in captions(pool_answer).values())
 
 
 def test_life_is_the_closed_formula():
     logs, wear = np.log([[0.1, 0.15]] * 3), np.array([0.2, 0.0, 0.2])
     cycles = cycles_to_failure(ASKED, logs, wear, 50_000.0)
-    at = np.exp(-np.exp(0.2 * cycles[0] / 50_000.0) * (0.1 * np.pi + 0.15 * 0.3))
-    assert at == pytest.approx(0.6) and np.isinf(cycles[1])
+    values = np.exp(-np.exp(0.2 * cycles[0] / 50_000.0) * (0.1 * np.pi + 0.15 * 0.3))
+    assert values == pytest.approx(0.6) and np.isinf(cycles[1])
     life = summarize_life(ASKED, cycles, 50_000.0)
     assert life.lasts == pytest.approx(1 / 3) and life.extrapolated and life.fails == pytest.approx(2 / 3)
     assert cycles_to_failure(replace(ASKED, efficiency=0.9), logs, wear, 1.0).tolist() == [0.0, 0.0, 0.0]
 
 
-def weighed(known, drawn, target, outcomes=100):
+def weighed(selected, draws, target, outcomes=100):
     """Variance of a target after an inspection of each cable, on average: draws weighted by what each simulated one reads."""
-    generator, summaries = np.random.default_rng(5), known.inspected.summaries
+    generator, summaries = np.random.default_rng(5), selected.inspected.summaries
     scale, freedom = np.median(summaries.scale, axis=0), np.median(summaries.freedom)
     after = []
-    for i, values in enumerate(drawn.cables.transpose(1, 0, 2)):
-        at = (known.cycles[known.inspected.cable == i].max() + 25_000) / REFERENCE
-        foretold, aim, left = values[:, :2] + values[:, 2:] * at, target(values), []
-        for each in generator.choice(len(values), outcomes, replace=False):
-            read = stats.multivariate_t(foretold[each], scale, freedom, seed=generator).rvs()
+    for i, values in enumerate(draws.cables.transpose(1, 0, 2)):
+        horizon = (selected.cycles[selected.inspected.cable == i].max() + 25_000) / REFERENCE
+        foretold, aim, left = values[:, :2] + values[:, 2:] * horizon, target(values), []
+        for item in generator.choice(len(values), outcomes, replace=False):
+            read = stats.multivariate_t(foretold[item], scale, freedom, seed=generator).rvs()
             away = np.linalg.solve(np.linalg.cholesky(scale), (read - foretold).T)
             weights = (1 + np.sum(away**2, axis=0) / freedom) ** (-(freedom + 2) / 2)
             left.append(np.cov(aim, aweights=weights))
@@ -184,8 +184,8 @@ def weighed(known, drawn, target, outcomes=100):
     return np.array(after)
 
 
-@pytest.mark.parametrize("asked", [None, ASKED], ids=["wear", "failing"])
-def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(population, asked):
+@pytest.mark.parametrize("question", [None, ASKED], ids=["wear", "failing"])
+def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(population, question):
     """The best by either lies within 5 % of the best of the other, and its uncertainty after it within 5 %."""
 
     def fails(values):
@@ -194,46 +194,46 @@ def test_what_to_inspect_next_is_what_simulated_inspections_of_every_cable_say(p
     def wear(values):
         return values[:, 2]
 
-    (known, drawn), target = population, wear if asked is None else fails
-    best, *_ = rank_next_inspections(known, drawn, asked, 1)
-    before = np.array([target(each).var(ddof=1) for each in drawn.cables.transpose(1, 0, 2)])
-    after = weighed(known, drawn, target)
-    gained, chosen = before - after, known.cables.index(best.cable)
+    (selected, chosen_population), target = population, wear if question is None else fails
+    best, *_ = rank_next_inspections(selected, chosen_population, question, 1)
+    initial = np.array([target(item).var(ddof=1) for item in chosen_population.cables.transpose(1, 0, 2)])
+    after = weighed(selected, chosen_population, target)
+    gained, chosen = initial - after, selected.cables.index(best.cable)
     assert gained[chosen] > 0.95 * gained.max() and best.cycles == 75_000
-    stated = np.sqrt([before[chosen], after[chosen]])
-    assert best.before == pytest.approx(stated[0]) and best.after == pytest.approx(stated[1], rel=0.05)
+    predicted_sd = np.sqrt([initial[chosen], after[chosen]])
+    assert best.before == pytest.approx(predicted_sd[0]) and best.after == pytest.approx(predicted_sd[1], rel=0.05)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("asked", [None, ASKED], ids=["wear", "failing"])
-def test_what_to_inspect_next_is_what_pooling_again_after_every_inspection_says(asked):
+@pytest.mark.parametrize("question", [None, ASKED], ids=["wear", "failing"])
+def test_what_to_inspect_next_is_what_pooling_again_after_every_inspection_says(question):
     """The brute force: every cable inspected ten times over, and the fleet pooled again each time.
 
     Variances of 60 fleets pooled again are known to some 10 % a cable; the chosen one gains no less than 0.8 of the best.
     """
     fleet, _ = fleet_draws(15, cables=6, cycles=(0.0, 50_000.0), truth=Truth(wear_spread=0.15))
-    known = select_inspections(fleet)
-    inspected, s = known.inspected, known.inspected.summaries
+    selected = select_inspections(fleet)
+    inspected, s = selected.inspected, selected.inspected.summaries
     scale, freedom = np.median(s.scale, axis=0), float(np.median(s.freedom))
     generator, after, targets = np.random.default_rng(2), [], []
 
     def target(values):
         return (
             values[:, 2]
-            if asked is None
-            else cycles_to_failure(asked, values[:, :2], values[:, 2], REFERENCE) < asked.cycles
+            if question is None
+            else cycles_to_failure(question, values[:, :2], values[:, 2], REFERENCE) < question.cycles
         )
 
-    drawn = draw_population(inspected, 1)
-    (best, *_) = rank_next_inspections(known, drawn, asked, 1)
+    chosen_population = draw_population(inspected, 1)
+    (best, *_) = rank_next_inspections(selected, chosen_population, question, 1)
     for i in range(6):
-        left, values = [], drawn.cables[:, i]
+        left, values = [], chosen_population.cables[:, i]
         targets.append(target(values).var())
-        for each in generator.choice(len(values), 10, replace=False):
-            at = values[each, :2] + 2 * values[each, 2]
+        for item in generator.choice(len(values), 10, replace=False):
+            coefficients = values[item, :2] + 2 * values[item, 2]
             more = replace(
                 s,
-                center=np.vstack([s.center, stats.multivariate_t(at, scale, freedom, seed=generator).rvs()]),
+                center=np.vstack([s.center, stats.multivariate_t(coefficients, scale, freedom, seed=generator).rvs()]),
                 scale=np.concatenate([s.scale, scale[None]]),
                 freedom=np.append(s.freedom, freedom),
             )
@@ -249,7 +249,7 @@ def test_what_to_inspect_next_is_what_pooling_again_after_every_inspection_says(
         after.append(np.mean(left))
     gained = np.array(targets) - after
     print(best, gained, np.sqrt(after))
-    assert gained[known.cables.index(best.cable)] > 0.8 * gained.max()
+    assert gained[selected.cables.index(best.cable)] > 0.8 * gained.max()
 
 
 def test_a_normal_sample_passes_and_two_heaps_do_not():
@@ -265,8 +265,8 @@ def made_of(shift, error=1.0):
     """A cable of a population that is known, inspected three times, off by a shift, and draws of that population."""
     generator, scale = np.random.default_rng(3), error**2 * np.array([[0.02, 0.01], [0.01, 0.03]])
     summaries = Summaries(np.full((3, 2), shift), np.broadcast_to(scale, (3, 2, 2)), np.array([5.0, 5.0, 30.0]))
-    worn, known = np.array([0.0, 0.5, 1.0]), np.ones((3, 2), dtype=bool)
-    inspected = Inspections(np.zeros(3, dtype=int), worn, {}, known, summaries, np.zeros(2), np.ones(2))
+    worn, mask = np.array([0.0, 0.5, 1.0]), np.ones((3, 2), dtype=bool)
+    inspected = Inspections(np.zeros(3, dtype=int), worn, {}, mask, summaries, np.zeros(2), np.ones(2))
     mean, spread = 0.02 * generator.standard_normal((1000, 3)), 0.2 + 0.05 * generator.uniform(size=(1000, 3))
     return inspected, PopulationDraws(mean, spread, np.zeros((1000, 0)), np.zeros((1000, 1, 3)), (), 1000.0)
 
@@ -275,7 +275,7 @@ def made_of(shift, error=1.0):
 def test_the_probability_of_a_cable_as_far_off_is_the_share_of_simulated_ones(shift):
     """Of 400,000 cables of the population, each with errors of its own; within 6 % and four standard errors."""
     inspected, population = made_of(shift)
-    ((found,), generator, count) = outlier_p_values(inspected, population, 1, (0,)), np.random.default_rng(9), 400_000
+    ((computed,), generator, count) = outlier_p_values(inspected, population, 1, (0,)), np.random.default_rng(9), 400_000
     which = generator.integers(1000, size=count)
     mean, spread = population.mean[which], population.spread[which]
     design, scale = inspected.design.reshape(6, 3), block_diag(*inspected.summaries.scale)
@@ -291,7 +291,7 @@ def test_the_probability_of_a_cable_as_far_off_is_the_share_of_simulated_ones(sh
         loose = np.diag(np.where(np.arange(3) == k, 0.0, np.median(population.spread, axis=0) ** -2))
         gain = np.linalg.solve(design.T @ inside @ design + loose, design.T @ inside)[k]
         shares.append(np.mean(np.abs(off @ gain) >= np.abs(seen @ gain)))
-    assert abs(found / (4 * min(shares)) - 1) < 0.06 + 4 / np.sqrt(count * min(shares))
+    assert abs(computed / (4 * min(shares)) - 1) < 0.06 + 4 / np.sqrt(count * min(shares))
 
 
 def test_one_among_ten_thousand_cables_can_be_named():
@@ -304,43 +304,43 @@ def test_one_among_ten_thousand_cables_can_be_named():
 
 
 def test_what_cannot_be_told_is_said(few):
-    drawn = few
-    same = select_inspections(replace(drawn, cycles=np.zeros(36)))
+    draws = few
+    same = select_inspections(replace(draws, cycles=np.zeros(36)))
     assert same.inspected.cycles is None and "wear and life cannot be estimated" in " ".join(same.notes)
-    some = drawn.lubricated.copy()
+    some = draws.lubricated.copy()
     some[4] = np.nan
     assert "does not say whether the cable was lubricated" in " ".join(
-        select_inspections(replace(drawn, lubricated=some)).notes
+        select_inspections(replace(draws, lubricated=some)).notes
     )
-    undated = drawn.cycles.copy()
+    undated = draws.cycles.copy()
     undated[0] = np.nan
-    left = select_inspections(replace(drawn, cycles=undated)).left_out
-    assert [each.inspection for each in left] == ["cable-01 after 0 cycles"] and "number of cycles is not stated" in left[0].why
-    trusted = drawn.stats["trusted"].copy()
+    left = select_inspections(replace(draws, cycles=undated)).left_out
+    assert [item.inspection for item in left] == ["cable-01 after 0 cycles"] and "number of cycles is not stated" in left[0].why
+    trusted = draws.stats["trusted"].copy()
     trusted[5] = 0
-    (left,) = select_inspections(replace(drawn, stats=drawn.stats | {"trusted": trusted})).left_out
+    (left,) = select_inspections(replace(draws, stats=draws.stats | {"trusted": trusted})).left_out
     assert "must not be trusted" in left.why
     with pytest.raises(bf.StoreError, match="no friction coefficient"):
-        select_inspections(replace(drawn, attributes={name: {"role": "noise"} for name in drawn.values}))
+        select_inspections(replace(draws, attributes={name: {"role": "noise"} for name in draws.values}))
 
 
 def test_coefficients_that_mean_different_things_are_pooled_apart(few):
-    drawn = few
+    draws = few
     shape = np.array(["one"] * 18 + ["two"] * 18, dtype=object)
-    about = dict(drawn.about) | {"meanings": {"one": {"mu_0": "sheath"}, "two": {"mu_0": "ring"}}}
-    apart = select_inspections(replace(drawn, stats=drawn.stats | {"shape": shape}, about=about))
+    about = dict(draws.about) | {"meanings": {"one": {"mu_0": "sheath"}, "two": {"mu_0": "ring"}}}
+    apart = select_inspections(replace(draws, stats=draws.stats | {"shape": shape}, about=about))
     assert apart.coefficients == ("mu_0 (1)", "mu_0 (2)", "mu_1")
     assert "mu_0 (2) is ring" in " ".join(apart.notes)
     assert apart.inspected.known.sum(axis=0).tolist() == [18, 18, 36]
 
 
-def finished_fleet(folder, drawn):
-    write_fleet_draws(folder / FLEET_DRAWS, drawn)
+def finished_fleet(folder, draws):
+    write_fleet_draws(folder / FLEET_DRAWS, draws)
     (folder / FLEET_PAGE).write_text(json.dumps({CHECKSUM: file_checksum(folder / FLEET_DRAWS)}))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("--cycles", "1000"), "state until which efficiency"),
         (("--until", "60%"), "none is given for mu_0"),
@@ -349,10 +349,10 @@ def finished_fleet(folder, drawn):
         (("--until", "60%", "--wrap-angle", "mu_9=90deg"), "there is no coefficient 'mu_9'"),
     ],
 )
-def test_life_without_what_it_depends_on_is_refused(run, few, tmp_path, arguments, said):
+def test_life_without_what_it_depends_on_is_refused(run, few, tmp_path, arguments, message):
     finished_fleet(tmp_path, few)
     code, _, error = run("pool", tmp_path, *arguments)
-    assert code == 2 and said in " ".join(error.split())
+    assert code == 2 and message in " ".join(error.split())
 
 
 def test_a_folder_without_a_fleet_is_refused(run, tmp_path):
@@ -379,16 +379,16 @@ def test_draws_that_are_not_as_they_were_written_are_refused(run, fleet, tmp_pat
 
 
 @pytest.mark.parametrize("anew", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["as-found", "drawn-anew"])
-def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, anew):
+def test_the_answer_is_json_and_csv(run, fleet, pool_answer, tmp_path, monkeypatch, anew):
     """The command asks for what was found, of the draws in the file; the slow one draws it anew."""
 
-    def as_found(drawn, asked, seed, measurements):
-        assert asked == replace(ASKED, wrap_angles=pytest.approx(ASKED.wrap_angles)) and (seed, measurements) == (
+    def as_found(sample, request, seed, measurements):
+        assert request == replace(ASKED, wrap_angles=pytest.approx(ASKED.wrap_angles)) and (seed, measurements) == (
             1,
             None,
         )
-        assert all(np.array_equal(drawn.values[name], draws) for name, draws in fleet[0].values.items())
-        return found
+        assert all(np.array_equal(sample.values[name], draws) for name, draws in fleet[0].values.items())
+        return pool_answer
 
     if not anew:
         monkeypatch.setattr(pooling, "pool_cables", as_found)
@@ -397,19 +397,19 @@ def test_the_answer_is_json_and_csv(run, fleet, found, tmp_path, monkeypatch, an
     code, out, _ = run("pool", tmp_path, *angles, "--json", "--seed", 1, "-o", tmp_path / "out")
     page = json.loads(out)
     assert code == 0 and page["is_trusted"] and len(page["cables"]) == 12
-    assert page["new"]["fails"] == found.new_cable.fails
+    assert page["new"]["fails"] == pool_answer.new_cable.fails
     page_file = (tmp_path / "out" / "pool.html").read_text()
     assert "cable-03 is an outlier" in page_file and page_file.count("<img") == 3
     assert json.loads((tmp_path / "out" / "pool.json").read_text()) == page
     code, _, error = run("pool", tmp_path, "-o", tmp_path / "out")
     assert code == 2 and "add --force" in " ".join(error.split())
-    assert found.to_csv().startswith("quantity,cable,mean,sd")
+    assert pool_answer.to_csv().startswith("quantity,cable,mean,sd")
 
 
 @pytest.mark.slow
 def test_one_cable_has_no_population():
-    drawn, _ = fleet_draws(1, cables=1)
-    alone = pool(drawn, ASKED)
+    draws, _ = fleet_draws(1, cables=1)
+    alone = pool(draws, ASKED)
     assert alone.new_cable is None and not alone.outliers and not alone.spreads
     assert "one cable only" in pool_text(alone)
 
@@ -425,8 +425,8 @@ def test_fleets_without_and_with_nothing_in_common():
 
 @pytest.mark.slow
 def test_two_makes_pooled_as_one_are_seen():
-    drawn, _ = fleet_draws(11, cables=20, shifts=dict.fromkeys(range(10), 1.5), truth=Truth(spread=0.15))
-    found = pool(drawn)
-    assert found.mixtures and "do not look like one population" in pool_text(found)
+    draws, _ = fleet_draws(11, cables=20, shifts=dict.fromkeys(range(10), 1.5), truth=Truth(spread=0.15))
+    pooled = pool(draws)
+    assert pooled.mixtures and "do not look like one population" in pool_text(pooled)
     alike, _ = fleet_draws(12, cables=20)
     assert not pool(alike).mixtures

@@ -44,26 +44,26 @@ def like_cables(seed, cables, inspections=3, error=0.03, freedom=5.0, draws=0, s
         weights = np.exp(log - log.max(axis=1, keepdims=True))
         rows = [g.choice(len(w), draws, p=w / w.sum()) for w in weights]
         summaries = summarize_likelihoods(
-            np.stack([each[row] for each, row in zip(likely, rows, strict=True)]), MEAN, SD
+            np.stack([item[row] for item, row in zip(likely, rows, strict=True)]), MEAN, SD
         )
     else:
         summaries = Summaries(seen, root @ root.transpose(0, 2, 1), np.full(len(true), freedom))
     worn = np.tile(cycles, cables) if inspections > 1 else None
-    cable, known = np.repeat(np.arange(cables), inspections), np.ones((len(true), COUNT), dtype=bool)
-    return Inspections(cable, worn, {"lubrication": oiled.ravel()}, known, summaries, MEAN, SD)
+    cable, mask = np.repeat(np.arange(cables), inspections), np.ones((len(true), COUNT), dtype=bool)
+    return Inspections(cable, worn, {"lubrication": oiled.ravel()}, mask, summaries, MEAN, SD)
 
 
 def least_chances(fleets, seed, sweeps=600):
     """The least chance in each fleet, and how many cables each is left with a name."""
-    drawn = gibbs(fleets, [()] * len(fleets), seed, sweeps)
-    found = []
-    for i, (fleet, population) in enumerate(zip(fleets, drawn, strict=True)):
+    draws = gibbs(fleets, [()] * len(fleets), seed, sweeps)
+    results = []
+    for i, (fleet, population) in enumerate(zip(fleets, draws, strict=True)):
 
         def without(cables, fleet=fleet, i=i):
             return gibbs([fleet], [cables], seed + i, sweeps)[0]
 
-        found.append(outlier_cables.separate_outliers(fleet, population, without, seed)[1])
-    return np.array([chances.min() for chances in found]), found
+        results.append(outlier_cables.separate_outliers(fleet, population, without, seed)[1])
+    return np.array([chances.min() for chances in results]), results
 
 
 @pytest.mark.slow
@@ -74,19 +74,19 @@ def test_who_is_named_is_unlike_a_population_that_was_drawn_without_it(monkeypat
     """
     monkeypatch.setattr(outlier_cables, "_POPULATIONS", 250)
     fleets = [like_cables([1, i], 8) for i in range(40)]
-    _, found = least_chances(fleets, 1)
-    named = [(i, int(cable)) for i, each in enumerate(found) for cable in np.flatnonzero(each < outlier_cables.FALSE_ALARM)]
-    others = gibbs([fleets[i] for i, _ in named], [(cable,) for _, cable in named], 77)
-    for (i, cable), population in zip(named, others, strict=True):
+    _, computed = least_chances(fleets, 1)
+    named = [(i, int(cable)) for i, item in enumerate(computed) for cable in np.flatnonzero(item < outlier_cables.FALSE_ALARM)]
+    remaining = gibbs([fleets[i] for i, _ in named], [(cable,) for _, cable in named], 77)
+    for (i, cable), population in zip(named, remaining, strict=True):
         assert 8 * outlier_cables.outlier_p_values(fleets[i], population, 2, (cable,))[cable] < 2 * outlier_cables.FALSE_ALARM
 
 
 def test_a_cable_that_is_unlike_few_others_is_found(monkeypatch):
     """Five spreads off among ten: in two fleets of three at the least; the seed is fixed."""
     monkeypatch.setattr(outlier_cables, "_POPULATIONS", 250)
-    _, found = least_chances([like_cables([2, i], 10, shift=1.0) for i in range(9)], 2)
-    assert sum(chances[0] < outlier_cables.FALSE_ALARM for chances in found) >= 6
-    assert sum(int(np.argmin(chances)) == 0 for chances in found) >= 8
+    _, computed = least_chances([like_cables([2, i], 10, shift=1.0) for i in range(9)], 2)
+    assert sum(chances[0] < outlier_cables.FALSE_ALARM for chances in computed) >= 6
+    assert sum(int(np.argmin(chances)) == 0 for chances in computed) >= 8
 
 
 def test_what_is_off_is_what_its_own_inspections_say(monkeypatch):
@@ -105,9 +105,9 @@ def test_the_sampler_of_fleets_agrees_with_another():
     (other,) = gibbs([fleet], [()], 3, 4000)
     ours = draw_population(fleet, 1)
     for name in ("mean", "spread", "effects"):
-        one, two = getattr(ours, name), getattr(other, name)
-        assert np.all(np.abs(one.mean(axis=0) - two.mean(axis=0)) < 0.15 * two.std(axis=0)), name
-        assert np.all(np.abs(one.std(axis=0) / two.std(axis=0) - 1) < 0.15), name
+        first, two = getattr(ours, name), getattr(other, name)
+        assert np.all(np.abs(first.mean(axis=0) - two.mean(axis=0)) < 0.15 * two.std(axis=0)), name
+        assert np.all(np.abs(first.std(axis=0) / two.std(axis=0) - 1) < 0.15), name
     away = np.abs(ours.cables.mean(axis=0) - other.cables.mean(axis=0)) / other.cables.std(axis=0)
     assert np.quantile(away, 0.9) < 0.15
 
@@ -115,8 +115,8 @@ def test_the_sampler_of_fleets_agrees_with_another():
 @pytest.mark.parametrize("freedom", [3.0, 5.0])
 def test_degrees_of_freedom_are_found_without_bias(freedom):
     """Their mean logarithm over 120 inspections within 0.05, known to 0.012. Tails that are too light make false alarms."""
-    found = like_cables([4, 0], 40, freedom=freedom, draws=1024).summaries.freedom
-    assert abs(np.mean(np.log(found / freedom))) < 0.05
+    computed = like_cables([4, 0], 40, freedom=freedom, draws=1024).summaries.freedom
+    assert abs(np.mean(np.log(computed / freedom))) < 0.05
 
 
 @pytest.mark.slow

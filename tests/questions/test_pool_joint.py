@@ -47,11 +47,11 @@ def test_pooled_draws_are_those_of_all_readings_at_once(cables, tmp_path):
         made, truth = simulate_fleet(plan, 20 + cables)
         write_fleet(plan, made, truth, tmp_path / "fleet")
         bf.fleet(tmp_path / "fleet", output=tmp_path / "fits", seed=1)
-        known = select_inspections(read_fleet_draws(tmp_path / "fits"))
-        pooled = draw_population(known.inspected, 2)
-        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, pooled, 800, 3)
+        selected = select_inspections(read_fleet_draws(tmp_path / "fits"))
+        pooled = draw_population(selected.inspected, 2)
+        joint = joint_draws(tmp_path / "fleet", selected.labels, selected.coefficients, pooled, 800, 3)
     every = joint.population.transpose(2, 0, 1)
-    worth = [diagnose(np.ascontiguousarray(each), len(each)) for each in every]
+    worth = [diagnose(np.ascontiguousarray(item), len(item)) for item in every]
     least = min(d.ess_bulk for d in worth)
     print(cables, "R-hat", max(d.r_hat for d in worth), "effective", least, "divergent", joint.divergent)
     assert max(d.r_hat for d in worth) < 1.02 and least > 400 and joint.divergent < 6 and not pooled.reasons
@@ -99,11 +99,11 @@ def drawn_fleet(generator, cables=20, inspections=3, draws=768):
     prior = -np.sum(((likely - PRIOR_MEAN) / PRIOR_SD) ** 2, axis=2) / 2
     weights = np.exp(prior - prior.max(axis=1, keepdims=True))
     chosen = [generator.choice(len(w), draws, p=w / w.sum()) for w in weights]
-    logs = np.stack([each[places] for each, places in zip(likely, chosen, strict=True)])
-    known = np.ones((len(cable), count), dtype=bool)
+    logs = np.stack([item[places] for item, places in zip(likely, chosen, strict=True)])
+    mask = np.ones((len(cable), count), dtype=bool)
     summaries = summarize_likelihoods(logs, np.full(count, PRIOR_MEAN), np.full(count, PRIOR_SD))
     means = np.full(count, PRIOR_MEAN), np.full(count, PRIOR_SD)
-    inspected = Inspections(cable, cycles, {"lubrication": oiled}, known, summaries, *means)
+    inspected = Inspections(cable, cycles, {"lubrication": oiled}, mask, summaries, *means)
     return inspected, (wear, wear_spread[0], spread[0], oil, *lasting(start[0], wears[0])), logs
 
 
@@ -113,10 +113,10 @@ def lasting(start, wear):
     return wear - room, np.where(room > 0, wear / np.where(room > 0, room, 1.0), np.inf)
 
 
-def asked_of(drawn):
+def asked_of(draws):
     """Draws of what the truths are of: wear, its spread, that of a coefficient, oil, and how long the first cable lasts."""
-    numbers = drawn.mean[:, 2], drawn.spread[:, 2], drawn.spread[:, 0], drawn.effects[:, 0]
-    return (*numbers, *lasting(drawn.cables[:, 0, :2], drawn.cables[:, 0, 2]))
+    numbers = draws.mean[:, 2], draws.spread[:, 2], draws.spread[:, 0], draws.effects[:, 0]
+    return (*numbers, *lasting(draws.cables[:, 0, :2], draws.cables[:, 0, 2]))
 
 
 @pytest.mark.slow
@@ -130,8 +130,8 @@ def test_ranks_of_truths_are_uniform_over_fleets():
     with jax.enable_x64(True):
         for fleet in range(200):
             inspected, truths, _ = drawn_fleet(generator)
-            drawn = draw_population(inspected, fleet)
-            pairs = zip(asked_of(drawn), truths, strict=True)
+            population = draw_population(inspected, fleet)
+            pairs = zip(asked_of(population), truths, strict=True)
             ranks.append([np.mean(draws < truth) + ties.uniform() * np.mean(draws == truth) for draws, truth in pairs])
             if fleet % 20 == 19:
                 tests = [float(stats.kstest(column, "uniform").pvalue) for column in np.array(ranks).T]
@@ -156,8 +156,8 @@ def test_without_a_population_cables_are_as_single_fits_say():
 
         z = 1.5 * generator.standard_t(3, (100_000, density.size))  # tails as heavy as those of single fits
         values, _ = jax.vmap(cables_of)(z)
-        at = jax.vmap(lambda each: density.log_coefficients(each, prior, inspected.data))(values)
-        of_readings = jax.vmap(lambda each: log_likelihood(each, inspected.data))(at)
+        log_densities = jax.vmap(lambda item: density.log_coefficients(item, prior, inspected.data))(values)
+        of_readings = jax.vmap(lambda item: log_likelihood(item, inspected.data))(log_densities)
         inner = z[:, len(density.names) :].reshape(len(z), inspected.cables, count)
         away = (np.asarray(values) - prior["mean"]) / prior["spread"]
         log = np.asarray(of_readings)[:, :, 0] - np.sum(away**2 / 2 + stats.t.logpdf(inner / 1.5, 3), axis=2)
@@ -171,20 +171,20 @@ def test_without_a_population_cables_are_as_single_fits_say():
 
 def test_the_density_is_that_of_the_model_written_out():
     """Differences of the log density between points, against the model in SciPy's words; no coordinates are shared."""
-    drawn, _ = fleet_draws(4, cables=3, draws=256)
-    inspected = select_inspections(drawn).inspected
+    fleet, _ = fleet_draws(4, cables=3, draws=256)
+    inspected = select_inspections(fleet).inspected
     summaries = inspected.summaries
     density = PopulationDensity(2, True, ("lubrication",), 3)
 
-    def written_out(found, values):
-        total = stats.norm.logpdf(found["mean"][:2], inspected.prior_mean, inspected.prior_sd).sum()
-        total += stats.norm.logpdf(found["mean"][2], 0, 1) + stats.norm.logpdf(found["effects"][0], 0, 1)
-        total += stats.halfnorm.logpdf(found["spread"], scale=[0.5, 0.5, 0.3]).sum()
-        total += stats.norm.logpdf(values, found["mean"], found["spread"]).sum()
+    def written_out(computed, values):
+        total = stats.norm.logpdf(computed["mean"][:2], inspected.prior_mean, inspected.prior_sd).sum()
+        total += stats.norm.logpdf(computed["mean"][2], 0, 1) + stats.norm.logpdf(computed["effects"][0], 0, 1)
+        total += stats.halfnorm.logpdf(computed["spread"], scale=[0.5, 0.5, 0.3]).sum()
+        total += stats.norm.logpdf(values, computed["mean"], computed["spread"]).sum()
         for j, cable in enumerate(inspected.cable):
-            at = values[cable, :2] + values[cable, 2] * inspected.cycles[j] + found["effects"][0] * drawn.lubricated[j]
+            expected = values[cable, :2] + values[cable, 2] * inspected.cycles[j] + computed["effects"][0] * fleet.lubricated[j]
             t = stats.multivariate_t(summaries.center[j], summaries.scale[j], summaries.freedom[j])
-            total += t.logpdf(at)
+            total += t.logpdf(expected)
         return total
 
     with jax.enable_x64(True):
@@ -193,12 +193,12 @@ def test_the_density_is_that_of_the_model_written_out():
 
         @jax.jit
         def values_of(z):
-            found = density.population_at(z, data)
-            return found, density.cables_at(z, data, found)[0]
+            computed = density.population_at(z, data)
+            return computed, density.cables_at(z, data, computed)[0]
 
         def of_values(z):
-            found, cables = values_of(z)
-            return np.concatenate([found["mean"], found["spread"], found["effects"][:1], cables.ravel()])
+            computed, cables = values_of(z)
+            return np.concatenate([computed["mean"], computed["spread"], computed["effects"][:1], cables.ravel()])
 
         log_density = jax.jit(density.log_density)
 
@@ -206,7 +206,7 @@ def test_the_density_is_that_of_the_model_written_out():
         for z in points:
             step = 1e-5 * np.eye(density.size)
             slopes = np.array([(of_values(z + e) - of_values(z - e)) / 2e-5 for e in step])
-            found, values = jax.tree.map(np.asarray, values_of(z))
-            direct = written_out(found, values) + np.linalg.slogdet(slopes)[1]
+            actual, values = jax.tree.map(np.asarray, values_of(z))
+            direct = written_out(actual, values) + np.linalg.slogdet(slopes)[1]
             sizes.append(float(log_density(z, data)) - direct)
     np.testing.assert_allclose(sizes, sizes[0], atol=1e-4)

@@ -37,8 +37,8 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
     """Differences between points: the log density of the fit, without the prior of what is pooled."""
     folder, fits = fleet
     with jax.enable_x64(True):
-        known = select_inspections(read_fleet_draws(fits))
-        (part,) = load_readings(known, (1, 0), folder)
+        selected = select_inspections(read_fleet_draws(fits))
+        (part,) = load_readings(selected, (1, 0), folder)
         posterior, space, z = (
             part.posterior,
             part.posterior.model.space,
@@ -51,9 +51,9 @@ def test_readings_in_the_density_are_those_of_a_single_fit(fleet):
         differences = []
         for point in z:
             pairs = list(zip(point, part.data, strict=True))
-            at = np.zeros((1, 2, 2))
-            at[0, list(part.rows)] = [[np.log(posterior.values(*pair)[name]) for name in part.names] for pair in pairs]
-            ours = part.log_density(at, point[:, list(part.others)].ravel(), part.stack(known.inspected.positions))
+            points = np.zeros((1, 2, 2))
+            points[0, list(part.rows)] = [[np.log(posterior.values(*pair)[name]) for name in part.names] for pair in pairs]
+            ours = part.log_density(points, point[:, list(part.others)].ravel(), part.stack(selected.inspected.positions))
             single = sum(posterior.log_density(*pair) for pair in pairs)
             pooled = [i for i in range(4) if i not in part.others]
             differences.append(float(ours - single - np.sum(point[:, pooled] ** 2) / 2))
@@ -74,12 +74,12 @@ def test_measurements_that_are_not_those_of_the_fleet_are_refused(run, fleet, tm
     folder, fits = fleet
     shutil.copytree(folder, tmp_path / "other")
     (tmp_path / "other" / FLEET_TABLE).write_text((folder / FLEET_TABLE).read_text().replace("01-0.csv", "02-0.csv"))
-    known = select_inspections(read_fleet_draws(fits))
+    selected = select_inspections(read_fleet_draws(fits))
     with (
         jax.enable_x64(True),
         pytest.raises(bf.StoreError, match="does not hold what cable-01 after 0 cycles was fitted from"),
     ):
-        load_readings(known, (0, 1), tmp_path / "other")
+        load_readings(selected, (0, 1), tmp_path / "other")
     code, _, error = run("pool", fits, "--measurements", tmp_path / "none")
     assert code == 2 and "is not a folder" in " ".join(error.split())
 
@@ -126,18 +126,18 @@ def test_cables_pooled_by_their_readings_are_those_of_all_readings_at_once(tmp_p
     write_few(tmp_path / "fleet", np.random.default_rng([2, 0]))
     bf.fleet(tmp_path / "fleet", output=tmp_path / "fits", seed=1)
     with jax.enable_x64(True):
-        known = select_inspections(read_fleet_draws(tmp_path / "fits"))
+        selected = select_inspections(read_fleet_draws(tmp_path / "fits"))
         rows = np.flatnonzero(
-            count_effective_draws(known, draw_population(known.inspected, 2)) < pooling.LEAST_EFFECTIVE_DRAWS
+            count_effective_draws(selected, draw_population(selected.inspected, 2)) < pooling.LEAST_EFFECTIVE_DRAWS
         )
-        mine = sorted({int(known.inspected.cable[j]) for j in rows})
-        assert mine
+        mask = sorted({int(selected.inspected.cable[j]) for j in rows})
+        assert mask
         ours = draw_population(
-            known.inspected, 2, readings=load_readings(known, list(map(int, rows)), tmp_path / "fleet")
+            selected.inspected, 2, readings=load_readings(selected, list(map(int, rows)), tmp_path / "fleet")
         )
-        joint = joint_draws(tmp_path / "fleet", known.labels, known.coefficients, ours, 500, 3)
-    theirs = joint.cables.reshape(-1, *joint.cables.shape[2:])[:, mine]
-    cables = ours.cables[:, mine]
+        joint = joint_draws(tmp_path / "fleet", selected.labels, selected.coefficients, ours, 500, 3)
+    theirs = joint.cables.reshape(-1, *joint.cables.shape[2:])[:, mask]
+    cables = ours.cables[:, mask]
     away = (cables.mean(axis=0) - theirs.mean(axis=0)) / theirs.std(axis=0)
     wider = cables.std(axis=0) / theirs.std(axis=0) - 1
     print("away", away.round(2), "wider", wider.round(2))

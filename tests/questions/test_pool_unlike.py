@@ -39,11 +39,11 @@ def test_nine_of_ten_intervals_of_odd_cables_hold_their_truth(population, inspec
     for i in range(cables):
         fleet = like_cables([21, i], 2, inspections=inspections, error=0.1, freedom=4.0, shift=ODD)
         fleet = replace(fleet, prior_sd=np.full(2, 3.0))  # truths are not from the prior of single fits
-        drawn = population
+        chosen_population = population
         if inspections == 1:
-            drawn = replace(population, mean=population.mean[:, :2], spread=population.spread[:, :2])
-        values, told = draw_unpooled(fleet, drawn, 0, 1)
-        assert told == (inspections > 1)
+            chosen_population = replace(population, mean=population.mean[:, :2], spread=population.spread[:, :2])
+        values, reported = draw_unpooled(fleet, chosen_population, 0, 1)
+        assert reported == (inspections > 1)
         low, high = np.quantile(values, (0.05, 0.95), axis=0)
         truth = truth_of([21, i], inspections)
         inside.append((low < truth) & (truth < high))
@@ -70,7 +70,7 @@ def test_wear_is_that_of_the_others_only_where_no_own_inspections_tell_it(popula
     """Of a cable inspected once, or twice within a thousandth of the reference cycles."""
     fleet = like_cables([23, 0], 2, inspections=max(len(after), 2), error=0.03, shift=ODD)
     cycles = np.tile(np.resize(after, 2), 2)
-    values, told = draw_unpooled(replace(fleet, cycles=cycles), population, 0, 1)
-    assert not told and abs(values[:, 2].mean() - 0.2) < 0.03 and 0.06 < values[:, 2].std() < 0.11
-    values, told = draw_unpooled(replace(fleet, cycles=np.array([0.0, 1.0, 0.0, 1.0])), population, 0, 1)
-    assert told
+    values, reported = draw_unpooled(replace(fleet, cycles=cycles), population, 0, 1)
+    assert not reported and abs(values[:, 2].mean() - 0.2) < 0.03 and 0.06 < values[:, 2].std() < 0.11
+    values, reported = draw_unpooled(replace(fleet, cycles=np.array([0.0, 1.0, 0.0, 1.0])), population, 0, 1)
+    assert reported

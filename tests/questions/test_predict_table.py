@@ -53,16 +53,16 @@ def test_efficiencies_and_wanted_forces_and_angles_of_curves(quick_fit, table):
 
 @pytest.mark.extended
 def test_outside_the_curves_a_row_needs_its_own_angles(quick_fit, table):
-    stated = "cable_length_mm,free_sheath_angle_deg,squeezed_sheath_angle_deg\n560,20,30\n450,,\n"
-    outside, inside = bf.predict(quick_fit, table=table(stated))
+    setting = "cable_length_mm,free_sheath_angle_deg,squeezed_sheath_angle_deg\n560,20,30\n450,,\n"
+    outside, inside = bf.predict(quick_fit, table=table(setting))
     assert "by the wrap angles stated" in outside["note"]
     assert not inside["note"]
     with pytest.raises(UsageError, match="no wrap angle of 'squeezed sheath' was measured there"):
-        bf.predict(quick_fit, table=table(stated + "561,20,\n"))
+        bf.predict(quick_fit, table=table(setting + "561,20,\n"))
 
 
 @pytest.mark.parametrize(
-    ("text", "why"),
+    ("text", "reason"),
     [
         ("cable_length_mm,colour\n450,red\n", r"rows.csv: predict does not use 'colour'; it uses cable_length"),
         ("bracket edge (deg)\n30\n", "rows.csv has no column cable_length_mm"),
@@ -74,8 +74,8 @@ def test_outside_the_curves_a_row_needs_its_own_angles(quick_fit, table):
         ("cable_length_mm,bracket edge (deg),bracket_edge_angle_deg\n450,1,1\n", "two columns for the wrap angle"),
     ],
 )
-def test_what_is_wrong_with_a_table_is_refused(quick_fit, table, text, why):
-    with pytest.raises(DatasetError, match=why):
+def test_what_is_wrong_with_a_table_is_refused(quick_fit, table, text, reason):
+    with pytest.raises(DatasetError, match=reason):
         bf.predict(quick_fit, table=table(text))
 
 

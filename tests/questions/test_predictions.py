@@ -161,9 +161,9 @@ def _good(rows: list[str]) -> np.ndarray:
 )
 def test_the_window_is_the_stretch_around_the_surest_length_that_is_good_enough_often_enough(rows, probability, window):
     efficiency = _good(rows)
-    found = find_best_window(GRID, efficiency, efficiency.max(axis=1), 0.01, probability)
-    np.testing.assert_equal((found.start, found.stop), tuple(float(x) for x in window))
-    assert (found.within, found.probability) == (0.01, probability)
+    best_window = find_best_window(GRID, efficiency, efficiency.max(axis=1), 0.01, probability)
+    np.testing.assert_equal((best_window.start, best_window.stop), tuple(float(x) for x in window))
+    assert (best_window.within, best_window.probability) == (0.01, probability)
 
 
 def test_every_length_of_the_window_is_within_one_per_cent_as_often_as_promised(on_body_model):
@@ -187,16 +187,16 @@ def test_every_length_of_the_window_is_within_one_per_cent_as_often_as_promised(
 @pytest.mark.parametrize("n", [1, 1023, 1024, 1025, 2500])
 def test_draws_in_batches_are_the_draws_one_by_one(n):
     z = np.random.default_rng(n).standard_normal((n, 2))
-    found = for_each_draw(lambda one: {"sum": one.sum(), "square": one**2}, 2)(z)
-    np.testing.assert_allclose(found["sum"], z.sum(axis=1), rtol=1e-13, atol=1e-15)
-    np.testing.assert_allclose(found["square"], z**2, rtol=1e-15)
+    computed = for_each_draw(lambda draw: {"sum": draw.sum(), "square": draw**2}, 2)(z)
+    np.testing.assert_allclose(computed["sum"], z.sum(axis=1), rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(computed["square"], z**2, rtol=1e-15)
 
 
 @pytest.mark.parametrize("n", [1, 1025])
 def test_functions_of_values_are_those_of_every_draw_by_itself(n):
     first, second = np.random.default_rng(n).standard_normal((2, n))
-    found = for_each_value(lambda of, by: of["first"] * by - of["second"], {"first": first, "second": second}, np.array(3.0))
-    np.testing.assert_allclose(found, 3 * first - second, rtol=1e-13, atol=1e-15)
+    computed = for_each_value(lambda of, by: of["first"] * by - of["second"], {"first": first, "second": second}, np.array(3.0))
+    np.testing.assert_allclose(computed, 3 * first - second, rtol=1e-13, atol=1e-15)
 
 
 def test_efficiency_falls_off_with_the_friction_exponent_at_each_length(on_body_model):

@@ -87,8 +87,8 @@ def identifiability(*groups):
     """Of groups of parameters, with a profile for each of the first."""
     values = np.linspace(0.00012, 0.00029, 21)
     profiles = tuple(Profile(n, values, 12 * np.linspace(-1, 1, 21) ** 2) for n in groups[0])
-    known = {f"group {i}": knowledge(names) for i, names in enumerate(groups)}
-    return Identifiability(NAME, "the least-squares estimate", True, known, profiles)
+    reference = {f"group {i}": knowledge(names) for i, names in enumerate(groups)}
+    return Identifiability(NAME, "the least-squares estimate", True, reference, profiles)
 
 
 def ranking(candidates, scale, words):
@@ -142,9 +142,9 @@ ANSWERS = {
 @pytest.mark.parametrize("of", ANSWERS)
 def test_figures_of_answers_can_be_read(of):
     names, make = ANSWERS[of]
-    found = make()
+    computed = make()
     for name in names:
-        assert_answer_readable(FILES[f"{name}_figure"], found, NAME)
+        assert_answer_readable(FILES[f"{name}_figure"], computed, NAME)
 
 
 @pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-haptic-loop", "yarn-on-cylinder"])
@@ -160,9 +160,9 @@ def test_no_figure_of_an_answer_is_left_out():
 
 def test_each_figure_is_written_in_three_formats_beside_its_caption(tmp_path):
     """A second figure in the folder leaves the caption of the first, and the same again replaces it."""
-    found, folder = calibration(("mu", "tau"), ""), tmp_path / "new"
+    computed, folder = calibration(("mu", "tau"), ""), tmp_path / "new"
     for name in ("coverage", "ranks", "coverage"):
-        write_figure(FILES[f"{name}_figure"], found, folder, name, found.name)
+        write_figure(FILES[f"{name}_figure"], computed, folder, name, computed.name)
     endings = ("pdf", "png", "svg")
     assert {p.name for p in folder.iterdir()} == {
         CAPTIONS,
@@ -183,6 +183,6 @@ def test_figures_of_answers_on_every_data_set_can_be_read(folder, tmp_path):
         () if has_candidates(fit) else ("efficiency@180deg", "efficiency@540deg")
     )  # of a catheter no displacement can be
     assert_answer_readable(FILES["next_figure"], bf.next_measurement(fit, candidates=named), fit.name)
-    found = bf.calibrate(folder, replications=20, seed=1, output=tmp_path / "calibration")
+    calibrated_again = bf.calibrate(folder, replications=20, seed=1, output=tmp_path / "calibration")
     for name in ("coverage", "ranks", "sharpness"):
-        assert_answer_readable(FILES[f"{name}_figure"], found, fit.name)
+        assert_answer_readable(FILES[f"{name}_figure"], calibrated_again, fit.name)

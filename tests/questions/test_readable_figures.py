@@ -108,15 +108,15 @@ def test_words_with_a_fault_are_refused(texts, says):
     assert any(says in fault for fault in faults(page(*texts)[0]))
 
 
-@pytest.mark.parametrize("what", ["nothing", "a line across", "values that are none", "areas across"])
-def test_a_panel_without_data_is_refused(what):
+@pytest.mark.parametrize("case", ["nothing", "a line across", "values that are none", "areas across"])
+def test_a_panel_without_data_is_refused(case):
     figure, axes = page()
     axes.lines[0].remove()
-    if what == "a line across":
+    if case == "a line across":
         axes.axhline(0.0)
-    elif what == "values that are none":
+    elif case == "values that are none":
         axes.plot([np.nan, np.nan], [0.0, 1.0])
-    elif what == "areas across":
+    elif case == "areas across":
         axes.axvspan(0.2, 0.4)
     assert any("is empty" in fault for fault in faults(figure))
 

@@ -27,9 +27,9 @@ def several(tmp_path_factory):
 @pytest.fixture(scope="module")
 def sampled(tmp_path_factory):
     """A short posterior from two short recordings; the first of them never goes slack."""
-    each = [recorded(amplitude=a, seconds=6.0, seed=i) for i, a in enumerate((30.0, 80.0))]
+    recordings = [recorded(amplitude=a, seconds=6.0, seed=i) for i, a in enumerate((30.0, 80.0))]
     settings = ("sampler.n_walkers=32", "sampler.n_ensembles=2", "sampler.max_steps=400", "sampler.target_ess=100")
-    return bf.fit(folder_of(tmp_path_factory.mktemp("sampled"), each), seed=2, settings=settings)
+    return bf.fit(folder_of(tmp_path_factory.mktemp("sampled"), recordings), seed=2, settings=settings)
 
 
 @pytest.mark.slow
@@ -48,10 +48,10 @@ def test_recordings_of_a_loop_come_back_from_a_saved_fit(sampled):
     page = json.loads(json.dumps(_measurements_page(measurements), allow_nan=False))
     again = _measurements(page).table(Recordings)
     assert again.loop
-    for one, other in zip(again.items, measurements.table(Recordings).items, strict=True):
-        assert one.strokes.drag == other.strokes.drag
-        np.testing.assert_equal(one.strokes.exponent, other.strokes.exponent)
-        assert np.array_equal(one.blocks.output_force, other.blocks.output_force)
+    for first, other in zip(again.items, measurements.table(Recordings).items, strict=True):
+        assert first.strokes.drag == other.strokes.drag
+        np.testing.assert_equal(first.strokes.exponent, other.strokes.exponent)
+        assert np.array_equal(first.blocks.output_force, other.blocks.output_force)
     assert np.isnan(again.items[0].strokes.exponent)
 
 
@@ -79,8 +79,8 @@ def test_traces_show_what_load_cells_with_known_errors_read(tmp_path):
     columns = recorded("triangle", 60.0, noise=0.0, seconds=6.0)
     columns["input_force_N"] = columns["input_force_N"] + 2.0
     columns["output_force_N"] = columns["output_force_N"] * math.exp(-0.05) - 1.5
-    known = {"mu": MU, "preload": PRELOAD, "input_offset": 2.0, "output_offset": -1.5, "gain_error": 0.05}
-    prior = "\n".join(f"{name}.fixed = {value}" for name, value in known.items() if name != "mu")
+    expected = {"mu": MU, "preload": PRELOAD, "input_offset": 2.0, "output_offset": -1.5, "gain_error": 0.05}
+    prior = "\n".join(f"{name}.fixed = {value}" for name, value in expected.items() if name != "mu")
     more = f"[prior]\n{prior}\n[friction.mu]\nfixed = {MU}\n"
     sensors = '[sensors]\ninput_gain_error_sd = 0\noutput_gain_error_sd = 0.1\noffset_sd = { value = 1, unit = "N" }'
     fit = bf.fit(folder_of(tmp_path, [columns], more=f"{sensors}\n{more}[tables]\nrecordings = {{}}"), mcmc=False)
@@ -107,8 +107,8 @@ def test_points_of_a_loop_s_plane_are_gathered_by_wrap_angle(several):
     np.testing.assert_allclose(np.rad2deg(np.unique(angle)), [90, 180, 270])
     assert set(collect_loop_points(fit, contact=0)[0]) == set(angle)
     for of_one in np.unique(angle):
-        here = angle == of_one
-        assert here.sum() > 100
+        mask = angle == of_one
+        assert mask.sum() > 100
         exponent = MU * of_one
-        widest = np.maximum(2 * PRELOAD * exponent, np.abs(force_in[here]) * (math.exp(exponent) - 1))
-        assert np.all(np.abs(force_in[here] - force_out[here]) < widest * 1.1 + 1)
+        widest = np.maximum(2 * PRELOAD * exponent, np.abs(force_in[mask]) * (math.exp(exponent) - 1))
+        assert np.all(np.abs(force_in[mask] - force_out[mask]) < widest * 1.1 + 1)

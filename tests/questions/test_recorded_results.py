@@ -85,8 +85,8 @@ def test_every_run_s_own_exponent_is_found_to_a_thousandth(plain, truth):
     for i, recording in enumerate(truth["recordings"]):
         cells = term.data["run"] == i
         weight = term.data["weight"][cells]
-        found = np.sum(weight * (term.data["mean"] - delay * term.data["drift"])[cells]) / weight.sum()
-        assert found == pytest.approx(recording["exponent"] + recording["run_effect"], abs=0.001)
+        computed = np.sum(weight * (term.data["mean"] - delay * term.data["drift"])[cells]) / weight.sum()
+        assert computed == pytest.approx(recording["exponent"] + recording["run_effect"], abs=0.001)
 
 
 def test_both_likelihoods_ask_for_the_same_coefficients(recorded, plain):
@@ -101,13 +101,13 @@ def test_a_saved_fit_of_recordings_comes_back_bit_for_bit(plain):
     fit, folder = plain
     again = bf.load(folder)
     assert details_text(again) == details_text(fit)
-    for before, after in zip(
+    for initial, after in zip(
         fit.dataset.measurements.table(Recordings).items, again.dataset.measurements.table(Recordings).items, strict=True
     ):
-        np.testing.assert_array_equal(before.blocks.input_force, after.blocks.input_force)
-        np.testing.assert_array_equal(before.strokes.stroke, after.strokes.stroke)
-        assert before.account.counts == after.account.counts
-        assert before.strokes.used_sliding.dtype == after.strokes.used_sliding.dtype == bool
+        np.testing.assert_array_equal(initial.blocks.input_force, after.blocks.input_force)
+        np.testing.assert_array_equal(initial.strokes.stroke, after.strokes.stroke)
+        assert initial.account.counts == after.account.counts
+        assert initial.strokes.used_sliding.dtype == after.strokes.used_sliding.dtype == bool
     np.testing.assert_array_equal(again.posterior.z, fit.posterior.z)
 
 
@@ -137,9 +137,9 @@ def test_check_shows_the_recordings_and_has_no_false_warning(recorded):
 
 
 def test_figures_of_a_fit_show_every_recording_with_a_band_that_holds_most_of_it(plain):
-    found = trace_recordings(plain[0])
-    assert len(found) == 7
-    for trace in found:
+    traces = trace_recordings(plain[0])
+    assert len(traces) == 7
+    for trace in traces:
         low, _, high = trace.predicted[:, trace.used]
         inside = (trace.output_force[trace.used] > low - 1.0) & (trace.output_force[trace.used] < high + 1.0)
         assert inside.mean() > 0.85  # a 90 % band of mountings, give or take the noise of a block
@@ -178,10 +178,10 @@ def test_the_sentence_on_speed_says_no_more_than_the_interval(q05, q95, probabil
 
 @pytest.mark.slow
 def test_compare_answers_whether_speed_matters_on_the_command_line(plain, with_rate, tmp_path, run):
-    where = tmp_path / "comparison"
-    code, out, err = run("compare", "--json", "-o", where, plain[1], with_rate[1])
+    folder = tmp_path / "comparison"
+    code, out, err = run("compare", "--json", "-o", folder, plain[1], with_rate[1])
     assert code == 0, err
-    words = " ".join((where / "comparison.txt").read_text().split())
+    words = " ".join((folder / "comparison.txt").read_text().split())
     assert "The data cannot distinguish" in words
     assert "Letting friction depend on speed (rate) predicts no better than not (plain)." in words
     assert "viscous" in words
@@ -205,10 +205,10 @@ def test_compare_refuses_fits_of_different_readings_one_fit_and_fits_without_dra
 
 def test_the_better_model_is_seen_only_beyond_two_standard_errors():
     good, k = np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4)
-    found = compare_predictions({"worse": LooPrediction(good - [5, 5.1, 4.9, 5], k), "best": LooPrediction(good, k)})
-    assert list(found) == ["best", "worse"]
-    assert found["worse"].elpd == pytest.approx(20.0)
-    assert found["worse"].is_distinguishable
+    comparison = compare_predictions({"worse": LooPrediction(good - [5, 5.1, 4.9, 5], k), "best": LooPrediction(good, k)})
+    assert list(comparison) == ["best", "worse"]
+    assert comparison["worse"].elpd == pytest.approx(20.0)
+    assert comparison["worse"].is_distinguishable
     assert not ElpdDifference(20.0, 15.0, 0).is_distinguishable
     assert not ElpdDifference(1.0, 0.1, 0).is_distinguishable
 
@@ -223,11 +223,11 @@ def test_leave_one_out_of_a_normal_mean_is_what_leaving_one_out_gives():
     readings = generator.normal(size=12)
     draws = generator.normal(readings.mean(), 1 / np.sqrt(12), size=(8, 4000))
     log_likelihood = stats.norm.logpdf(readings, draws[..., None], 1.0)
-    found = psis_loo({"readings": log_likelihood}, draws.size)
-    others = [np.delete(readings, i).mean() for i in range(12)]
-    expected = stats.norm.logpdf(readings, others, np.sqrt(1 + 1 / 11))
-    np.testing.assert_allclose(found.elpd, expected, atol=0.02)
-    assert found.unreliable == 0
+    loo = psis_loo({"readings": log_likelihood}, draws.size)
+    remaining = [np.delete(readings, i).mean() for i in range(12)]
+    expected = stats.norm.logpdf(readings, remaining, np.sqrt(1 + 1 / 11))
+    np.testing.assert_allclose(loo.elpd, expected, atol=0.02)
+    assert loo.unreliable == 0
 
 
 @pytest.fixture(scope="session")
@@ -286,17 +286,17 @@ def test_recordings_one_below_the_other_in_one_file_are_told_apart_by_a_column(r
 def test_a_short_table_with_a_clock_and_no_runs_is_a_recording_and_one_with_strokes_is_not(recorded, tmp_path):
     rows = np.loadtxt(recorded / "recordings" / "470mm_60rpm.csv", delimiter=",", skiprows=1)[100:290]
     _csv(tmp_path / "clock.csv", ("time_s", "input_force_N", "output_force_N"), rows[:, :3])
-    found = bf.read(tmp_path / "clock.csv", wrap_angle=(180.0, "deg")).measurements
-    assert found.table(Recordings) is not None
-    assert found.table(ForceTable) is None
+    measurements = bf.read(tmp_path / "clock.csv", wrap_angle=(180.0, "deg")).measurements
+    assert measurements.table(Recordings) is not None
+    assert measurements.table(ForceTable) is None
     _csv(
         tmp_path / "strokes.csv",
         ("stroke", "input_force_N", "output_force_N"),
         np.abs(rows[:5, [3, 1, 2]]) * [0, 1, 1] + [1, 0, 0],
     )
-    found = bf.read(tmp_path / "strokes.csv", wrap_angle=(180.0, "deg")).measurements
-    assert found.table(Recordings) is None
-    assert len(found.table(ForceTable).run) == 5
+    measurements = bf.read(tmp_path / "strokes.csv", wrap_angle=(180.0, "deg")).measurements
+    assert measurements.table(Recordings) is None
+    assert len(measurements.table(ForceTable).run) == 5
 
 
 def test_check_of_a_file_alone_lists_channels_and_what_it_is_as_a_recording(recorded, run):

@@ -84,8 +84,8 @@ def trace(number=0, n=BLOCKS, name=None, draws=True, cycles=2, seconds=40.0):
 
 def one_way(number=0):
     """A recording that only pulls."""
-    whole, here, name = trace(number), slice(80, 250), "pulling only"
-    cut = {name: getattr(whole.over_time, name)[..., here] for name in PER_BLOCK}
+    whole, part, name = trace(number), slice(80, 250), "pulling only"
+    cut = {name: getattr(whole.over_time, name)[..., part] for name in PER_BLOCK}
     none = dict.fromkeys(("flagged_time", "flagged_input", "flagged_output"), np.zeros(0))
     over_time = dataclasses.replace(whole.over_time, name=name, **cut, **none, flagged_kind=())
     forces = {n: cut[n] for n in ("input_force", "output_force", "stroke")}
@@ -98,11 +98,11 @@ def one_way(number=0):
     )
 
 
-def dependence_on(what, label, x, draws=True, runs=3):
+def dependence_on(case, label, x, draws=True, runs=3):
     middle = 0.787 + 0.02 * np.log(x / x.mean())
     points = np.linspace(x[2], x[-2], 4)
     return Dependence(
-        what=what, label=label, x=x, quantiles=middle + (0.01 * np.array([[-1], [0], [1]]) if draws else np.zeros((1, 1))),
+        what=case, label=label, x=x, quantiles=middle + (0.01 * np.array([[-1], [0], [1]]) if draws else np.zeros((1, 1))),
         constant=0.787, points_x=np.tile(points, runs),
         points_efficiency=np.tile(np.interp(points, x, middle), runs) + np.repeat(0.004 * np.arange(runs), 4),
         points_label=tuple(f"mounting {i}" for i in range(runs) for _ in points), place="at 470 mm",
@@ -186,9 +186,9 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
     for axes in figure.axes:
         place = axes.get_subplotspec()
         below = [a for a in figure.axes if a.get_subplotspec().colspan == place.colspan]
-        beside = [a for a in figure.axes if a.get_subplotspec().rowspan == place.rowspan]
+        neighbors = [a for a in figure.axes if a.get_subplotspec().rowspan == place.rowspan]
         assert any(a.get_xlabel() for a in below)
-        assert any(a.get_ylabel() for a in beside)
+        assert any(a.get_ylabel() for a in neighbors)
         assert place.rowspan.stop < lowest or axes.get_xlabel()
 
 
@@ -299,8 +299,8 @@ def test_of_many_cycles_only_the_first_are_shown_and_this_is_said():
 
 def test_thinned_lines_keep_every_peak():
     values = np.random.default_rng(1).standard_normal(100_000)
-    kept = extremes(values, 100)
-    assert len(kept) <= 200 and {values.argmin(), values.argmax()} <= set(kept.tolist())
+    indices = extremes(values, 100)
+    assert len(indices) <= 200 and {values.argmin(), values.argmax()} <= set(indices.tolist())
     np.testing.assert_array_equal(extremes(values[:150], 100), np.arange(150))
     long = trace(n=20_000)
     (axes,) = drawn("recordings", data_of([long])).axes
@@ -432,7 +432,7 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["two", pytest.param("twenty, long names", marks=pytest.mark.slow)])
 def test_the_same_data_give_the_same_small_files(case, tmp_path):
-    before = dict(mpl.rcParams)
+    initial = dict(mpl.rcParams)
     data = ONCE.data(case)
     for folder in ("first", "second"):
         written = [path for name in NAMES for path in write_figure_files(name, data[name], tmp_path / folder)]
@@ -441,7 +441,7 @@ def test_the_same_data_give_the_same_small_files(case, tmp_path):
         assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
         assert 1_000 < path.stat().st_size < 500_000, path.name
     assert "Input force (N)</text>" in (tmp_path / "first" / "hysteresis.svg").read_text(encoding="utf-8")
-    assert dict(mpl.rcParams) == before
+    assert dict(mpl.rcParams) == initial
 
 
 @pytest.mark.parametrize("case", CASES)

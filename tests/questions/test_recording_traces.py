@@ -19,8 +19,8 @@ def test_a_right_fit_lies_on_the_output_after_deep_valleys_too(tmp_path, rate):
     phase = (time / 4) % 1
     force, band = 5 + 180 * np.minimum(phase, 1 - phase), 0.12 * np.pi
     output = [force[0] * np.exp(-band)]
-    for one in force[1:]:
-        output.append(float(np.clip(output[-1], one * np.exp(-band), one * np.exp(band))))
+    for value in force[1:]:
+        output.append(float(np.clip(output[-1], value * np.exp(-band), value * np.exp(band))))
     noise = 0.1 * np.random.default_rng(1).standard_normal((2, len(time)))
     table = np.column_stack([time, force + noise[0], np.array(output) + noise[1]])
     np.savetxt(tmp_path / "r.csv", table, delimiter=",", header="time_s,input_force_N,output_force_N", comments="")

@@ -62,7 +62,7 @@ def drawn_anew(dataset: Dataset, values: dict[str, float], scale: float = 1.0) -
 def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
     dataset = data_set(name)
     again = drawn_anew(dataset, plausible_values(dataset))
-    for table, kept, read in (
+    for table, columns, read in (
         ("angles", ("route",), "angle"),
         ("efficiencies", ("route",), "efficiency"),
         ("forces", ("route", "run", "stroke"), "output_force"),
@@ -70,29 +70,29 @@ def test_tables_drawn_anew_keep_the_design_and_change_the_readings(name):
         ("preload", ("wrap_angle",), "preload"),
         ("loop", ("stroke",), "output_force"),
     ):
-        before, after = (d.measurements.table(KINDS[table].table) for d in (dataset, again))
-        assert (before is None) == (after is None)
-        if before is not None:
-            for column in kept:
-                np.testing.assert_array_equal(getattr(before, column), getattr(after, column))
-            assert getattr(before, read).shape == getattr(after, read).shape
-            assert not np.array_equal(getattr(before, read), getattr(after, read), equal_nan=True)
+        initial, after = (d.measurements.table(KINDS[table].table) for d in (dataset, again))
+        assert (initial is None) == (after is None)
+        if initial is not None:
+            for column in columns:
+                np.testing.assert_array_equal(getattr(initial, column), getattr(after, column))
+            assert getattr(initial, read).shape == getattr(after, read).shape
+            assert not np.array_equal(getattr(initial, read), getattr(after, read), equal_nan=True)
     recordings = again.measurements.table(Recordings)
     if recordings is not None:
-        for one, other in zip(dataset.measurements.table(Recordings).items, recordings.items, strict=True):
-            np.testing.assert_array_equal(one.blocks.time, other.blocks.time)
-            assert not np.array_equal(one.blocks.output_force, other.blocks.output_force)
+        for first, other in zip(dataset.measurements.table(Recordings).items, recordings.items, strict=True):
+            np.testing.assert_array_equal(first.blocks.time, other.blocks.time)
+            assert not np.array_equal(first.blocks.output_force, other.blocks.output_force)
     build_model(again)
 
 
 def test_angles_outside_the_range_of_the_curves_stay_as_measured(on_body):
     dataset = load_dataset(on_body)
     again = resimulate(dataset, plausible_values(dataset), jax.random.key(1))
-    table, drawn = dataset.measurements.table(AngleTable), again.measurements.table(AngleTable)
+    table, draws = dataset.measurements.table(AngleTable), again.measurements.table(AngleTable)
     outside = table.route > 530
-    np.testing.assert_array_equal(table.angle[outside], drawn.angle[outside])
-    assert np.all(np.isfinite(drawn.limit) == np.isnan(drawn.angle))
-    assert np.nanmin(drawn.angle) >= np.deg2rad(10)
+    np.testing.assert_array_equal(table.angle[outside], draws.angle[outside])
+    assert np.all(np.isfinite(draws.limit) == np.isnan(draws.angle))
+    assert np.nanmin(draws.angle) >= np.deg2rad(10)
 
 
 @pytest.mark.parametrize("name", ["on-body-exoskeleton", "synthetic-haptic-loop"])
@@ -103,8 +103,8 @@ def test_tables_drawn_without_noise_are_what_the_model_expects(name):
     named = {name: jnp.asarray(value) for name, value in values.items()}
     for term in build_model(again).terms:
         seen, expected = term.observed(), np.asarray(term.expected(named, jax.tree.map(jnp.asarray, term.data)))
-        known = np.isfinite(seen) & ~((seen == 0) & (expected <= 0))  # undetected angles; a slack rope
-        np.testing.assert_allclose(seen[known], expected[known], rtol=1e-9, atol=1e-9)
+        mask = np.isfinite(seen) & ~((seen == 0) & (expected <= 0))  # undetected angles; a slack rope
+        np.testing.assert_allclose(seen[mask], expected[mask], rtol=1e-9, atol=1e-9)
 
 
 def test_recordings_drawn_without_noise_show_the_friction_exponent_that_they_were_drawn_with():
@@ -186,7 +186,7 @@ def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
 
 
 @pytest.mark.parametrize(
-    ("name", "table", "column", "change", "why"),
+    ("name", "table", "column", "change", "reason"),
     [
         ("on-body-exoskeleton", "efficiencies", "efficiency", lambda e: 0.2 * e, "below 20 %"),
         ("on-body-exoskeleton", "efficiencies", "efficiency", lambda e: e**0.01, "above 99 %"),
@@ -202,6 +202,6 @@ def changed(dataset: Dataset, table: str, **columns: object) -> Dataset:
         ("synthetic-haptic-loop", "loop", "output_force", lambda f: 0.01 * f, "80 %"),
     ],
 )  # fmt: skip
-def test_tables_that_no_bench_would_hand_in_are_drawn_again(name, table, column, change, why):
+def test_tables_that_no_bench_would_hand_in_are_drawn_again(name, table, column, change, reason):
     dataset = data_set(name)
-    assert why in why_implausible(dataset, changed(dataset, table, **{column: change}))
+    assert reason in why_implausible(dataset, changed(dataset, table, **{column: change}))

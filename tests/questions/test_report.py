@@ -26,8 +26,8 @@ LONGER = f"{HOSTILE}\n\u202egnp.exe"  # which no description may hold, but a fol
 @pytest.fixture(scope="module")
 def chromium():
     """One browser for all tests of this file."""
-    with browser() as found:
-        yield found
+    with browser() as running_browser:
+        yield running_browser
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_names_stay_text(chromium, routed):
         assert reader.page.title() == HOSTILE
         assert "<b onclick='alert(3)'>" in reader.page.locator("section.part-coefficients tbody th").all_text_contents()
         assert reader.page.locator("script").count() == 2  # the library, and what draws with it
-        assert reader.said == []
+        assert reader.messages == []
 
 
 def test_a_name_that_turns_its_direction_is_written_out(chromium, routed, tmp_path):
@@ -98,7 +98,7 @@ def test_a_name_that_turns_its_direction_is_written_out(chromium, routed, tmp_pa
     with opened(chromium, path) as reader:
         assert reader.page.locator("h1").text_content().endswith("\\u202egnp.exe")
         assert "\u202e" not in reader.page.content()
-        assert reader.said == []
+        assert reader.messages == []
 
 
 def test_a_chart_is_zoomed_into_and_read_with_the_pointer(chromium, routed):
@@ -121,7 +121,7 @@ def test_a_chart_is_zoomed_into_and_read_with_the_pointer(chromium, routed):
         assert high - low == pytest.approx(0.3 * (whole[1] - whole[0]), rel=0.05)
         chart.get_by_role("button", name="Show all").click()
         assert shown(chart) == whole
-        assert reader.said == []
+        assert reader.messages == []
 
 
 def test_a_chart_is_read_with_the_keyboard(chromium, routed):
@@ -154,10 +154,10 @@ def test_each_recording_is_chosen_by_its_name(chromium, recorded):
         chart = reader.page.locator(CHART.format("recordings"))
         names = chart.locator("option").all_text_contents()
         assert len(names) == 7
-        before = shown(chart)
+        initial = shown(chart)
         chart.get_by_role("combobox").select_option(label=names[-1])
-        assert shown(chart) != before
-        assert reader.said == []
+        assert shown(chart) != initial
+        assert reader.messages == []
 
 
 def shown(chart):
@@ -220,10 +220,10 @@ def test_a_folder_that_is_no_fit_or_was_edited_is_refused(refuse, tmp_path):
 def test_a_fit_whose_report_cannot_be_written_is_kept(on_body, tmp_path, monkeypatch):
     from bowdenfit.questions.report import page
 
-    said = []
+    messages = []
     monkeypatch.setattr(page, "BELOW_FIGURES", (lambda _: 1 / 0,))
-    bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, figures=False, report=said.append)
-    (sentence,) = said
+    bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, figures=False, report=messages.append)
+    (sentence,) = messages
     assert "holds the whole fit, but its report could not be written (division by zero)" in sentence
     assert bf.load(tmp_path / "fit").converged
     assert not (tmp_path / "fit" / REPORT).exists()

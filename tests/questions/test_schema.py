@@ -54,5 +54,5 @@ def test_summaries_without_draws_follow_the_schema(summary):
 def test_the_published_summary_follows_the_schema():
     page = json.loads((ROOT / "fits" / "published" / "on-body-exoskeleton" / "summary.json").read_text())
     assert faults("summary", page) == []
-    known = bf.schema("summary")["properties"].keys()
-    assert {"optimal", "sampler"} <= page.keys() <= known
+    names = bf.schema("summary")["properties"].keys()
+    assert {"optimal", "sampler"} <= page.keys() <= names

@@ -36,10 +36,10 @@ def truths(**page: object) -> tuple[StatedTruth, ...]:
     return parse_truths(page, SPACE, "truth.toml")
 
 
-def drawn(stated: StatedTruth, n: int = 2000) -> np.ndarray:
+def drawn(truth: StatedTruth, n: int = 2000) -> np.ndarray:
     """True values in shown units."""
-    generator, prior = np.random.default_rng(1), stated.parameter.prior
-    return np.array([float(prior.constrain(stated.draw_z(generator))) for _ in range(n)]) * stated.parameter.shown_scale
+    generator, prior = np.random.default_rng(1), truth.parameter.prior
+    return np.array([float(prior.constrain(truth.draw_z(generator))) for _ in range(n)]) * truth.parameter.shown_scale
 
 
 def test_a_number_is_the_truth_of_every_replication():
@@ -48,9 +48,9 @@ def test_a_number_is_the_truth_of_every_replication():
 
 def test_a_range_of_what_is_positive_is_drawn_by_factors():
     """Halves of a logarithmic range: each of 200 draws 5 standard deviations wide, by chance out once in a million seeds."""
-    (stated,) = truths(sigma_F=[0.01, 1.0])
-    values = drawn(stated, 200)
-    assert stated.text == "sigma_F log-uniform from 0.01 to 1 N"
+    (truth,) = truths(sigma_F=[0.01, 1.0])
+    values = drawn(truth, 200)
+    assert truth.text == "sigma_F log-uniform from 0.01 to 1 N"
     assert 0.01 <= values.min() < values.max() <= 1.0
     assert abs(np.mean(values < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
 
@@ -60,24 +60,24 @@ def test_so_are_ranges_of_whatever_default_priors_leave_positive(name):
     """Noise scales and drag were drawn uniformly; by chance out once in a million seeds."""
     description = cable(1, friction_model="drag")
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
-    (stated,) = parse_truths({name: [0.01, 1.0]}, space, "truth.toml")
-    assert " log-uniform from 0.01 to 1" in stated.text
-    assert abs(np.mean(drawn(stated, 200) < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
+    (truth,) = parse_truths({name: [0.01, 1.0]}, space, "truth.toml")
+    assert " log-uniform from 0.01 to 1" in truth.text
+    assert abs(np.mean(drawn(truth, 200) < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
 
 
 def test_a_range_of_either_sign_is_drawn_uniformly():
     prior = {"free_angle_b": {"prior": {"normal": {"mean": 0.0, "sd": 1.0}}}}
     description = cable(1, ("angles",), prior=prior)
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
-    (stated,) = parse_truths({"free_angle_b": [-1.0, 3.0]}, space, "truth.toml")
-    values = drawn(stated, 200)
-    assert stated.text == "free_angle_b uniform from -1 to 3"
+    (truth,) = parse_truths({"free_angle_b": [-1.0, 3.0]}, space, "truth.toml")
+    values = drawn(truth, 200)
+    assert truth.text == "free_angle_b uniform from -1 to 3"
     assert -1.0 <= values.min() < values.max() <= 3.0
     assert abs(np.mean(values < 1.0) - 0.5) < 5 * np.sqrt(0.25 / 200)
 
 
 @pytest.mark.parametrize(
-    ("page", "why"),
+    ("page", "reason"),
     [
         ({"mu_egde": 0.1}, "'mu_egde' is not a parameter of this cable; did you mean 'mu_edge'"),
         ({"tau": 0.1}, "tau is fixed in cable.toml"),
@@ -91,19 +91,19 @@ def test_a_range_of_either_sign_is_drawn_uniformly():
         ({"mu_edge": {"low": 0.1}}, "neither a number nor a range"),
     ],
 )
-def test_what_can_be_no_truth_is_refused_in_a_sentence(page, why):
-    with pytest.raises(UsageError, match=why):
+def test_what_can_be_no_truth_is_refused_in_a_sentence(page, reason):
+    with pytest.raises(UsageError, match=reason):
         truths(**page)
 
 
 @pytest.mark.parametrize(
-    ("text", "why"), [("", "states no true value"), ("mu = ", "is not valid TOML"), (None, "does not exist")]
+    ("text", "reason"), [("", "states no true value"), ("mu = ", "is not valid TOML"), (None, "does not exist")]
 )
-def test_a_file_without_truths_is_refused_in_a_sentence(tmp_path, text, why):
+def test_a_file_without_truths_is_refused_in_a_sentence(tmp_path, text, reason):
     file = tmp_path / "truth.toml"
     if text is not None:
         file.write_text(text)
-    with pytest.raises(UsageError, match=why):
+    with pytest.raises(UsageError, match=reason):
         read_truths(file)
 
 
@@ -118,15 +118,15 @@ def test_only_coefficients_and_the_optimum_are_judged_and_only_by_their_interval
         Replication(i, {}, (), {"mu": ranked(float(generator.uniform())), "tau": ranked(0.999)}, 0.1)
         for i in range(200)
     ]
-    known = {"mu": QuantityLabel("mu"), "tau": QuantityLabel("tau", is_answer=False)}
-    assert set(summarize_replications(made, known).faults) == {"tau"}
-    found = summarize_replications(made, known, truths=("mu 0.1",))
-    assert found.is_calibrated
-    text = calibration_text(found)
+    expected = {"mu": QuantityLabel("mu"), "tau": QuantityLabel("tau", is_answer=False)}
+    assert set(summarize_replications(made, expected).faults) == {"tau"}
+    calibration = summarize_replications(made, expected, truths=("mu 0.1",))
+    assert calibration.is_calibrated
+    text = calibration_text(calibration)
     assert "true values were stated (mu 0.1), the others drawn from the priors" in " ".join(text.split())
     assert "(tau)" in text
     wrong = [Replication(i, {}, (), {"mu": ranked(0.999)}, 0.1) for i in range(200)]
-    assert "too narrow" in summarize_replications(wrong, known, truths=("mu 0.1",)).faults["mu"]
+    assert "too narrow" in summarize_replications(wrong, expected, truths=("mu 0.1",)).faults["mu"]
 
 
 BANDS = {0.5: (0.37, 0.63), 0.9: (0.82, 0.97)}
@@ -150,8 +150,8 @@ def test_right_intervals_are_caught_no_more_often_than_the_level(monkeypatch):
 def with_truth(laboratory: BatchFitter, **friction: object) -> dict[str, str]:
     """What is wrong with intervals of 24 cables whose coefficient is 0.2."""
     dataset = bench(**friction)
-    stated = parse_truths({"mu_edge": 0.2}, build_model(dataset).space, "truth.toml")
-    made = Replicator(CalibrationPlan(dataset, dataset, 1, stated), laboratory).replicate(range(24))
+    truth = parse_truths({"mu_edge": 0.2}, build_model(dataset).space, "truth.toml")
+    made = Replicator(CalibrationPlan(dataset, dataset, 1, truth), laboratory).replicate(range(24))
     return summarize_replications(list(made), {}, truths=("mu_edge 0.2",)).faults
 
 

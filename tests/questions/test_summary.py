@@ -33,8 +33,8 @@ def masked(text: str) -> str:
     text = re.sub(r"Influential reading.*?if\s+in\s+doubt\.", "Influential: ...", text, flags=re.S)  # the last ones vary
     text = re.sub(r"in doubt,.*?further\s+measurements\.", "in doubt, ...", text, flags=re.S)
     # Which prior leads, and which follow, varies with quick draws too.
-    first, others = r"(Interval widths depend on the prior of)", r"(Interval\s+widths\s+also\s+depend\s+on)"
-    text = re.sub(rf"{first} \w+[ ,:].*?{others}\s+the\s+priors?\s+of\s.*?\.", r"\1 ... \2 ...", text, flags=re.S)
+    first, remaining = r"(Interval widths depend on the prior of)", r"(Interval\s+widths\s+also\s+depend\s+on)"
+    text = re.sub(rf"{first} \w+[ ,:].*?{remaining}\s+the\s+priors?\s+of\s.*?\.", r"\1 ... \2 ...", text, flags=re.S)
     text = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", text)
     return re.sub(r"-{3,}", "---", re.sub(r"[ ]{2,}", "  ", text)).strip() + "\n"
 
@@ -69,9 +69,9 @@ def test_nothing_is_below_zero_by_rounding_alone():
 
 
 def test_a_page_that_nobody_reads_is_found_out(fit):
-    found = faults(details_text(fit))
+    page_faults = faults(details_text(fit))
     for fault in ("wider than 80", "lines", "no answer", "walkers", "LogNormal(", "condition number"):
-        assert any(fault.lower() in each.lower() for each in found), fault
+        assert any(fault.lower() in item.lower() for item in page_faults), fault
 
 
 def test_least_squares_alone_say_so_on_one_page(least_squares_of):

@@ -74,13 +74,13 @@ def test_efficiencies_above_1_are_no_fit_to_trust(tmp_path, runs, mcmc):
     with jax.enable_x64(True):
         page = summary_text(fit)
     assert faults(page) == [] and "DO NOT USE THESE NUMBERS" in page.splitlines()[0]
-    said = _told(fit)
-    assert "IMPOSSIBLE READINGS" in said and "swapped" in said and "run 1 13" in said
-    if mcmc and "determine no coefficient by itself" in said:
+    message = _told(fit)
+    assert "IMPOSSIBLE READINGS" in message and "swapped" in message and "run 1 13" in message
+    if mcmc and "determine no coefficient by itself" in message:
         assert NOT_IDENTIFIABLE in fit.verdict().troubles
     if mcmc and runs == 5:
         assert NOT_IDENTIFIABLE in fit.verdict().troubles
-        assert "hold 0 of 5" not in said or NOT_DESCRIBED in fit.verdict().troubles
+        assert "hold 0 of 5" not in message or NOT_DESCRIBED in fit.verdict().troubles
 
 
 @pytest.mark.extended
@@ -100,11 +100,11 @@ def _bends_of(folder, degrees: float, shown: float, settings=()):
 @pytest.mark.parametrize(("degrees", "shown"), [(180.0, np.pi), (30.0, np.rad2deg(30.0))])
 def test_friction_that_no_sheath_has_is_no_fit_to_trust(tmp_path, degrees, shown):
     """Radians headed deg, and degrees headed rad where they are few."""
-    found = _bends_of(tmp_path, degrees, shown).verdict()
-    assert list(found.troubles) == [IMPOSSIBLE]
-    assert "the unit of the wrap angles" in found.reasons[0] and "lognormal" in found.reasons[0]
-    stated = "friction.mu.prior.lognormal={median=1.0, log_sd=3.0}"
-    assert _bends_of(tmp_path, degrees, shown, [stated]).verdict().trusted
+    verdict = _bends_of(tmp_path, degrees, shown).verdict()
+    assert list(verdict.troubles) == [IMPOSSIBLE]
+    assert "the unit of the wrap angles" in verdict.reasons[0] and "lognormal" in verdict.reasons[0]
+    setting = "friction.mu.prior.lognormal={median=1.0, log_sd=3.0}"
+    assert _bends_of(tmp_path, degrees, shown, [setting]).verdict().trusted
     assert _bends_of(tmp_path, degrees, degrees).verdict().trusted
 
 
@@ -130,19 +130,19 @@ def test_a_reading_far_out_is_a_trouble_unless_the_noise_may_have_such(on_body, 
     assert student.parameter("mu3").q05 > normal.parameter("mu3").q05 + 0.02
 
 
-@pytest.mark.parametrize(("stated", "said"), [(0.03, True), (0.003, False)])
-def test_readings_that_scatter_far_less_than_was_stated_are_not_said_to_agree(stated, said, tmp_path):
+@pytest.mark.parametrize(("stated_value", "message"), [(0.03, True), (0.003, False)])
+def test_readings_that_scatter_far_less_than_was_stated_are_not_said_to_agree(stated_value, message, tmp_path):
     """Sixteen efficiencies that scatter by 0.3 %, and a standard deviation of 3 % or 0.3 % beside each."""
     rng, rows = np.random.default_rng(1), ["wrap_angle_deg,efficiency,efficiency_sd"]
     for angle in 30 + 15 * np.arange(16):
-        rows.append(f"{angle},{np.exp(-0.12 * np.deg2rad(angle) + 0.003 * rng.standard_normal()):.5f},{stated}")
+        rows.append(f"{angle},{np.exp(-0.12 * np.deg2rad(angle) + 0.003 * rng.standard_normal()):.5f},{stated_value}")
     (tmp_path / "efficiencies.csv").write_text("\n".join(rows) + "\n")
     fit = bf.fit(tmp_path / "efficiencies.csv", seed=1, settings=QUICK)
     text = " ".join(summary_text(fit).split())
     assert fit.verdict().trusted
-    assert ("but the readings of efficiencies scatter less than the fit predicts" in text) == said
-    assert ("Next: look at the noise that is stated" in text) == said
-    assert ("the readings agree with the model" in text) != said
+    assert ("but the readings of efficiencies scatter less than the fit predicts" in text) == message
+    assert ("Next: look at the noise that is stated" in text) == message
+    assert ("the readings agree with the model" in text) != message
 
 
 def test_least_squares_that_runs_to_no_friction_at_all_is_no_fit_to_trust(on_body, on_body_squares, tmp_path):
@@ -152,7 +152,7 @@ def test_least_squares_that_runs_to_no_friction_at_all_is_no_fit_to_trust(on_bod
     table = (exchanged / "efficiencies.csv").read_text()
     assert "510,75.3\n550,67.8" in table
     (exchanged / "efficiencies.csv").write_text(table.replace("510,75.3\n550,67.8", "510,67.8\n550,75.3"))
-    found = bf.fit(exchanged, mcmc=False).verdict()
-    assert list(found.troubles) == [NOT_IDENTIFIABLE]
-    assert "do not determine mu2" in found.reasons[0]
+    verdict = bf.fit(exchanged, mcmc=False).verdict()
+    assert list(verdict.troubles) == [NOT_IDENTIFIABLE]
+    assert "do not determine mu2" in verdict.reasons[0]
     assert on_body_squares.verdict().trusted

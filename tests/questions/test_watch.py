@@ -97,7 +97,7 @@ def test_the_history_is_drawn_and_written(tmp_path):
     history = History()
     for answer in reversed(answers):
         history = history.add(answer)
-    assert [one.mountings for one in history.answers] == list(range(2, 9))
+    assert [answer.mountings for answer in history.answers] == list(range(2, 9))
     assert "mu after 8 mountings" in str(history).splitlines()[0].replace("Mu", "mu")
     figure = history_figure.draw(history)
     assert figure.axes[0].get_xlabel() == "Mountings"

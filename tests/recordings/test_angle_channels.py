@@ -24,10 +24,10 @@ def recording(tmp_path, heading, angle, name="log.csv"):
     return tmp_path / name
 
 
-def refused(path, stated):
+def refused(path, stated_value):
     """The sentence with which a stated angle in degrees is refused; empty where it is not."""
     try:
-        refuse_other_angle(read_channels(path), {}, FORCE, np.deg2rad(stated))
+        refuse_other_angle(read_channels(path), {}, FORCE, np.deg2rad(stated_value))
     except bf.DatasetError as error:
         return str(error)
     return ""
@@ -83,10 +83,10 @@ def test_a_channel_that_the_user_names_for_something_is_not_asked_about(tmp_path
 @pytest.mark.parametrize("angle", ["value = 180, unit = 'deg'", "column = 'theta'"])
 def test_an_angle_that_contradicts_the_description_is_refused(tmp_path, angle):
     recording(tmp_path, "bend_deg", 90)
-    stated = 'wrap_angles = { theta = { value = 180, unit = "deg" } }' if "column" in angle else ""
+    setting = 'wrap_angles = { theta = { value = 180, unit = "deg" } }' if "column" in angle else ""
     (tmp_path / "cable.toml").write_text(
         f"schema = 1\nname = 'bench'\n[[contact]]\nname = 'sheath'\nfriction = 'mu'\nwrap_angle = {{ {angle} }}\n"
-        f"[tables]\nrecordings = {{}}\n[[recording]]\nfile = 'log.csv'\n{stated}\n"
+        f"[tables]\nrecordings = {{}}\n[[recording]]\nfile = 'log.csv'\n{setting}\n"
     )
     with pytest.raises(bf.BowdenfitError, match="'bend_deg' is 90deg throughout"):
         bf.read(tmp_path)

@@ -43,8 +43,8 @@ def counts(tmp_path):
     noise = 0.1 * generator.standard_normal((2, len(TIME)))
     ends = [7970 + (FORCE + noise[0]) / 2.23, 120 - (held_back(FORCE) + noise[1]) / 0.01]
 
-    def write(head, beside, input_force=INPUT, output_force=OUTPUT, more="", angle='{ column = "wrap_angle" }', route=""):
-        table = np.column_stack([TIME, *ends, beside])
+    def write(head, extra, input_force=INPUT, output_force=OUTPUT, more="", angle='{ column = "wrap_angle" }', route=""):
+        table = np.column_stack([TIME, *ends, extra])
         np.savetxt(tmp_path / "run.csv", table, "%.4f", ",", header=f"time_s,ai3,ai4,{head}", comments="")
         text = TOML.format(input=input_force, output=output_force, more=more, angle=angle, route=route)
         (tmp_path / "cable.toml").write_text(text)
@@ -84,10 +84,10 @@ def test_a_channel_of_the_length_places_a_recording(counts):
 
 
 def test_a_fit_with_counts_is_stored_and_read_back(counts, tmp_path):
-    found = bf.fit(counts("wrap_angle_deg", bend()), mcmc=False, output=tmp_path / "fit", figures=False)
+    fit = bf.fit(counts("wrap_angle_deg", bend()), mcmc=False, output=tmp_path / "fit", figures=False)
     again = bf.load(tmp_path / "fit")
-    assert again.dataset.description == found.dataset.description
-    assert found.least_squares.estimates["mu"].value == pytest.approx(EXPONENT / (np.pi / 2), rel=0.05)
+    assert again.dataset.description == fit.dataset.description
+    assert fit.least_squares.estimates["mu"].value == pytest.approx(EXPONENT / (np.pi / 2), rel=0.05)
 
 
 REFUSED = {
@@ -106,11 +106,11 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_is_refused_with_a_remedy(counts, refuse, what):
-    changed, said = REFUSED[what]
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_is_refused_with_a_remedy(counts, refuse, case):
+    changed, message = REFUSED[case]
     sentence = refuse("check", counts("encoder_deg", bend(), **changed))
-    assert all(part in sentence for part in said), sentence
+    assert all(part in sentence for part in message), sentence
 
 
 def test_a_bend_that_changes_or_is_said_twice_is_refused(counts, refuse):

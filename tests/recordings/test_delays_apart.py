@@ -13,8 +13,8 @@ BENCH = RecordedBench(rate=100, length=40, wave="sine", noise=0.002)
 def ending(folder, delay):
     """Verdict of a fit that is told a delay with an error of 2 ms."""
     file = write(BENCH, folder, 1) / "cable.toml"
-    stated = f'recordings = {{ prepare = {{ delay = {{ value = {delay}, sd = 2, unit = "ms" }} }} }}'
-    file.write_text(file.read_text().replace("recordings = {}", stated))
+    setting = f'recordings = {{ prepare = {{ delay = {{ value = {delay}, sd = 2, unit = "ms" }} }} }}'
+    file.write_text(file.read_text().replace("recordings = {}", setting))
     return bf.fit(folder, mcmc=False, seed=1).verdict()
 
 

@@ -29,6 +29,6 @@ def test_the_error_of_a_delay_is_as_large_as_said(unlike):
     """
     for seed in range(2):
         bench = RecordedBench(**unlike)
-        time, pulled, given = channels(bench, np.random.default_rng(seed)).values()
-        found = estimate_delay(time, pulled, given, np.ones(len(time), dtype=bool), 0.05)
-        assert abs(found.value - bench.delay) < 3.3 * found.sd < 0.1
+        time, pulled, output = channels(bench, np.random.default_rng(seed)).values()
+        delay = estimate_delay(time, pulled, output, np.ones(len(time), dtype=bool), 0.05)
+        assert abs(delay.value - bench.delay) < 3.3 * delay.sd < 0.1

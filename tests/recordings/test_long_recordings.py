@@ -31,27 +31,27 @@ def cycles(samples, rate=1000.0, period=4.0, noise=0.2, seed=1):
     phase = (time / period) % 1
     pulled = 20 + 60 * np.abs(2 * phase - 1)
     falling, rising = np.exp(EXPONENT) * pulled, np.exp(-EXPONENT) * pulled
-    given = np.where(phase < 0.5, np.minimum(80 * np.exp(-EXPONENT), falling), np.maximum(20 * np.exp(EXPONENT), rising))
+    output = np.where(phase < 0.5, np.minimum(80 * np.exp(-EXPONENT), falling), np.maximum(20 * np.exp(EXPONENT), rising))
     noises = noise * np.random.default_rng(seed).standard_normal((2, samples))
-    forces, velocity = (pulled + noises[0], given + noises[1]), np.where(phase < 0.5, -20.0, 20.0)
+    forces, velocity = (pulled + noises[0], output + noises[1]), np.where(phase < 0.5, -20.0, 20.0)
     return RawRecording("long", "long.csv", time, forces[0], time, forces[1], time, velocity)
 
 
 def with_faults(raw):
     """The recording with spikes, missing and frozen samples, clipping, and a clock of the output that has gaps and is late."""
-    given, n = raw.output_force.copy(), len(raw.output_force)
-    given[np.arange(300, n, 517)] += 80
-    given[(np.arange(n) % 311) < 4] -= 60  # four in a row are no spike
-    given[900:930] = given[-3:] = np.nan
-    given[2000:2200] = given[2000]
-    kept = np.random.default_rng(0).random(n) > 0.2
-    kept[5000:5100] = False
+    output, n = raw.output_force.copy(), len(raw.output_force)
+    output[np.arange(300, n, 517)] += 80
+    output[(np.arange(n) % 311) < 4] -= 60  # four in a row are no spike
+    output[900:930] = output[-3:] = np.nan
+    output[2000:2200] = output[2000]
+    mask = np.random.default_rng(0).random(n) > 0.2
+    mask[5000:5100] = False
     moved = np.where(np.arange(n) % 701 == 5, np.nan, raw.velocity)
     times = np.floor(raw.input_time * 600) / 600
     changes = {"input_time": times, "input_force": np.minimum(raw.input_force, 76.0), "velocity": moved}
     raw = replace(raw, **changes)
-    object.__setattr__(raw, "output_time", raw.output_time[kept] + 0.02)  # past the check that all arrays are equally long
-    object.__setattr__(raw, "output_force", given[kept])
+    object.__setattr__(raw, "output_time", raw.output_time[mask] + 0.02)  # past the check that all arrays are equally long
+    object.__setattr__(raw, "output_force", output[mask])
     return raw
 
 
@@ -117,22 +117,22 @@ def test_a_long_file_is_kept_in_half_the_bits_and_read_once(tmp_path, monkeypatc
     whole = made()[0]
     monkeypatch.setattr(csv_recording, "_MANY_ROWS", 1000)
     half, channels = made()
-    assert [each.values.dtype for each in channels.channels] == [np.float64, np.float32, np.float32, np.float32]
+    assert [channel.values.dtype for channel in channels.channels] == [np.float64, np.float32, np.float32, np.float32]
     assert half.input_force is channels.channels[1].values and half.input_time is half.velocity_time
     assert read_channels(file) is channels
     file.write_text(file.read_text() + "6.0000,50.0000,40.0000,0.0000\n")
     assert len(read_channels(file).channels[0].values) == 6001
-    one, other = (prepare(each, ON)[0] for each in (whole, half))
-    np.testing.assert_allclose(other.input_force, one.input_force, rtol=1e-7)
-    np.testing.assert_allclose(other.output_force, one.output_force, rtol=1e-7)
+    first, other = (prepare(item, ON)[0] for item in (whole, half))
+    np.testing.assert_allclose(other.input_force, first.input_force, rtol=1e-7)
+    np.testing.assert_allclose(other.output_force, first.output_force, rtol=1e-7)
 
 
 @pytest.mark.parametrize(("rate", "period"), [(250.0, 4.0), (5000.0, 8.0), (20_000.0, 2.0)])
 def test_the_main_motion_is_found_at_any_rate(rate, period):
     """Looked for in 8192 samples, one of 20 s at 5 kHz was taken for one of 1.6 s, and long recordings of it were refused."""
     raw = cycles(round(40 * period * rate), rate, period)
-    found = main_frequency(raw.input_force, raw.output_force, rate)
-    assert found == pytest.approx(1 / period, rel=0.15)
+    frequency = main_frequency(raw.input_force, raw.output_force, rate)
+    assert frequency == pytest.approx(1 / period, rel=0.15)
 
 
 def test_repeated_times_are_spread_in_pieces_as_in_one(monkeypatch):

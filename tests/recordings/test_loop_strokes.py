@@ -20,49 +20,49 @@ SLACK_FROM = 2 * PRELOAD * HALF_TURN / (1 - math.exp(-HALF_TURN))
 
 @pytest.mark.parametrize("shape", ["sine", "triangle"])
 def test_loss_and_exponent_of_a_recording_without_noise_are_found(shape):
-    found = strokes_of(recorded(shape, 60.0, noise=0.0))
-    assert found.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=2e-3)
-    assert found.exponent == pytest.approx(HALF_TURN, rel=2e-3)
-    assert found.center == pytest.approx(0.0, abs=0.02)
+    strokes = strokes_of(recorded(shape, 60.0, noise=0.0))
+    assert strokes.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=2e-3)
+    assert strokes.exponent == pytest.approx(HALF_TURN, rel=2e-3)
+    assert strokes.center == pytest.approx(0.0, abs=0.02)
 
 
 @pytest.mark.parametrize("amplitude", [20.0, 60.0, 120.0])
 def test_phases_are_where_the_loop_moves(amplitude):
     columns = recorded(amplitude=amplitude, noise=0.3)
     blocks, _ = prepared(columns)
-    found = find_strokes(blocks, "run.csv", "run", cable=LoopStrokes())
+    strokes = find_strokes(blocks, "run.csv", "run", cable=LoopStrokes())
     time, force = motor("sine", amplitude)
     rate = np.interp(blocks.time, time, np.gradient(output_of(force, PRELOAD, HALF_TURN), time))
-    assert found.used_sliding.any()
-    assert np.all(np.sign(rate[found.used_sliding]) == found.stroke[found.used_sliding])
-    assert found.noise < 0.3
+    assert strokes.used_sliding.any()
+    assert np.all(np.sign(rate[strokes.used_sliding]) == strokes.stroke[strokes.used_sliding])
+    assert strokes.noise < 0.3
 
 
 def test_without_slack_a_recording_tells_the_loss_and_not_the_exponent():
     columns = recorded(amplitude=25.0)
     assert np.abs(columns["input_force_N"]).max() < SLACK_FROM
-    found = strokes_of(columns)
-    assert found.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.01)
-    assert np.isnan(found.exponent)
-    assert any("does not go slack" in remark for remark in found.remarks)
-    stated = strokes_of(columns, preload=PRELOAD)
-    assert stated.exponent == pytest.approx(found.drag / (2 * PRELOAD))
-    assert not any("does not go slack" in remark for remark in stated.remarks)
+    strokes = strokes_of(columns)
+    assert strokes.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.01)
+    assert np.isnan(strokes.exponent)
+    assert any("does not go slack" in remark for remark in strokes.remarks)
+    stated_strokes = strokes_of(columns, preload=PRELOAD)
+    assert stated_strokes.exponent == pytest.approx(strokes.drag / (2 * PRELOAD))
+    assert not any("does not go slack" in remark for remark in stated_strokes.remarks)
 
 
 def test_without_preload_a_recording_tells_the_exponent_and_not_the_loss():
-    found = strokes_of(recorded(preload=0.0))
-    assert found.exponent == pytest.approx(HALF_TURN, rel=0.01)
-    assert np.isnan(found.drag)
+    strokes = strokes_of(recorded(preload=0.0))
+    assert strokes.exponent == pytest.approx(HALF_TURN, rel=0.01)
+    assert np.isnan(strokes.drag)
 
 
-@pytest.mark.parametrize(("amplitude", "told"), [(60.0, True), (20.0, False)])
-def test_either_sign_of_the_forces_is_right(amplitude, told):
+@pytest.mark.parametrize(("amplitude", "outcome"), [(60.0, True), (20.0, False)])
+def test_either_sign_of_the_forces_is_right(amplitude, outcome):
     columns = recorded(amplitude=amplitude)
-    found, turned = strokes_of(columns), strokes_of({n: v if n == "time_s" else -v for n, v in columns.items()})
-    assert turned.drag == pytest.approx(found.drag, rel=1e-4)
-    assert np.isfinite(found.exponent) == np.isfinite(turned.exponent) == told
-    assert np.mean(turned.stroke == -found.stroke) > 0.99
+    strokes, turned = strokes_of(columns), strokes_of({n: v if n == "time_s" else -v for n, v in columns.items()})
+    assert turned.drag == pytest.approx(strokes.drag, rel=1e-4)
+    assert np.isfinite(strokes.exponent) == np.isfinite(turned.exponent) == outcome
+    assert np.mean(turned.stroke == -strokes.stroke) > 0.99
 
 
 def test_a_recording_of_one_direction_is_enough():
@@ -74,20 +74,20 @@ def test_a_recording_of_one_direction_is_enough():
         "input_force_N": force + noise[0],
         "output_force_N": output_of(force, PRELOAD, HALF_TURN) + noise[1],
     }
-    found = strokes_of(columns)
-    assert set(found.stroke[found.used_sliding]) == {1}
-    assert found.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.03)
-    assert found.exponent == pytest.approx(HALF_TURN, rel=0.03)
-    assert any("moves forward throughout" in remark for remark in found.remarks)
+    strokes = strokes_of(columns)
+    assert set(strokes.stroke[strokes.used_sliding]) == {1}
+    assert strokes.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.03)
+    assert strokes.exponent == pytest.approx(HALF_TURN, rel=0.03)
+    assert any("moves forward throughout" in remark for remark in strokes.remarks)
 
 
 def test_load_cells_that_disagree_shift_the_center_and_not_the_loss():
     columns = recorded(amplitude=60.0)
     columns["output_force_N"] = columns["output_force_N"] - 5.0
-    found = strokes_of(columns)
-    assert found.center == pytest.approx(5.0, abs=0.1)
-    assert found.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.02)
-    assert any("off the output force by +" in remark for remark in found.remarks)
+    strokes = strokes_of(columns)
+    assert strokes.center == pytest.approx(5.0, abs=0.1)
+    assert strokes.drag == pytest.approx(2 * PRELOAD * HALF_TURN, rel=0.02)
+    assert any("off the output force by +" in remark for remark in strokes.remarks)
 
 
 def test_phases_set_by_hand_replace_those_found():
@@ -98,14 +98,14 @@ def test_phases_set_by_hand_replace_those_found():
         Phase(start=3.0, end=3.5, stroke="return"),
         Phase(start=5.0, end=5.5, stroke="pull"),
     )
-    found = find_strokes(blocks, "run.csv", "run", spans, LoopStrokes())
+    strokes = find_strokes(blocks, "run.csv", "run", spans, LoopStrokes())
     plain = find_strokes(blocks, "run.csv", "run", cable=LoopStrokes())
     inside = [(blocks.time >= s.start) & (blocks.time <= s.end) for s in spans]
-    assert [set(found.stroke[part]) for part in inside] == [{0}, {-1}, {1}]
-    assert not found.used_sliding[inside[0]].any()
+    assert [set(strokes.stroke[part]) for part in inside] == [{0}, {-1}, {1}]
+    assert not strokes.used_sliding[inside[0]].any()
     outside = ~np.any(inside, axis=0)
-    assert np.array_equal(found.stroke[outside], plain.stroke[outside])
-    assert found.by_hand
+    assert np.array_equal(strokes.stroke[outside], plain.stroke[outside])
+    assert strokes.by_hand
 
 
 def test_the_motor_s_overtones_are_not_taken_for_noise():
@@ -124,13 +124,13 @@ def test_a_delay_is_not_estimated_but_a_stated_one_is_applied(tmp_path):
     assert [r.account.delay for r in plain.table(Recordings).items] == [0.0, 0.0]
     assert sum("not estimated for a loop" in remark for remark in plain.remarks) == 1
     assert any('delay = { value = 10, unit = "ms" }' in remark for remark in plain.remarks)
-    stated = 'recordings = { prepare = { delay = { value = 50, unit = "ms", sd = 2 } } }'
-    found = load_dataset(folder_of(tmp_path, [late], more=f"[tables]\n{stated}"))
-    assert found.measurements.table(Recordings) is not None
-    strokes = found.measurements.table(Recordings).items[0].strokes
+    setting = 'recordings = { prepare = { delay = { value = 50, unit = "ms", sd = 2 } } }'
+    dataset = load_dataset(folder_of(tmp_path, [late], more=f"[tables]\n{setting}"))
+    assert dataset.measurements.table(Recordings) is not None
+    strokes = dataset.measurements.table(Recordings).items[0].strokes
     assert strokes.exponent == pytest.approx(HALF_TURN, rel=0.02)
-    assert "delay_error" in {p.name for p in build_model(found).space.free}
-    assert not any("not estimated" in remark for remark in found.measurements.remarks)
+    assert "delay_error" in {p.name for p in build_model(dataset).space.free}
+    assert not any("not estimated" in remark for remark in dataset.measurements.remarks)
 
 
 # What is refused --------------------------------------------------------------------------------------------------

@@ -90,5 +90,5 @@ def test_an_output_that_much_friction_holds_most_of_the_time_is_not_called_dead(
     for x in np.log(force):
         y = min(max(y, x - exponent), x + exponent)
         output.append(y)
-    blocks, found = used(accept("check", *recorded(force, np.exp(output))))
-    assert blocks > 5 and found == pytest.approx(exponent, rel=0.1)
+    blocks, computed = used(accept("check", *recorded(force, np.exp(output))))
+    assert blocks > 5 and computed == pytest.approx(exponent, rel=0.1)

@@ -47,8 +47,8 @@ def test_a_loop_about_another_ratio_is_refused_with_that_ratio(tmp_path, ratio, 
     path = write_recording(tmp_path / "log.csv", ratio, shape=shape, load=load)
     with pytest.raises(bf.BowdenfitError, match="follows a reversing input in a loop about") as refusal:
         recording_of(path)
-    stated = float(str(refusal.value).split("sensors.output_ratio=")[1].split(" ")[0])
-    assert stated == pytest.approx(1 / ratio, rel=0.05)
+    stated_ratio = float(str(refusal.value).split("sensors.output_ratio=")[1].split(" ")[0])
+    assert stated_ratio == pytest.approx(1 / ratio, rel=0.05)
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 2.0])

@@ -100,13 +100,13 @@ def with_lengths(raw, **channels):
 
 def flags_of(raw, side, **switches):
     """Faults of one channel of a recording."""
-    mine, other = (raw.input_force, raw.output_force) if side == "input" else (raw.output_force, raw.input_force)
-    return flag_samples(raw.input_time, mine, raw.input_time, other, ON.model_copy(update=switches))
+    side_force, other = (raw.input_force, raw.output_force) if side == "input" else (raw.output_force, raw.input_force)
+    return flag_samples(raw.input_time, side_force, raw.input_time, other, ON.model_copy(update=switches))
 
 
-def score(found, put_in):
+def score(computed, put_in):
     """Share of what was put in that was found, and share of all samples flagged wrongly."""
-    return np.mean(found[put_in]), np.mean(found & ~put_in)
+    return np.mean(computed[put_in]), np.mean(computed & ~put_in)
 
 
 # --- play operator
@@ -229,10 +229,10 @@ def test_quick_reversals_and_steps_are_no_spikes(rate, noise):
 def test_spikes_of_one_to_three_samples_are_found():
     generator = np.random.default_rng(2)
     force, put_in = RAW.output_force.copy(), np.zeros(len(RAW.output_force), dtype=bool)
-    for at in range(200, len(force) - 200, 250):
-        where = slice(at, at + int(generator.integers(1, 4)))
-        force[where] += generator.choice([-1, 1]) * generator.uniform(10, 200)
-        put_in[where] = True
+    for start in range(200, len(force) - 200, 250):
+        rows = slice(start, start + int(generator.integers(1, 4)))
+        force[rows] += generator.choice([-1, 1]) * generator.uniform(10, 200)
+        put_in[rows] = True
     channel, _ = flags_of(replace(RAW, output_force=force), "output")
     hits, false = score(channel.fault == SPIKE, put_in)
     assert hits >= 0.95 and false < 1e-3
@@ -243,9 +243,9 @@ def test_spikes_of_one_to_three_samples_are_found():
 def test_frozen_and_missing_samples_are_found(side):
     force = getattr(RAW, f"{side}_force").copy()
     put_in = np.zeros(len(force), dtype=bool)
-    for at in (1700, 3000, 7000, 9300, 15000, 26000):
-        force[at : at + 150] = force[at]
-        put_in[at : at + 150] = True
+    for start in (1700, 3000, 7000, 9300, 15000, 26000):
+        force[start : start + 150] = force[start]
+        put_in[start : start + 150] = True
     force[20000:20050] = np.nan
     put_in[20000:20050] = True
     raw = replace(RAW, **{f"{side}_force": force})
@@ -270,15 +270,15 @@ def test_samples_interpolated_over_a_gap_of_the_other_clock_are_dropouts():
 
 
 @pytest.mark.parametrize("side", ["input", "output"])
-@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("stated_value", [True, False])
 @pytest.mark.parametrize("noise", [0.0, 0.5])
-def test_readings_at_the_end_of_the_range_are_found(side, stated, noise):
+def test_readings_at_the_end_of_the_range_are_found(side, stated_value, noise):
     raw = recording(noise=noise)
     force = getattr(raw, f"{side}_force")
     top = quantised(0.8 * force.max())
     clipped = replace(raw, **{f"{side}_force": np.minimum(force, top)})
-    channel, ends = flags_of(clipped, side, limits=ForceLimits(low=-top, high=top, unit="N") if stated else None)
-    hits, false = score(channel.fault == SATURATED, force >= top - (RANGE / 4096 * 1.01 if stated else 0))
+    channel, ends = flags_of(clipped, side, limits=ForceLimits(low=-top, high=top, unit="N") if stated_value else None)
+    hits, false = score(channel.fault == SATURATED, force >= top - (RANGE / 4096 * 1.01 if stated_value else 0))
     assert hits >= 0.95 and false < 1e-3
     assert ends[1] == pytest.approx(top)
     assert not np.any(flags_of(clipped, side, saturation="kept")[0].fault)
@@ -290,8 +290,8 @@ def test_an_ordinary_plateau_of_a_quantised_force_is_not_clipping():
     for noise in (0.0, 0.03, 0.1):
         generator = np.random.default_rng(3)
         force = quantised(slow + generator.normal(0, noise, len(time)))
-        ends, found = saturation(force, slow, 1.0, None, 250)
-        assert not found.any() and ends == (-np.inf, np.inf)
+        ends, computed = saturation(force, slow, 1.0, None, 250)
+        assert not computed.any() and ends == (-np.inf, np.inf)
 
 
 # --- delay
@@ -352,8 +352,8 @@ def test_a_load_cell_with_a_wrong_gain_does_not_shift_the_delay():
 def test_a_recording_without_reversal_does_not_tell_the_delay():
     time = np.arange(10000) / 1000
     pull = np.exp(np.log(50) + 0.15 * time)
-    found = estimate_delay(time, pull, pull * np.exp(-EXPONENT), np.ones(len(time), dtype=bool), 0.05)
-    assert found.value == 0 and np.isnan(found.sd) and "cannot be known from this recording" in found.remark
+    delay = estimate_delay(time, pull, pull * np.exp(-EXPONENT), np.ones(len(time), dtype=bool), 0.05)
+    assert delay.value == 0 and np.isnan(delay.sd) and "cannot be known from this recording" in delay.remark
 
 
 def test_a_given_delay_is_applied_as_it_is():
@@ -506,7 +506,7 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
     heading = generator.choice([-1.0, 0.0, 1.0], size=x.shape)
     rests = Rests(generator.normal(size=x.shape), heading) if rested else None
     exponents = np.array([0.0, 0.05, 0.3])
-    found = play_along_rows(x, start, exponents, rests)
+    computed = play_along_rows(x, start, exponents, rests)
     for e, row in np.ndindex(3, rows):
         y = start[row]
         for t in range(points):
@@ -515,7 +515,7 @@ def test_all_rows_follow_the_play_operator_value_by_value(rows, points, rested):
                 level = rests.level[row, t]
                 low = high = min(level, high) if heading[row, t] < 0 else max(level, low)
             y = min(max(y, low), high)
-            assert found[e, row, t] == y
+            assert computed[e, row, t] == y
 
 
 @pytest.mark.parametrize("blocks", [7, 8, 50, 1000])
@@ -542,10 +542,10 @@ def up_and_down(seconds_long: int, period: int = 4, rate: int = 50, more: float 
     output = np.exp(play(np.log(np.tile(force, 2)), EXPONENT)[0])[-len(force) :]
     n, noise = seconds_long // period, np.random.default_rng(1)
     clock = np.arange(n * len(force)) / rate
-    pulled, given = (
+    pulled, output_force = (
         np.tile(f, n) + 0.2 * noise.standard_normal(len(clock)) + more * np.sin(40 * np.pi * clock) for f in (force, output)
     )
-    return RawRecording("up and down", "long.csv", clock, pulled, clock, given)
+    return RawRecording("up and down", "long.csv", clock, pulled, clock, output_force)
 
 
 @pytest.mark.parametrize(("seconds_long", "more"), [(40, 0.0), (400, 0.0), (1200, 0.0), (1200, 2.0)])

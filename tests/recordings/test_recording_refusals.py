@@ -113,17 +113,17 @@ def test_good_recordings_are_accepted(columns, accept, tmp_path):
 
 def test_a_clock_that_runs_backwards_is_refused(columns, refuse, tmp_path):
     columns["time_s"] = np.where(np.arange(len(columns["time_s"])) < 300, columns["time_s"], columns["time_s"] - 2.0)
-    said = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
+    message = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
     for part in ("run.csv", "input_force", "backwards", "sample 301", "from 2.99 s to 1 s", "Split"):
-        assert part in said
+        assert part in message
 
 
 @pytest.mark.parametrize("name", ["input_force", "output_force"])
 def test_a_constant_channel_is_refused(columns, refuse, tmp_path, name):
     columns[f"{name}_N"] = np.full(len(columns["time_s"]), 5.0)
-    said = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
+    message = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
     for part in ("run.csv", name, "5 N in every sample", "unplugged", "leave the recording out"):
-        assert part in said
+        assert part in message
 
 
 def test_a_channel_that_ends_early_counts_as_missing_from_there(columns, accept, tmp_path):
@@ -136,9 +136,9 @@ def test_channels_and_clocks_of_different_length_are_refused(columns, refuse, tm
     clock, force_in, force_out, _ = columns.values()
     scipy.io.savemat(path, {"t": clock[:-7], "fin": force_in, "fout": force_out})
     channels = ["--channel", "input_force=fin:N", "--channel", "output_force=fout:N", "--channel", "time=t:s"]
-    said = refuse("check", *alone(path), *channels)
+    message = refuse("check", *alone(path), *channels)
     for part in ("run.mat", "'fin'", f"{len(clock)} samples", str(len(clock) - 7), "--channel time=1000Hz"):
-        assert part in said
+        assert part in message
 
 
 @pytest.mark.parametrize("verb", ["check", "fit"])
@@ -151,9 +151,9 @@ def test_swapped_channels_are_refused_with_the_way_to_swap_them(
     columns = during(columns, simulated, PULL) if part == "pull" else columns
     path = write(tmp_path / "run.csv", exchanged(columns))
     output = ["--output", tmp_path / "results"] if verb == "fit" else []
-    said = refuse(verb, *alone(path), *output)
+    message = refuse(verb, *alone(path), *output)
     for words in ("run.csv", *SWAP):
-        assert words in said
+        assert words in message
 
 
 def test_swapping_swapped_channels_is_accepted(columns, accept, tmp_path):
@@ -165,9 +165,9 @@ def test_swapping_swapped_channels_is_accepted(columns, accept, tmp_path):
 def test_the_wrong_sign_is_refused_and_can_be_turned(columns, refuse, accept, tmp_path):
     columns["input_force_N"] = -columns["input_force_N"]
     path = write(tmp_path / "run.csv", columns)
-    said = refuse("check", *alone(path))
+    message = refuse("check", *alone(path))
     for part in ("run.csv", "input_force", "negative", "sign convention", "--channel input_force=NAME:-N"):
-        assert part in said
+        assert part in message
     assert "0.30" in accept("check", *alone(path), "--channel", "input_force=input_force_N:-N")
 
 
@@ -180,9 +180,9 @@ def test_a_lone_pull_is_accepted_with_a_remark(columns, simulated, accept, tmp_p
 def test_a_lone_return_is_refused_unless_set_by_hand(columns, simulated, refuse, accept, tmp_path, velocity):
     columns = columns if velocity else without_velocity(columns)
     path = write(tmp_path / "run.csv", during(columns, simulated, RETURN))
-    said = refuse("check", *alone(path))
+    message = refuse("check", *alone(path))
     for part in ("run.csv", "return stroke alone", "cable.toml", 'stroke = "return"', *SWAP):
-        assert part in said
+        assert part in message
     start, end = simulated.time[np.flatnonzero(simulated.stroke == RETURN)[[0, -1]]]
     describe(tmp_path, ("at = 470", f'at = 470\nstrokes = [{{ start = {start}, end = {end}, stroke = "return" }}]'))
     describe(tmp_path, ('"whole"', '"runs"'), text=(tmp_path / "cable.toml").read_text())
@@ -192,9 +192,9 @@ def test_a_lone_return_is_refused_unless_set_by_hand(columns, simulated, refuse,
 def test_a_whole_recording_without_a_reversal_is_refused(columns, simulated, refuse, tmp_path):
     write(tmp_path / "run.csv", during(columns, simulated, PULL))
     describe(tmp_path)
-    said = refuse("fit", tmp_path, "--output", tmp_path / "results")
+    message = refuse("fit", tmp_path, "--output", tmp_path / "results")
     for part in ("run.csv", "no reversal", 'likelihood = "runs"'):
-        assert part in said
+        assert part in message
 
 
 HEADINGS = [
@@ -210,24 +210,24 @@ HEADINGS = [
 
 @pytest.mark.parametrize(("old", "new", "parts"), HEADINGS)
 def test_a_heading_that_does_not_say_enough_is_refused(columns, refuse, tmp_path, old, new, parts):
-    said = refuse("check", *alone(write(tmp_path / "run.csv", renamed(columns, old, new))))
+    message = refuse("check", *alone(write(tmp_path / "run.csv", renamed(columns, old, new))))
     for part in ("run.csv", *parts):
-        assert part in said, said
+        assert part in message, message
 
 
 def test_two_channels_of_one_name_are_refused_until_one_is_chosen(columns, refuse, accept, tmp_path):
     path = write(tmp_path / "run.csv", {**columns, "Input force (N)": columns["input_force_N"] + 1})
-    said = refuse("check", *alone(path))
+    message = refuse("check", *alone(path))
     for part in ("run.csv", "'input_force_N', 'Input force'", "--channel input_force=input_force_N", "cable.toml"):
-        assert part in said
+        assert part in message
     accept("check", *alone(path), "--channel", "input_force=input_force_N")
 
 
 def test_a_copy_of_a_channel_is_refused(columns, refuse, tmp_path):
     columns["output_force_N"] = columns["input_force_N"]
-    said = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
-    assert "copies of each other" in said
-    assert "'output_force_N'" in said
+    message = refuse("check", *alone(write(tmp_path / "run.csv", columns)))
+    assert "copies of each other" in message
+    assert "'output_force_N'" in message
 
 
 CHANNELS = [
@@ -257,9 +257,9 @@ CHANNELS = [
 @pytest.mark.parametrize(("channels", "parts"), CHANNELS)
 def test_a_wrong_channel_option_is_refused(columns, refuse, tmp_path, channels, parts):
     path = write(tmp_path / "run.csv", columns)
-    said = refuse("check", *alone(path), *(word for c in channels for word in ("--channel", c)))
+    message = refuse("check", *alone(path), *(word for c in channels for word in ("--channel", c)))
     for part in parts:
-        assert part in said, said
+        assert part in message, message
 
 
 def test_channels_of_a_data_set_without_recordings_are_refused(on_body, refuse):
@@ -313,9 +313,9 @@ def test_a_file_that_is_no_recording_is_refused(columns, refuse, tmp_path, endin
     path = tmp_path / f"run{ending}"
     path.write_bytes(data[: int(len(data) * share)])
     for arguments in (("check",), ("fit", "--output", tmp_path / "results")):
-        said = refuse(*arguments, *alone(path))
+        message = refuse(*arguments, *alone(path))
         for part in parts:
-            assert part in said, said
+            assert part in message, message
 
 
 def test_a_csv_cut_off_in_the_middle_is_read_up_to_there_and_says_so(columns, accept, tmp_path):
@@ -326,18 +326,18 @@ def test_a_csv_cut_off_in_the_middle_is_read_up_to_there_and_says_so(columns, ac
 
 def test_missing_files_and_folders_are_refused(refuse, tmp_path):
     for name in ("none.csv", "none.mat"):
-        said = refuse("check", *alone(tmp_path / name))
-        assert name in said
-        assert "does not exist" in said
+        message = refuse("check", *alone(tmp_path / name))
+        assert name in message
+        assert "does not exist" in message
     assert "is a folder, not a recording" in refuse("check", *alone(tmp_path))
 
 
 def test_a_file_that_is_too_large_is_refused(columns, refuse, tmp_path, monkeypatch):
     path = write(tmp_path / "run.csv", columns)
     monkeypatch.setattr(csv_recording, "LARGEST_BYTES", 1000)
-    said = refuse("check", *alone(path))
+    message = refuse("check", *alone(path))
     for part in ("run.csv", "more than", "Parquet", "cut it into runs"):
-        assert part in said
+        assert part in message
 
 
 def describe(folder, *changes, text=TOML):
@@ -422,26 +422,26 @@ DESCRIPTIONS = [
 def test_a_spoiled_description_of_recordings_is_refused(columns, refuse, tmp_path, changes, parts):
     write(tmp_path / "run.csv", columns)
     describe(tmp_path, *changes)
-    said = refuse("check", tmp_path)
+    message = refuse("check", tmp_path)
     for part in parts:
-        assert part in said, said
+        assert part in message, message
 
 
 def test_velocities_of_the_rope_and_of_the_motor_do_not_mix(columns, refuse, tmp_path):
     write(tmp_path / "run.csv", columns)
     write(tmp_path / "motor.csv", renamed(columns, "mm/s", "rpm"))
     describe(tmp_path, *with_key('[[recording]]\nfile = "motor.csv"\nat = 500'))
-    said = refuse("check", tmp_path)
+    message = refuse("check", tmp_path)
     for part in ("run.csv and motor.csv", "rope", "motor", "mm/s or both in r/min"):
-        assert part in said
+        assert part in message
 
 
-@pytest.mark.parametrize(("at", "refused"), [(470, False), (550, False), (640, True)])
-def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path, at, refused):
+@pytest.mark.parametrize(("index", "refused"), [(470, False), (550, False), (640, True)])
+def test_a_recording_outside_the_curves_needs_a_row_of_angles(columns, tmp_path, index, refused):
     write(tmp_path / "run.csv", columns)
     describe(tmp_path)
     data = load_dataset(tmp_path)
-    moved = replace(data.measurements.table(Recordings).items[0], route=float(at))
+    moved = replace(data.measurements.table(Recordings).items[0], route=float(index))
     recordings = replace(data.measurements.table(Recordings), items=(moved,))
     if not refused:
         KINDS["recordings"].check(recordings, data.description, data.measurements)
@@ -504,9 +504,9 @@ def test_a_run_of_which_nothing_can_be_used_is_refused(on_body, likelihood):
 
     folder = on_body.parent / "synthetic-recordings"
     data = load_dataset(folder, [f'tables.recordings.likelihood="{likelihood}"'])
-    first, *others = data.measurements.table(Recordings).items
+    first, *remaining = data.measurements.table(Recordings).items
     blocks = replace(first.blocks, output_force=-np.abs(first.blocks.output_force))
-    recordings = replace(data.measurements.table(Recordings), items=(replace(first, blocks=blocks), *others))
+    recordings = replace(data.measurements.table(Recordings), items=(replace(first, blocks=blocks), *remaining))
     bad = replace(data, measurements=data.measurements.with_tables(recordings))
     with jax.enable_x64(True), pytest.raises(DatasetError, match=r"nothing of the run .* can be used") as error:
         build_model(bad)

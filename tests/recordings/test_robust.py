@@ -32,18 +32,18 @@ def by_scipy(model, start, limits):
 @pytest.mark.parametrize("outliers", [0, 3, 20])
 def test_the_minimum_of_a_line_is_scipy_s(outliers):
     model = line(1, outliers)
-    found, cost = robust_minimum(model, np.array([30.0, -50.0]), *FREE)
+    minimum, cost = robust_minimum(model, np.array([30.0, -50.0]), *FREE)
     expected = by_scipy(model, [30.0, -50.0], FREE)
-    np.testing.assert_allclose(found, expected.x, rtol=1e-6)
+    np.testing.assert_allclose(minimum, expected.x, rtol=1e-6)
     assert cost == pytest.approx(expected.cost, rel=1e-12)
 
 
 @pytest.mark.parametrize("limits", [[[3.5, -np.inf], [np.inf, np.inf]], [[-np.inf, -np.inf], [np.inf, 1.5]]])
 def test_a_parameter_beyond_its_limit_stays_there_and_the_other_goes_on(limits):
     model = line(2)
-    found, cost = robust_minimum(model, np.array([4.0, 1.0]), *np.array(limits))
+    minimum, cost = robust_minimum(model, np.array([4.0, 1.0]), *np.array(limits))
     expected = by_scipy(model, [4.0, 1.0], limits)
-    np.testing.assert_allclose(found, expected.x, rtol=1e-6)
+    np.testing.assert_allclose(minimum, expected.x, rtol=1e-6)
     assert cost == pytest.approx(expected.cost, rel=1e-9)
 
 
@@ -67,11 +67,11 @@ def loop_model(generator):
 
 
 @pytest.mark.parametrize(
-    ("make", "at"),
+    ("make", "time"),
     [(rope_model, [0.23, 0.01, 0.05]), (rope_model, [0.3, -0.02, 0.0]), (loop_model, [0.28, 0.37, 0.02])],
 )
-def test_slopes_are_differences_of_the_residuals(make, at):
-    model, point = make(np.random.default_rng(3)), np.array(at)
+def test_slopes_are_differences_of_the_residuals(make, time):
+    model, point = make(np.random.default_rng(3)), np.array(time)
     slopes = model(point)[1]
     for k in range(3):
         step = 1e-7 * np.eye(3)[k]
@@ -81,9 +81,9 @@ def test_slopes_are_differences_of_the_residuals(make, at):
 
 @pytest.mark.parametrize(("exponent", "drag"), [(0.02, 0.0), (0.25, 0.0), (0.25, 3.0), (0.6, 0.5)])
 def test_a_rope_without_noise_is_followed_exactly(exponent, drag):
-    found = rope_strokes.fit_loop(*cycles(exponent, drag))
-    assert found.cost < 1e-3
-    assert (found.exponent, found.lost) == pytest.approx((exponent, drag), rel=2e-3, abs=1e-3)
+    computed = rope_strokes.fit_loop(*cycles(exponent, drag))
+    assert computed.cost < 1e-3
+    assert (computed.exponent, computed.lost) == pytest.approx((exponent, drag), rel=2e-3, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -91,8 +91,8 @@ def test_no_start_nearby_leads_scipy_to_a_lower_cost_of_a_noisy_rope(seed):
     generator = np.random.default_rng(seed)
     model = rope_model(generator)
     limits = np.array([[1e-9, -np.inf, 0.0], [np.inf] * 3])
-    found, cost = robust_minimum(model, np.array([0.3, 0.0, 0.01]), *limits)
-    assert cost == pytest.approx(robust_cost(model(found)[0]), rel=1e-14)
+    minimum, cost = robust_minimum(model, np.array([0.3, 0.0, 0.01]), *limits)
+    assert cost == pytest.approx(robust_cost(model(minimum)[0]), rel=1e-14)
     for _ in range(3):
-        start = np.maximum(found * generator.uniform(0.8, 1.2, 3), limits[0] + 1e-6)
+        start = np.maximum(minimum * generator.uniform(0.8, 1.2, 3), limits[0] + 1e-6)
         assert cost < by_scipy(model, start, limits).cost * (1 + 1e-9)

@@ -20,5 +20,5 @@ def test_two_recordings_may_share_a_run_without_names(tmp_path):
     assert '"470 mm, 60 r/min"' in text and '"470 mm, 40 r/min"' in text
     description.write_text(text.replace('"470 mm, 60 r/min"', '"470 mm, 40 r/min"'))
     recordings = bf.read(folder).measurements.table(Recordings)
-    shared = [each for each in recordings.items if each.run == "470 mm, 40 r/min"]
-    assert [each.name for each in shared] == ["470 mm, 40 r/min, 470mm_40rpm", "470 mm, 40 r/min, 470mm_60rpm"]
+    shared = [item for item in recordings.items if item.run == "470 mm, 40 r/min"]
+    assert [item.name for item in shared] == ["470 mm, 40 r/min, 470mm_40rpm", "470 mm, 40 r/min, 470mm_60rpm"]

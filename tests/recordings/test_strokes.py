@@ -162,10 +162,10 @@ def test_blocks_beside_a_change_of_the_contact_are_not_used():
     for velocity in ("recorded", "absent"):
         strokes = found(velocity, noise=0.5, partial_reversals=PARTIAL).strokes
         state, used = strokes.stroke, strokes.used_sliding
-        beside = np.flatnonzero(np.diff(state))
-        assert len(beside) > 10
-        assert not used[beside].any()
-        assert not used[beside + 1].any()
+        edges = np.flatnonzero(np.diff(state))
+        assert len(edges) > 10
+        assert not used[edges].any()
+        assert not used[edges + 1].any()
         assert not used[state == SWITCH].any()
 
 

@@ -29,11 +29,11 @@ def test_torques_over_the_radii_are_forces(tmp_path):
     (tmp_path / "a").mkdir()
     forces = load_dataset(folder_of(tmp_path, [columns])).measurements.table(Recordings)
     torques = folder_of(tmp_path / "a", [as_torques(columns, unit="N_mm")], cable=f"{IN_RADIUS}\n{OUT_RADIUS}")
-    found = load_dataset(torques).measurements.table(Recordings)
-    assert forces is not None and found is not None
+    table = load_dataset(torques).measurements.table(Recordings)
+    assert forces is not None and table is not None
     for end in ("input_force", "output_force"):
-        one, other = (getattr(r.items[0].blocks, end) for r in (forces, found))
-        np.testing.assert_allclose(one, other, atol=1e-6)
+        first, other = (getattr(r.items[0].blocks, end) for r in (forces, table))
+        np.testing.assert_allclose(first, other, atol=1e-6)
 
 
 def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
@@ -44,9 +44,9 @@ def test_a_torque_at_one_end_only_and_a_named_channel_are_read(tmp_path):
         "output_force_N": columns["output_force_N"],
     }
     path = folder_of(tmp_path, [mixed], cable=IN_RADIUS)
-    found = load_dataset(path, channels=parse_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
-    assert found is not None
-    assert found.items[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
+    table = load_dataset(path, channels=parse_channels(["input_torque=motor:-N*mm"])).measurements.table(Recordings)
+    assert table is not None
+    assert table.items[0].blocks.input_force.max() == pytest.approx(columns["input_force_N"].max(), abs=2.0)
 
 
 @pytest.mark.parametrize(
@@ -95,11 +95,11 @@ def test_torques_of_a_single_rope_are_forces_over_the_radii_too(tmp_path):
         (tmp_path / name).mkdir()
     forces = load_dataset(of_a_rope(tmp_path / "forces", pulled())).measurements.table(Recordings)
     path = of_a_rope(tmp_path / "torques", as_torques(pulled(), unit="N_mm"), f"{IN_RADIUS}\n{OUT_RADIUS}")
-    found = load_dataset(path).measurements.table(Recordings)
-    assert forces is not None and found is not None
+    table = load_dataset(path).measurements.table(Recordings)
+    assert forces is not None and table is not None
     for end in ("input_force", "output_force"):
-        one, other = (getattr(r.items[0].blocks, end) for r in (forces, found))
-        np.testing.assert_allclose(one, other, atol=1e-6)
+        first, other = (getattr(r.items[0].blocks, end) for r in (forces, table))
+        np.testing.assert_allclose(first, other, atol=1e-6)
 
 
 def test_a_torque_of_a_single_rope_without_a_radius_is_refused(tmp_path):

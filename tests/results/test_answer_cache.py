@@ -226,10 +226,10 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
     once, again = (
         json.loads(run("predict", folder, "470", "440", "--json")[1]) for folder in (results, bare)
     )
-    for one, other in zip(once, again, strict=True):
-        assert list(one) == list(other)
-        assert one.pop("note") == other.pop("note") == ""
-        np.testing.assert_allclose(list(one.values()), list(other.values()), rtol=1e-13)
+    for first, other in zip(once, again, strict=True):
+        assert list(first) == list(other)
+        assert first.pop("note") == other.pop("note") == ""
+        np.testing.assert_allclose(list(first.values()), list(other.values()), rtol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -248,7 +248,7 @@ def test_some_of_the_lengths_that_can_be_bought_are_predicted_as_they_are_alone(
     ids=str,
 )
 def test_another_question_is_not_answered_by_what_was_kept(results, other):
-    request = {name: one.default for name, one in inspect.signature(PREDICT.function).parameters.items()}
+    request = {name: parameter.default for name, parameter in inspect.signature(PREDICT.function).parameters.items()}
     answers = read_answers(results)
     assert PREDICT.kept(answers, request) is not None
     assert PREDICT.kept(answers, request | other) is None

@@ -57,11 +57,11 @@ def test_an_answer_gives_the_attributes_that_its_json_names_and_no_number_where_
 def test_stored_data_come_back_bit_for_bit():
     again = deserialize(Outer, json.loads(json.dumps(serialize(OUTER), allow_nan=False)))
     for name in vars(OUTER):
-        one, other = getattr(OUTER, name), getattr(again, name)
-        assert type(one) is type(other), name
-        np.testing.assert_equal(other, one, err_msg=name)
-        if isinstance(one, np.ndarray):
-            assert (one.dtype, one.shape) == (other.dtype, other.shape), name
+        first, other = getattr(OUTER, name), getattr(again, name)
+        assert type(first) is type(other), name
+        np.testing.assert_equal(other, first, err_msg=name)
+        if isinstance(first, np.ndarray):
+            assert (first.dtype, first.shape) == (other.dtype, other.shape), name
 
 
 @dataclass(frozen=True)

@@ -39,27 +39,27 @@ def unfinished(on_body, tmp_path_factory):
     return folder
 
 
-def assert_same(a, b, where=""):
+def assert_same(a, b, location=""):
     """Equal to the last bit, all the way down."""
-    assert type(a) is type(b), where
+    assert type(a) is type(b), location
     if dataclasses.is_dataclass(a):
         for part in dataclasses.fields(a):
-            assert_same(getattr(a, part.name), getattr(b, part.name), f"{where}.{part.name}")
+            assert_same(getattr(a, part.name), getattr(b, part.name), f"{location}.{part.name}")
     elif isinstance(a, dict):
-        assert list(a) == list(b), where
+        assert list(a) == list(b), location
         for key in a:
-            assert_same(a[key], b[key], f"{where}[{key}]")
+            assert_same(a[key], b[key], f"{location}[{key}]")
     elif isinstance(a, np.ndarray):
-        assert a.dtype == b.dtype, where
-        np.testing.assert_array_equal(a, b, err_msg=where, strict=True)
+        assert a.dtype == b.dtype, location
+        np.testing.assert_array_equal(a, b, err_msg=location, strict=True)
     elif isinstance(a, float) and np.isnan(a):
-        assert np.isnan(b), where
+        assert np.isnan(b), location
     elif isinstance(a, tuple):
-        assert len(a) == len(b), where
+        assert len(a) == len(b), location
         for i, (x, y) in enumerate(zip(a, b, strict=True)):
-            assert_same(x, y, f"{where}[{i}]")
+            assert_same(x, y, f"{location}[{i}]")
     else:
-        assert a == b, where
+        assert a == b, location
 
 
 def test_a_fit_is_read_back_bit_for_bit(saved):
@@ -145,10 +145,10 @@ def test_the_log_posterior_in_the_file_is_that_of_the_draws(saved):
 
 def test_a_finished_fit_is_not_overwritten(saved, on_body):
     _, folder = saved
-    before = (folder / "fit.json").read_bytes()
+    initial = (folder / "fit.json").read_bytes()
     with pytest.raises(bf.StoreError, match="--force"):
         bf.fit(on_body, output=folder, settings=QUICK)
-    assert (folder / "fit.json").read_bytes() == before
+    assert (folder / "fit.json").read_bytes() == initial
 
 
 def test_force_replaces_a_fit_and_nothing_else(saved, on_body, tmp_path):
@@ -174,11 +174,11 @@ class Stop(Exception):
     """Stands for the user's interrupt."""
 
 
-def interrupted(on_body, folder, at, **options):
-    """A fit that is interrupted once it has taken `at` steps."""
+def interrupted(on_body, folder, offset, **options):
+    """A fit that is interrupted once it has taken `offset` steps."""
 
     def stop(progress):
-        if progress.steps >= at:
+        if progress.steps >= offset:
             raise Stop
 
     with pytest.raises(Stop):

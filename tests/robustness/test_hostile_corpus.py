@@ -25,7 +25,7 @@ def tried(attempts, tmp_path):
     """Try a command: its exit code is one of those named, in bounds, in our words, and it writes nothing."""
 
     def call(*arguments, codes=(2,), names=""):
-        before = sorted(tmp_path.rglob("*"))
+        files_at_start = sorted(tmp_path.rglob("*"))
         done = attempts(*arguments, folder=tmp_path)
         assert done.code in codes, done
         assert done.seconds < SECONDS and done.memory < MEMORY, done
@@ -36,7 +36,7 @@ def tried(attempts, tmp_path):
         else:
             assert done.err == ""
         assert all(x.isprintable() or x in "\n\t\u00a0" for x in done.out + done.err)
-        assert sorted(tmp_path.rglob("*")) == before
+        assert sorted(tmp_path.rglob("*")) == files_at_start
         return done
 
     return call
@@ -113,12 +113,12 @@ TOML = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", TOML)
-def test_descriptions_that_nobody_would_write_are_refused(cable, tried, what):
-    (cable / "cable.toml").write_text(f"{TOML[what]}\n{(cable / 'cable.toml').read_text()}")
+@pytest.mark.parametrize("case", TOML)
+def test_descriptions_that_nobody_would_write_are_refused(cable, tried, case):
+    (cable / "cable.toml").write_text(f"{TOML[case]}\n{(cable / 'cable.toml').read_text()}")
     tried("check", cable)
-    if len(TOML[what]) < 100_000:  # the system takes no longer argument
-        tried("check", cable, "--set", TOML[what])
+    if len(TOML[case]) < 100_000:  # the system takes no longer argument
+        tried("check", cable, "--set", TOML[case])
 
 
 KEYS = ("name", "schema", "route.range", "friction.mu1.fixed", "sampler.max_steps")

@@ -300,8 +300,8 @@ def test_what_is_said_of_a_file_is_short_however_many_channels_it_has_and_howeve
 def test_a_table_that_is_not_what_its_ending_says_is_called_what_it_is(run, on_body, tmp_path):
     folder = shutil.copytree(on_body, tmp_path / "cable")
     (folder / "angles.csv").rename(folder / "angles.xlsx")
-    told = (folder / "cable.toml").read_text().replace("angles.csv", "angles.xlsx")
-    (folder / "cable.toml").write_text(told)
+    text = (folder / "cable.toml").read_text().replace("angles.csv", "angles.xlsx")
+    (folder / "cable.toml").write_text(text)
     code, _, err = run("check", folder)
     assert (code, err) == (2, "Error: angles.xlsx is not a .xlsx file but text; rename it to .csv.\n")
 

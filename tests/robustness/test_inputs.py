@@ -32,17 +32,17 @@ def endless(path):
 
 
 def listening(path):
-    with socket.socket(socket.AF_UNIX) as one:
-        one.bind(str(path))
+    with socket.socket(socket.AF_UNIX) as unix_socket:
+        unix_socket.bind(str(path))
 
 
-@pytest.mark.parametrize(("make", "what"), [(pipe, "a named pipe"), (endless, "a device"), (listening, "a socket")])
+@pytest.mark.parametrize(("make", "case"), [(pipe, "a named pipe"), (endless, "a device"), (listening, "a socket")])
 @pytest.mark.parametrize("name", ["angles.csv", "efficiencies.csv", "cable.toml"])
-def test_what_is_no_file_is_refused_before_it_is_opened(cable, monkeypatch, name, make, what):
+def test_what_is_no_file_is_refused_before_it_is_opened(cable, monkeypatch, name, make, case):
     (cable / name).unlink()
     monkeypatch.chdir(cable)  # names of sockets are short
     make((cable / name).relative_to(cable))
-    with pytest.raises(bf.BowdenfitError, match=f"{name} is {what}, not a file"):
+    with pytest.raises(bf.BowdenfitError, match=f"{name} is {case}, not a file"):
         bf.check(cable)
 
 
@@ -107,8 +107,8 @@ def test_every_count_in_a_description_has_a_limit(cable, old, new, says):
 def test_recordings_whose_links_lead_round_in_a_circle_are_a_sentence(tmp_path):
     (tmp_path / "a.csv").symlink_to("b.csv")
     (tmp_path / "b.csv").symlink_to("a.csv")
-    one = 'recordings = {}\n[[recording]]\nfile = '
-    for named in ('recordings = { files = "*.csv" }', f'{one}"a.csv"', f'{one}"a\\u0000"'):
+    text = 'recordings = {}\n[[recording]]\nfile = '
+    for named in ('recordings = { files = "*.csv" }', f'{text}"a.csv"', f'{text}"a\\u0000"'):
         (tmp_path / "cable.toml").write_text(f'name = "x"\n{CONTACT.format(1)}[tables]\n{named}\n')
         with pytest.raises(bf.DatasetError, match="cannot be the name of a file"):
             bf.read(tmp_path)
@@ -152,11 +152,11 @@ def test_settings_that_lead_nowhere_are_sentences(on_body, setting):
     assert len(str(refused.value)) < 600
 
 
-@pytest.mark.parametrize("asked", [bf.fit, bf.check, bf.identify, bf.calibrate])
-def test_what_changes_the_reading_comes_too_late_for_a_data_set_that_has_been_read(on_body, asked):
+@pytest.mark.parametrize("answer", [bf.fit, bf.check, bf.identify, bf.calibrate])
+def test_what_changes_the_reading_comes_too_late_for_a_data_set_that_has_been_read(on_body, answer):
     data = bf.read(on_body)
     with pytest.raises(bf.UsageError, match="settings and noise would change nothing: name that where it is read"):
-        asked(data, settings=["friction.mu1.fixed=0.1"], noise="student", columns=())
+        answer(data, settings=["friction.mu1.fixed=0.1"], noise="student", columns=())
 
 
 @pytest.mark.parametrize(
@@ -178,12 +178,12 @@ def test_targets_that_no_sampling_can_reach_are_refused_at_the_start(on_body, tm
 
 @pytest.mark.extended
 @pytest.mark.parametrize(
-    ("output", "code", "said"), [("| true", 141, ""), (">&-", 0, ""), ("2>&- >&-", 0, ""), ("2>/dev/full", 0, "On-body")]
+    ("output", "code", "message"), [("| true", 141, ""), (">&-", 0, ""), ("2>&- >&-", 0, ""), ("2>/dev/full", 0, "On-body")]
 )
-def test_output_that_nobody_reads_is_no_failure(output, code, said):
+def test_output_that_nobody_reads_is_no_failure(output, code, message):
     command = f"set -o pipefail; {sys.executable} -m bowdenfit metabolic datasets/on-body-metabolic {output}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stderr) == (code, "") and done.stdout.startswith(said)
+    assert (done.returncode, done.stderr) == (code, "") and done.stdout.startswith(message)
 
 
 @pytest.mark.parametrize("output", ["2>&-", "2>/dev/full"])

@@ -28,9 +28,9 @@ def elsewhere(tmp_path):
     for name in ("a", "folder/b"):
         (place / name).write_text("precious")
     (place / CHAIN).write_bytes(checkpoint_header({"seed": 3}))
-    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    files_at_start = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
     yield place
-    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == files_at_start
 
 
 @pytest.fixture(scope="module")

@@ -43,9 +43,9 @@ def test_the_library_refuses_too_little_memory_too(tmp_path):
 
 def test_a_fit_that_runs_out_of_memory_while_it_samples_is_kept(tmp_path, monkeypatch):
     settings = {"sampler.max_steps": 400, "sampler.n_walkers": 32, "sampler.target_ess": 100}
-    asked = {"settings": [f"{name}={value}" for name, value in settings.items()], "seed": 3, "figures": False}
+    options = {"settings": [f"{name}={value}" for name, value in settings.items()], "seed": 3, "figures": False}
     cable = "datasets/yarn-on-cylinder"
-    whole = bf.fit(cable, **asked)
+    whole = bf.fit(cable, **options)
 
     def refuse(*_, **__):
         raise OSError(12, "Cannot allocate memory")
@@ -55,9 +55,9 @@ def test_a_fit_that_runs_out_of_memory_while_it_samples_is_kept(tmp_path, monkey
             monkeypatch.setattr(resources, "mmap", SimpleNamespace(mmap=refuse))
 
     with pytest.raises(MemoryShortageError, match="MiB of memory"):
-        bf.fit(cable, output=tmp_path / "fit", progress=starve, **asked)
+        bf.fit(cable, output=tmp_path / "fit", progress=starve, **options)
     monkeypatch.undo()
-    resumed = bf.fit(cable, output=tmp_path / "fit", resume=True, **asked)
+    resumed = bf.fit(cable, output=tmp_path / "fit", resume=True, **options)
     assert resumed.posterior.z.tobytes() == whole.posterior.z.tobytes()
 
 
@@ -67,9 +67,9 @@ def _setting(name, **environment):
         "import os, sys; from bowdenfit import cli; sys.argv = ['bowdenfit', '--version']\n"
         f"try: cli.start()\nexcept SystemExit: print(os.environ[{name!r}], 'numpy' in sys.modules)"
     )
-    others = {other: value for other, value in os.environ.items() if other != name}
+    variables = {other: value for other, value in os.environ.items() if other != name}
     done = subprocess.run(
-        [sys.executable, "-c", program], env=others | environment, capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", program], env=variables | environment, capture_output=True, text=True, check=False, timeout=60
     )
     return done.stdout.splitlines()[-1]
 

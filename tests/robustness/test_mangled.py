@@ -40,17 +40,17 @@ def attempts():
 
 @pytest.fixture(autouse=True)
 def bounded(capfd):
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    usage_at_start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     yield
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < before + MOST_MEMORY
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < usage_at_start + MOST_MEMORY
     assert capfd.readouterr() == ("", "")
 
 
 def options_of(attempts, place):
-    def run(given):
-        before = set(place.rglob("*"))
-        done = attempts(*given, folder=place)
-        assert set(place.rglob("*")) == before
+    def run(arguments):
+        files_at_start = set(place.rglob("*"))
+        done = attempts(*arguments, folder=place)
+        assert set(place.rglob("*")) == files_at_start
         assert done.seconds < 10
         assert done.memory < MOST_MEMORY
         return done.code, done.out, done.err
@@ -74,7 +74,7 @@ def test_strange_data_sets_are_checked_or_refused_in_sentences(tmp_path, name):
 @pytest.mark.parametrize("name", WRITERS)
 def test_mangled_files_of_every_kind_are_read_or_refused_in_sentences(tmp_path, valid, name):
     outcomes = [read_mangled_file(tmp_path, valid, name, number) for number in range(25)]
-    refused = sum(each.refused for each in outcomes)
+    refused = sum(outcome.refused for outcome in outcomes)
     assert refused > 3 and (refused < 25 or name == "zip.xlsx")  # else what is mangled was none of ours to begin with
 
 
@@ -87,7 +87,7 @@ def test_mangled_devices_studies_and_fleets_are_read_or_refused_in_sentences(tmp
 
 def test_mangled_options_are_taken_or_refused_in_sentences(tmp_path, attempts):
     outcomes = [run_mangled_options(options_of(attempts, tmp_path), number) for number in range(120)]
-    assert 66 < sum(each.refused for each in outcomes) < 120
+    assert 66 < sum(outcome.refused for outcome in outcomes) < 120
 
 
 @pytest.mark.slow

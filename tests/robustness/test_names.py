@@ -84,9 +84,9 @@ def test_a_coefficient_s_name_stands_behind_its_letter_and_only_an_index_below_i
 def test_odd_names_come_back_from_the_file_of_draws(tmp_path):
     groups = {"posterior": {name: np.full((2, 3), float(i)) for i, name in enumerate(ODD)}}
     write_groups(tmp_path / "posterior.nc", groups, {}, {}, {})
-    found = read_groups(tmp_path / "posterior.nc")["posterior"]
-    assert list(found) == ODD
-    assert all(np.all(found[name] == i) for i, name in enumerate(ODD))
+    group = read_groups(tmp_path / "posterior.nc")["posterior"]
+    assert list(group) == ODD
+    assert all(np.all(group[name] == i) for i, name in enumerate(ODD))
 
 
 def test_a_fit_with_odd_names_is_written_drawn_and_read_again(on_body, tmp_path):
@@ -119,14 +119,14 @@ def test_names_that_cannot_be_are_refused_by_check(on_body, tmp_path, name, says
 def test_a_fit_whose_figures_cannot_be_drawn_is_kept_and_drawn_later(on_body, tmp_path, monkeypatch):
     from bowdenfit.questions.figures import FIGURES
 
-    drawn, said = FIGURES["wrap_angles"].draw, []
+    figures, messages = FIGURES["wrap_angles"].draw, []
     monkeypatch.setattr(FIGURES["wrap_angles"], "draw", lambda *_: 1 / 0)
-    bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, report=said.append)
-    (sentence,) = said
+    bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False, report=messages.append)
+    (sentence,) = messages
     assert "holds the whole fit, but its figure wrap_angles could not be drawn (division by zero)" in sentence
     assert bf.load(tmp_path / "fit").converged
     assert (tmp_path / "fit" / "summary.txt").exists()
-    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", drawn)
+    monkeypatch.setattr(FIGURES["wrap_angles"], "draw", figures)
     assert bf.plot(tmp_path / "fit", figures=["wrap_angles"])
 
 
@@ -143,9 +143,9 @@ def test_a_fit_whose_figures_find_no_room_is_kept_and_ends_as_a_failure_of_the_d
 
     monkeypatch.setattr(FIGURES["wrap_angles"], "draw", full)
     monkeypatch.setattr(writing, "printable", full)
-    with pytest.raises(DiskError, match=r"whole fit, but summary\.txt and details\.txt could not be written") as said:
+    with pytest.raises(DiskError, match=r"whole fit, but summary\.txt and details\.txt could not be written") as error:
         bf.fit(on_body, output=tmp_path / "fit", seed=3, mcmc=False)
-    assert "its figure wrap_angles could not be drawn" in str(said.value) and said.value.exit_code == 1
+    assert "its figure wrap_angles could not be drawn" in str(error.value) and error.value.exit_code == 1
     assert bf.load(tmp_path / "fit").converged
     assert not (tmp_path / "fit" / "summary.txt").exists()
 
@@ -188,8 +188,8 @@ FORMULAS = ["=1+1", " =1+1", "\t=1+1", "@SUM(1)", "-2+3", "+x", "-5+cmd|' /C cal
 def test_no_cell_of_a_table_or_of_the_comment_above_it_is_a_formula(name):
     ((head,), cells) = csv.reader(csv_table([name], [[name, ["a", name]]]).splitlines())
     assert head == cells[0] == f"'{name}" and len(cells) == 2
-    for before, after in (("", ""), ("cable a,", ",b"), ("cable a;", ";b"), ('cable a,"', '"')):
-        (line,) = csv_comment([f"{before}{name}{after}"]).splitlines()
+    for initial, after in (("", ""), ("cable a,", ",b"), ("cable a;", ";b"), ('cable a,"', '"')):
+        (line,) = csv_comment([f"{initial}{name}{after}"]).splitlines()
         assert line.startswith("# ")
         for cell in (cell for separator in ",;\t" for cell in next(csv.reader([line], delimiter=separator))):
             assert not cell.strip().startswith(tuple("=+@-\uff1d")), line

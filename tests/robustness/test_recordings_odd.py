@@ -50,7 +50,7 @@ def test_the_folder_of_a_ros_2_bag_is_read_alone_and_named_in_a_description(tmp_
         'wrap_angle = { value = 180, unit = "deg" }\n[tables.recordings]\n'
         f'[[recording]]\nfile = "bag"\nrun = "a"\nchannels = {{ {named} }}\n'
     )
-    both = [each.sha256["bag"] for each in (alone, bf.read(tmp_path))]
+    both = [dataset.sha256["bag"] for dataset in (alone, bf.read(tmp_path))]
     assert both[0] == both[1]
     next((tmp_path / "bag").glob("*.db3")).unlink()
     with pytest.raises(bf.DatasetError, match="bag is cut off or damaged"):
@@ -105,7 +105,7 @@ ODD = (external_link, external_storage, storage_of_the_system, virtual, null, na
 
 
 @pytest.mark.parametrize("ending", ["h5", "mat"])
-@pytest.mark.parametrize("add", ODD, ids=[each.__name__ for each in ODD])
+@pytest.mark.parametrize("add", ODD, ids=[item.__name__ for item in ODD])
 def test_what_is_odd_in_hdf5_is_left_out_and_the_rest_is_read(tmp_path, add, ending):
     with h5py.File(tmp_path / "other.h5", "w") as other:
         other["secret"] = np.full(N, 4711.0)
@@ -118,7 +118,7 @@ def test_what_is_odd_in_hdf5_is_left_out_and_the_rest_is_read(tmp_path, add, end
         add(file, tmp_path)
     if ending == "mat":
         path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM" + path.read_bytes()[128:])
-    found = read_channels(path)
-    assert {channel.name for channel in found.channels} >= {"input_force_N", "output_force_N"}
-    assert not any(np.any(channel.values == 4711) or channel.name.startswith("odd") for channel in found.channels)
-    assert any("odd" in remark for remark in found.remarks)
+    channels = read_channels(path)
+    assert {channel.name for channel in channels.channels} >= {"input_force_N", "output_force_N"}
+    assert not any(np.any(channel.values == 4711) or channel.name.startswith("odd") for channel in channels.channels)
+    assert any("odd" in remark for remark in channels.remarks)

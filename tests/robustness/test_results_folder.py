@@ -43,10 +43,10 @@ def test_a_checkpoint_gives_its_records_back(checkpoint):
 
 def test_a_checkpoint_cut_anywhere_keeps_every_whole_record(checkpoint):
     whole, start = checkpoint.read_bytes(), len(checkpoint_header({"seed": 3}))
-    each = (len(whole) - start) // 4
+    chunk = (len(whole) - start) // 4
     for length in range(start, len(whole), 97):
         checkpoint.write_bytes(whole[:length])
-        assert len(read_records(checkpoint, SHAPES)) == (length - start) // each
+        assert len(read_records(checkpoint, SHAPES)) == (length - start) // chunk
         append_record(checkpoint, {"z": np.zeros((5, 2)), "place": np.asarray(9)})
         assert int(read_records(checkpoint, SHAPES)[-1]["place"]) == 9
 
@@ -58,10 +58,10 @@ def test_a_flipped_bit_ends_a_checkpoint_before_its_record(checkpoint):
     assert [int(r["place"]) for r in read_records(checkpoint, SHAPES)] == [0, 1, 2]
 
 
-def _fit(on_body: Path, place: Path, compiled: Path, *before: str, more: tuple[str, ...] = ()):
+def _fit(on_body: Path, place: Path, compiled: Path, *initial: str, more: tuple[str, ...] = ()):
     """A fit in a process of its own, which keeps what is compiled where it is told."""
     fit = ["-m", "bowdenfit", "fit", str(on_body), "-o", str(place), "--seed", "3", "--no-figures"]
-    command = [*before, sys.executable, *fit, *(f"--set={setting}" for setting in QUICK), *more]
+    command = [*initial, sys.executable, *fit, *(f"--set={setting}" for setting in QUICK), *more]
     # Python takes half a file of byte code for a whole one.
     environment = os.environ | {"JAX_COMPILATION_CACHE_DIR": str(compiled), "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=240)
@@ -159,14 +159,14 @@ def test_what_a_person_put_into_a_folder_is_replaced_by_nothing(tmp_path, begin)
 
 
 def test_a_fit_that_is_written_again_counts_as_finished_only_when_all_of_it_is(on_body, tmp_path, monkeypatch):
-    found = bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, seed=3)
+    fit = bf.fit(on_body, output=tmp_path / "fit", mcmc=False, figures=False, seed=3)
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(store, "write_answers", full)
     with pytest.raises(DiskError):
-        store.save(found, found.summary(), tmp_path / "fit", force=True)
+        store.save(fit, fit.summary(), tmp_path / "fit", force=True)
     assert not (tmp_path / "fit" / "fit.json").exists()
 
 
@@ -186,7 +186,7 @@ def test_what_can_be_written_is_not_refused(tmp_path, monkeypatch, place):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").write_text("x")
     refuse_unwritable(Path(place))
-    assert sorted(each.name for each in tmp_path.rglob("*")) == ["file", "full"]
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "full"]
 
 
 def test_nothing_but_files_is_replaced_by_a_file(tmp_path):
@@ -221,10 +221,10 @@ def test_a_folder_that_its_umask_closes_is_not_left_behind(tmp_path, monkeypatch
 
 
 def test_a_folder_is_filled_whatever_the_umask_is(tmp_path):
-    before = os.umask(0o777)
+    initial = os.umask(0o777)
     try:
         with fill_folder_atomically(tmp_path / "a") as temporary:
             assert temporary.stat().st_mode & 0o700 == 0o700
     finally:
-        os.umask(before)
+        os.umask(initial)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]

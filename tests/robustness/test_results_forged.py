@@ -64,12 +64,12 @@ DRAWS = {
 }
 
 
-@pytest.mark.parametrize("what", DRAWS)
-def test_forged_draws_are_refused(folder, what):
+@pytest.mark.parametrize("case", DRAWS)
+def test_forged_draws_are_refused(folder, case):
     with h5py.File(folder / "posterior.nc", "a") as file:
         group = file["unconstrained_posterior"]
         name = next(name for name in group if group[name].ndim == 2)
-        values = DRAWS[what](group[name][()])
+        values = DRAWS[case](group[name][()])
         group.move(name, "other")
         if values is not None:
             del group["other"]
@@ -94,9 +94,9 @@ EDITS = {
 }
 
 
-@pytest.mark.parametrize("what", EDITS)
-def test_a_forged_fit_is_refused(folder, what):
-    edit_sealed(folder / "fit.json", EDITS[what])
+@pytest.mark.parametrize("case", EDITS)
+def test_a_forged_fit_is_refused(folder, case):
+    edit_sealed(folder / "fit.json", EDITS[case])
     with pytest.raises(bf.StoreError, match="damaged"):
         bf.load(folder)
 
@@ -133,8 +133,8 @@ def test_arrays_of_an_archive_share_no_bytes():
     with zipfile.ZipFile(file) as archive:
         first, second = archive.infolist()
     content = bytearray(file.getvalue())
-    at = content.rindex(b"PK\x01\x02") + 42  # where the second entry of the table of contents says that it begins
-    content[at : at + 4] = first.header_offset.to_bytes(4, "little")
+    index = content.rindex(b"PK\x01\x02") + 42  # where the second entry of the table of contents says that it begins
+    content[index : index + 4] = first.header_offset.to_bytes(4, "little")
     assert second.header_offset > 0
     with pytest.raises(ValueError, match="shares bytes"), open_arrays(io.BytesIO(content)):
         pass

@@ -26,9 +26,9 @@ MOST = 200 << 20  # bytes by which one of them may raise what this process holds
 
 @pytest.fixture(autouse=True)
 def bounded():
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    usage_at_start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     yield
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < before + MOST
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < usage_at_start + MOST
 
 
 def elsewhere(group, name, path):
@@ -109,9 +109,9 @@ def archive(path, content):
 ARCHIVES = {"claims": claimed(10**9), "claims more": claimed(10**15), "no array": b"x"}
 
 
-@pytest.mark.parametrize("what", ARCHIVES)
-def test_arrays_that_say_that_they_are_larger_than_they_are_are_refused(tmp_path, what):
-    archive(tmp_path / "figures.npz", ARCHIVES[what])
+@pytest.mark.parametrize("case", ARCHIVES)
+def test_arrays_that_say_that_they_are_larger_than_they_are_are_refused(tmp_path, case):
+    archive(tmp_path / "figures.npz", ARCHIVES[case])
     with pytest.raises((ValueError, KeyError)):  # of which whoever reads figures makes figures to be worked out anew
         read_arrays(tmp_path / "figures.npz", {"a": float})
 
@@ -124,9 +124,9 @@ def test_packed_arrays_are_refused_unread(tmp_path):
         read_arrays(tmp_path / "figures.npz", {"a": float})
 
 
-@pytest.mark.parametrize("what", ARCHIVES)
-def test_a_checkpoint_and_pieces_of_a_fleet_hold_no_such_arrays(tmp_path, what):
-    archive(tmp_path / "x.npz", ARCHIVES[what])
+@pytest.mark.parametrize("case", ARCHIVES)
+def test_a_checkpoint_and_pieces_of_a_fleet_hold_no_such_arrays(tmp_path, case):
+    archive(tmp_path / "x.npz", ARCHIVES[case])
     path = tmp_path / "chain.checkpoint"
     path.write_bytes(checkpoint_header({"seed": 3}))
     append_record(path, {"z": np.ones(2)})

@@ -63,8 +63,8 @@ def test_a_mangled_checkpoint_is_resumed_or_refused(tmp_path, interrupted, count
 
 @pytest.mark.parametrize("count", [60, pytest.param(MANY, marks=pytest.mark.slow)])
 def test_mangled_replications_are_resumed_or_refused(tmp_path, calibration, count):
-    found = refused(count, tmp_path, calibration, "replications.jsonl", resume_calibration, str(tmp_path))
-    assert 0.4 * count < found < count
+    records = refused(count, tmp_path, calibration, "replications.jsonl", resume_calibration, str(tmp_path))
+    assert 0.4 * count < records < count
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.slow)])

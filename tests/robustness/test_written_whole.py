@@ -45,10 +45,10 @@ def test_a_plan_writes_nothing_outside_its_folder(on_body, tmp_path, name):
     plan = (on_body.parent / "synthetic-bench" / "bench.toml").read_text()
     assert '"angles.csv"' in plan
     (tmp_path / "bench.toml").write_text(plan.replace('"angles.csv"', f'"{name}"'))
-    before = sorted(tmp_path.parent.iterdir())
+    files_at_start = sorted(tmp_path.parent.iterdir())
     with pytest.raises(bf.DescriptionError, match="outside of what is made"):
         bf.simulate(tmp_path / "bench.toml", output=tmp_path / "made" / "deep", seed=3)
-    assert sorted(tmp_path.parent.iterdir()) == before
+    assert sorted(tmp_path.parent.iterdir()) == files_at_start
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["bench.toml"]
 
 
@@ -56,10 +56,10 @@ def write_some_answer(folder):
     class Drawn:
         HEADING = "A figure"
 
-        def draw(self, found):
+        def draw(self, outcome):
             return empty_page(3.0, 2.0)
 
-        def caption(self, found):
+        def caption(self, outcome):
             return "What is drawn."
 
     write_answer(folder, "answer", {"x": 1.0}, "text", {"answer": Drawn(), "traces": Drawn()})
@@ -86,11 +86,11 @@ def test_an_answer_that_finds_no_room_leaves_nothing_and_an_earlier_one_stays(tm
         if folder.name == "there":
             folder.mkdir()
             (folder / "captions.txt").write_text("other: of another figure.\n")
-        before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+        files_at_start = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
         room.clear()
         with pytest.raises(DiskError, match=r"cannot be written \(No space left on device\)"):
             ask(folder)
-        assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == files_at_start
     assert room
     monkeypatch.setattr(write, "save", lambda figure, target, ending: target.write_bytes(b"a figure"))
     ask(tmp_path / "there")

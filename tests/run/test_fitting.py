@@ -46,8 +46,10 @@ SHOWS = KEEPS + "print(jax.config.jax_compilation_cache_dir)"
 
 
 def _cache_folder(**environment):
-    others = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
-    done = subprocess.run([sys.executable, "-c", SHOWS], env=others | environment, capture_output=True, text=True, check=True)
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    done = subprocess.run(
+        [sys.executable, "-c", SHOWS], env=variables | environment, capture_output=True, text=True, check=True
+    )
     return done.stdout.strip()
 
 

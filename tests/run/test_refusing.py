@@ -24,9 +24,9 @@ def contacts(place, count, more=""):
 
 def start_of(model, determined):
     """A maximum of the posterior of which the measurements determine so many coefficients."""
-    size, known = model.space.size, [model.space.index[f"mu{i}"] for i in range(determined)]
+    size, indices = model.space.size, [model.space.index[f"mu{i}"] for i in range(determined)]
     shares = np.ones(size)
-    shares[known] = 0.01
+    shares[indices] = 0.01
     return MaximumPosterior(np.zeros(size), np.diag(shares))
 
 
@@ -38,8 +38,8 @@ def test_many_coefficients_that_nothing_tells_apart_are_refused_before_sampling(
 
 
 def test_few_coefficients_and_stated_ones_are_not_looked_at(tmp_path):
-    stated = "".join(f"[friction.mu{i}]\nmeasured = {{ value = 0.1, sd = 0.02 }}\n" for i in range(10))
-    refuse_undetermined(build_model(bf.read(contacts(tmp_path, 30, stated))), lambda: pytest.fail("looked at"))
+    setting = "".join(f"[friction.mu{i}]\nmeasured = {{ value = 0.1, sd = 0.02 }}\n" for i in range(10))
+    refuse_undetermined(build_model(bf.read(contacts(tmp_path, 30, setting))), lambda: pytest.fail("looked at"))
 
 
 @pytest.mark.extended

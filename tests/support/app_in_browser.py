@@ -107,6 +107,6 @@ def watch(visit, page, app):
     """Note what a page says on the console, and what it asks of others than the app."""
     page.on("console", lambda message: visit.console.append(message.text))
     page.on("pageerror", lambda error: visit.console.append(str(error)))
-    own = ("data:", "blob:", f"http://127.0.0.1:{app.port}/", f"ws://127.0.0.1:{app.port}/")
-    page.on("request", lambda request: request.url.startswith(own) or visit.elsewhere.append(request.url))
-    page.on("websocket", lambda socket: socket.url.startswith(own) or visit.elsewhere.append(socket.url))
+    own_addresses = ("data:", "blob:", f"http://127.0.0.1:{app.port}/", f"ws://127.0.0.1:{app.port}/")
+    page.on("request", lambda request: request.url.startswith(own_addresses) or visit.elsewhere.append(request.url))
+    page.on("websocket", lambda socket: socket.url.startswith(own_addresses) or visit.elsewhere.append(socket.url))

@@ -53,7 +53,7 @@ class Attempts:
             user: Who gives it, by number; whoever runs this if omitted.
         """
         assert self.server.stdin is not None and self.server.stdout is not None
-        request = [[os.fsdecode(str(each)) for each in arguments], str(folder.resolve()), user]
+        request = [[os.fsdecode(str(argument)) for argument in arguments], str(folder.resolve()), user]
         self.server.stdin.write(json.dumps(request).encode() + b"\n")
         self.server.stdin.flush()
         return Attempt(**json.loads(self.server.stdout.readline()))

@@ -23,21 +23,21 @@ def number(chance: random.Random, content: bytes) -> bytes:
     """Another size, count or place."""
     form = chance.choice(["<B", "<H", "<I", "<I", "<Q", "<Q", ">I", ">Q"])
     size = struct.calcsize(form)
-    at = min(_place(chance, len(content)) // min(size, 4) * min(size, 4), max(len(content) - size, 0))
+    index = min(_place(chance, len(content)) // min(size, 4) * min(size, 4), max(len(content) - size, 0))
     packed = struct.pack(form, chance.choice(ODD_NUMBERS) % 256**size)
-    return content[:at] + packed + content[at + size :]
+    return content[:index] + packed + content[index + size :]
 
 
 def cut(chance: random.Random, content: bytes) -> bytes:
     """Its end is missing, or something in the middle."""
-    at = _place(chance, len(content))
-    return content[:at] if chance.random() < 0.5 else content[:at] + content[at + chance.choice([1, 4, 8, 64]) :]
+    index = _place(chance, len(content))
+    return content[:index] if chance.random() < 0.5 else content[:index] + content[index + chance.choice([1, 4, 8, 64]) :]
 
 
 def again(chance: random.Random, content: bytes) -> bytes:
     """A piece stands there twice, elsewhere, or is empty."""
-    at, to, size = _place(chance, len(content)), _place(chance, len(content)), chance.choice([4, 16, 64, 512])
-    piece = chance.choice([content[at : at + size], bytes(size), b"\xff" * size])
+    index, to, size = _place(chance, len(content)), _place(chance, len(content)), chance.choice([4, 16, 64, 512])
+    piece = chance.choice([content[index : index + size], bytes(size), b"\xff" * size])
     return content[:to] + piece + content[to + chance.choice([0, len(piece)]) :]
 
 
@@ -73,28 +73,28 @@ def mangled(chance: random.Random, content: bytes) -> bytes:
 def _member(chance: random.Random, content: bytes) -> bytes:
     """An archive with one of its members mangled, encrypted as it says, or packed in an unheard-of way."""
     made = BytesIO()
-    with zipfile.ZipFile(BytesIO(content)) as before, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as after:
-        chosen = chance.choice(before.namelist())
-        for name in before.namelist():
-            member = before.read(name)
+    with zipfile.ZipFile(BytesIO(content)) as initial, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as after:
+        chosen = chance.choice(initial.namelist())
+        for name in initial.namelist():
+            member = initial.read(name)
             for _ in range(name == chosen and chance.choice([1, 2, 3])):
                 member = chance.choice(ANY)(chance, member) or b"\0"
             after.writestr(name, member)
     packed = bytearray(made.getvalue())
     if chance.random() < 0.3:  # flags and ways of packing stand in two places
         flag, how = chance.choice([0, 1, 0x41, 8]), chance.choice([8, 0, 9, 12, 14, 99])
-        for mark, at in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
-            found = packed.find(mark)
-            struct.pack_into("<HH", packed, found + at, flag, how)
+        for mark, value in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+            position = packed.find(mark)
+            struct.pack_into("<HH", packed, position + value, flag, how)
     return bytes(packed)
 
 
 def _element(chance: random.Random, content: bytes) -> bytes:
     """A file of MATLAB with its first variable mangled where it is unpacked."""
     kind, size = struct.unpack_from("<II", content, 128)
-    inside, rest = content[136 : 136 + size], content[136 + size :]
+    inside, tail = content[136 : 136 + size], content[136 + size :]
     if kind == 15:
         inside = zlib.compress(chance.choice(ANY)(chance, zlib.decompress(inside)))
     else:
         inside = chance.choice(ANY)(chance, inside)
-    return content[:128] + struct.pack("<II", kind, len(inside)) + inside + rest
+    return content[:128] + struct.pack("<II", kind, len(inside)) + inside + tail

@@ -39,8 +39,8 @@ class Catheter:
         for _ in range(60):
             middle = (low + high) / 2
             tension = np.exp(np.clip(held, middle - band, middle + band))
-            given = tension[-1] / self.spring + tension[:-1].mean() / self.rope
-            low, high = (middle, high) if given < x - self.zero else (low, middle)
+            stretch = tension[-1] / self.spring + tension[:-1].mean() / self.rope
+            low, high = (middle, high) if stretch < x - self.zero else (low, middle)
         return (low + high) / 2
 
 
@@ -61,6 +61,6 @@ def bench(seed: int) -> str:
     for bend, zero in BENDS.items():
         catheter = Catheter(TRUTH["mu"] * np.deg2rad(bend), TRUTH["end_spring"], TRUTH["rope_stiffness"], zero)
         force = catheter.pulled(motion) + TRUTH["force_noise_N"] * generator.standard_normal(len(motion))
-        at = motion + TRUTH["displacement_noise_mm"] * generator.standard_normal(len(motion))
-        rows += [f"{bend},{x:.3f},{f:.3f}" for x, f in zip(at, force, strict=True)]
+        displacement = motion + TRUTH["displacement_noise_mm"] * generator.standard_normal(len(motion))
+        rows += [f"{bend},{x:.3f},{f:.3f}" for x, f in zip(displacement, force, strict=True)]
     return "\n".join(rows) + "\n"

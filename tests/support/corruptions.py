@@ -32,9 +32,9 @@ def corrupt(dataset: Path, folder: Path, seed: int) -> str:
     comments = [line for line in lines if line.startswith("#")]
     cells = [line.split(",") for line in lines if not line.startswith("#")]
     for which in generator.permutation(len(CORRUPTIONS)):
-        if what := CORRUPTIONS[which](cells, generator):
+        if case := CORRUPTIONS[which](cells, generator):
             path.write_text("\n".join([*comments, *(",".join(row) for row in cells)]) + "\n")
-            return f"{path.name}: {what}"
+            return f"{path.name}: {case}"
     raise AssertionError(f"no mistake can be made in {path}")
 
 
@@ -43,15 +43,15 @@ def read_by_a_fit(folder: Path) -> list[Path]:
     return sorted({folder / name for name in _named(tomllib.loads((folder / "cable.toml").read_text()))})
 
 
-def _named(stated: Any) -> Iterator[str]:
-    if isinstance(stated, dict):
-        for key, value in stated.items():
+def _named(stated_value: Any) -> Iterator[str]:
+    if isinstance(stated_value, dict):
+        for key, value in stated_value.items():
             if key in ("file", "files"):
                 yield from [value] if isinstance(value, str) else value
             else:
                 yield from _named(value)
-    elif isinstance(stated, list):
-        for value in stated:
+    elif isinstance(stated_value, list):
+        for value in stated_value:
             yield from _named(value)
 
 

@@ -68,8 +68,8 @@ def creep(truth: Truth, time, profile=pulled):
 
     def change(t, state):
         """Without damping: x' = y' + f' and f' = grows y'."""
-        (before, force, after), speed = profile(np.array([t - 1e-5, t, t + 1e-5]))[0], profile(np.array([t]))[1]
-        pulls = (after - before) / 2e-5 / force
+        (initial, force, after), speed = profile(np.array([t - 1e-5, t, t + 1e-5]))[0], profile(np.array([t]))[1]
+        pulls = (after - initial) / 2e-5 / force
         moves = pulls / (1 + grows(state[1], speed, 1.0 if pulls >= 0 else -1.0))
         return [moves, pulls - moves]
 
@@ -97,13 +97,15 @@ def record(truth: Truth, rate: float, seed: int, name: str = "turns") -> Recordi
     noise = NOISE * generator.standard_normal((2, len(time)))
     raw = RawRecording(name, f"{name}.csv", time, force + noise[0], time, output + noise[1], time, speed)
     blocks, account = prepare(raw, Preparation(delay="none"))
-    own = np.array([ANGLE]), np.array([np.nan])
-    return Recording(name, raw.file, name, float("nan"), *own, blocks, find_strokes(blocks, raw.file, name), account)
+    own_angles = np.array([ANGLE]), np.array([np.nan])
+    return Recording(name, raw.file, name, float("nan"), *own_angles, blocks, find_strokes(blocks, raw.file, name), account)
 
 
 def model_recordings(recordings: list[Recording], friction_model: str, delay_sd: float = 0.0) -> Model:
     """The model of recordings of one rope under a friction model."""
-    stated = {"reference_velocity": {"value": SPEED, "unit": "mm/s"}, "friction_model": friction_model}
-    description = cable(1, {"recordings": {"files": "*.csv"}}, contact=[CONTACT], **stated).model_copy(update={"route": None})
+    conditions = {"reference_velocity": {"value": SPEED, "unit": "mm/s"}, "friction_model": friction_model}
+    description = cable(1, {"recordings": {"files": "*.csv"}}, contact=[CONTACT], **conditions).model_copy(
+        update={"route": None}
+    )
     table = Recordings(("angle",), tuple(recordings), "mm/s", delay_sd)
     return build_model(Dataset(description, Measurements((table,)), {}))

@@ -59,31 +59,31 @@ def assert_readable(shown, cable, widths=(None, NARROW)):
         cable: Name of the cable.
         widths: Of the pages [in]; None for the usual one.
     """
-    drawn = [(name, width, draw_with_title(name, data, cable, width)) for name, data in shown.items() for width in widths]
-    wrong = [f"{name} at {width}: {fault}" for name, width, figure in drawn for fault in faults(figure)]
+    figures = [(name, width, draw_with_title(name, data, cable, width)) for name, data in shown.items() for width in widths]
+    wrong = [f"{name} at {width}: {fault}" for name, width, figure in figures for fault in faults(figure)]
     wrong += [f"caption of {name}: {fault}" for name, data in shown.items() for fault in jargon(figure_caption(name, data))]
     assert not wrong, "\n".join(wrong)
 
 
-def assert_answer_readable(file, found, cable):
+def assert_answer_readable(file, shown_data, cable):
     """The figure of an answer has no fault, and its caption is in plain words.
 
     Args:
         file: Of the figure.
-        found: The answer.
+        shown_data: The answer.
         cable: Name of the cable.
     """
-    said = file.caption(found)
-    assert " n = " in said
-    assert not (wrong := [*faults(draw_answer_figure(file, found, cable)), *jargon(said)]), "\n".join(wrong)
+    caption = file.caption(shown_data)
+    assert " n = " in caption
+    assert not (wrong := [*faults(draw_answer_figure(file, shown_data, cable)), *jargon(caption)]), "\n".join(wrong)
 
 
 def faults(figure):
     """What is wrong with a figure, in sentences."""
     texts = _texts(figure)
     boxes = _boxes(texts)
-    found = [*_misplaced(figure, boxes), *_alike(figure), *_empty(figure), *_garbled(texts), *_small(texts)]
-    return found + [f"{text!r} has {fault}" for text, _ in boxes for fault in jargon(_FORMULA.sub(" ", text))]
+    page_faults = [*_misplaced(figure, boxes), *_alike(figure), *_empty(figure), *_garbled(texts), *_small(texts)]
+    return page_faults + [f"{text!r} has {fault}" for text, _ in boxes for fault in jargon(_FORMULA.sub(" ", text))]
 
 
 def _misplaced(figure, boxes):
@@ -155,12 +155,12 @@ def _shows(axes, artist):
 def _garbled(texts):
     """Names set letter by letter in a formula, and code where a name should be."""
     for text in texts:
-        said = text.get_text()
-        parts = re.split(r"(?<!\\)\$", said) if text.get_parse_math() and is_math_text(said) else [said]
+        message = text.get_text()
+        parts = re.split(r"(?<!\\)\$", message) if text.get_parse_math() and is_math_text(message) else [message]
         if any(_WORD.search(_COMMAND.sub(" ", part)) for part in parts[1::2]):
-            yield f"{said!r} sets a name letter by letter"
+            yield f"{message!r} sets a name letter by letter"
         if any(re.search(r"\w_\w|\\(?!\$)|\^", part) for part in parts[::2]):
-            yield f"{said!r} shows code"
+            yield f"{message!r} shows code"
 
 
 def _small(texts):

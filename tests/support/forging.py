@@ -48,14 +48,14 @@ def reseal(folder: Path) -> None:
 
 def forge(chance: random.Random, folder: Path) -> str:
     """Change something in a folder, and return what."""
-    what = chance.choice(WAYS)
+    way = chance.choice(WAYS)
     sealing = chance.random() < 0.85
-    if what in ("fit", "answers"):
-        path = folder / f"{what}.json"
+    if way in ("fit", "answers"):
+        path = folder / f"{way}.json"
         path.write_text(other_json(chance, path.read_text()), encoding="utf-8", errors="surrogatepass")
-    elif what == "draws":
+    elif way == "draws":
         forge_draws(chance, folder / "posterior.nc")
-    elif what == "figures":
+    elif way == "figures":
         with np.load(folder / "figures.npz") as file:
             arrays = dict(file)
         name = chance.choice(list(arrays))
@@ -71,16 +71,16 @@ def forge(chance: random.Random, folder: Path) -> str:
             written = io.BytesIO((folder / "figures.npy").read_bytes())
             (folder / "figures.npy").unlink()
         (folder / "figures.npz").write_bytes(written.getvalue())
-    elif what == "text":
+    elif way == "text":
         path = folder / chance.choice(TEXTS)
         path.write_text(other_json(chance, path.read_text()) if path.suffix == ".json" else "You can trust this.\n")
         sealing = sealing and path.suffix == ".json"  # a text may be forged so that nobody can tell
-    elif what == "deep":
+    elif way == "deep":
         path = folder / chance.choice(("fit.json", "answers.json", "summary.json"))
         path.write_text('{"a":' * 900 + "1" + "}" * 900 if chance.random() < 0.5 else "[" * 100_000)
     else:
         path = chance.choice([path for path in folder.iterdir() if path.is_file() and path.suffix in {".json", ".nc", ".npz"}])
-        if what == "gone":
+        if way == "gone":
             path.unlink()
         else:
             content = bytearray(path.read_bytes())
@@ -89,7 +89,7 @@ def forge(chance: random.Random, folder: Path) -> str:
             path.write_bytes(content[: chance.choice((len(content), len(content), len(content) // 2))])
     if sealing:
         reseal(folder)
-    return f"{what}{' sealed' if sealing else ''}"
+    return f"{way}{' sealed' if sealing else ''}"
 
 
 def forge_draws(chance: random.Random, path: Path) -> None:
@@ -153,17 +153,17 @@ def ask_forged_folder(place: Path, whole: Path, number: int) -> Outcome:
     chance = random.Random(f"forged {number}")
     folder = shutil.copytree(whole, place / "fit")
     try:
-        what, verb = forge(chance, folder), chance.choice(VERBS)
-        before, start, most = contents(place, folder), time.process_time(), peak_memory()
+        way, verb = forge(chance, folder), chance.choice(VERBS)
+        initial, start, most = contents(place, folder), time.process_time(), peak_memory()
         with ended_in_time():
             code, printed = ask(folder, verb)
         seconds, memory = time.process_time() - start, peak_memory() - most  # beyond what tests before it have taken
         (place / "x.csv").unlink(missing_ok=True)
         left = [path.name for path in folder.rglob("*") if path.name.endswith(".partial") or path.name == ".lock"]
-        wrong = code not in (0, 2, 3) or seconds > SLOWEST or memory > LARGEST or left or contents(place, folder) != before
+        wrong = code not in (0, 2, 3) or seconds > SLOWEST or memory > LARGEST or left or contents(place, folder) != initial
     finally:
         shutil.rmtree(folder)
     if wrong:
-        case = f"forged {number}, {what}, {' '.join(verb)}: exit code {code}, {seconds:.0f} s, {memory >> 10} MB, left {left}"
+        case = f"forged {number}, {way}, {' '.join(verb)}: exit code {code}, {seconds:.0f} s, {memory >> 10} MB, left {left}"
         raise Wrong(f"{case}, {printed[-1500:]}")
     return Outcome(code == 2, printed)

@@ -39,11 +39,11 @@ class Outcome:
 
     Args:
         refused: Whether the input was refused; it was read otherwise.
-        said: In which words.
+        message: The words of the refusal.
     """
 
     refused: bool
-    said: str = ""
+    message: str = ""
 
 
 @contextmanager
@@ -53,13 +53,13 @@ def ended_in_time() -> Iterator[None]:
     def end(*_: object) -> None:
         raise Wrong(f"takes more than {2 * SLOWEST:g} s")
 
-    before = signal.signal(signal.SIGPROF, end)
+    previous_handler = signal.signal(signal.SIGPROF, end)
     signal.setitimer(signal.ITIMER_PROF, 2 * SLOWEST)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
+        signal.signal(signal.SIGPROF, previous_handler)
 
 
 def try_cases(numbers: Sequence[int], case: Callable[[int], Outcome]) -> int:
@@ -102,13 +102,13 @@ def meet(case: str, meets: Callable[[], object], *names: str) -> Outcome:
         outcome = Outcome(False)
     except bf.BowdenfitError as error:
         outcome = Outcome(True, str(error))
-        lines = outcome.said.splitlines()
+        lines = outcome.message.splitlines()
         sentences = [line.removeprefix("- ") for line in lines[len(lines) > 1 :]]
-        good = all(10 < len(each) <= LONGEST and each.rstrip()[-1] in ".?)" for each in sentences)
-        if not (good and error.exit_code == 2 and len(outcome.said) < LONGEST_LIST):
-            raise Wrong(f"{case}: {error.exit_code}, {outcome.said}") from None
-        if names and not any(name in outcome.said for name in names):
-            raise Wrong(f"{case} does not name {names}: {outcome.said}") from None
+        good = all(10 < len(sentence) <= LONGEST and sentence.rstrip()[-1] in ".?)" for sentence in sentences)
+        if not (good and error.exit_code == 2 and len(outcome.message) < LONGEST_LIST):
+            raise Wrong(f"{case}: {error.exit_code}, {outcome.message}") from None
+        if names and not any(name in outcome.message for name in names):
+            raise Wrong(f"{case} does not name {names}: {outcome.message}") from None
     except Exception as error:
         raise Wrong(f"{case}: {type(error).__name__}: {error}") from error
     if out.getvalue() or err.getvalue():
@@ -136,10 +136,10 @@ def read_mangled_data_set(place: Path, name: str, number: int) -> Outcome:
     for _ in range(chance.choice([1, 1, 2])):
         text = chance.choice(DESCRIPTIONS if file.endswith(".toml") else TABLES)(chance, text) or "\n"
     (folder / file).write_text(text, encoding="utf-8", errors="surrogatepass")
-    before = set(place.rglob("*"))
+    files_at_start = set(place.rglob("*"))
     try:
         outcome = meet(f"{name} {number}, {file}", lambda: bf.read(folder))
-        if set(place.rglob("*")) != before:
+        if set(place.rglob("*")) != files_at_start:
             raise Wrong(f"{name} {number}: files were written")
     finally:
         shutil.rmtree(folder)
@@ -169,10 +169,10 @@ def check_strange_data_set(place: Path, name: str, number: int) -> Outcome:
     case = f"strange {name} {number}, {path.name}: {', '.join(change.__name__ for change in changes)}"
     if chance.random() < 0.05:
         case += f", {replace_file(chance, path)}"
-    before = set(place.rglob("*"))
+    files_at_start = set(place.rglob("*"))
     try:
         outcome = meet(case, lambda: str(bf.check(folder)))
-        if set(place.rglob("*")) != before:
+        if set(place.rglob("*")) != files_at_start:
             raise Wrong(f"{case}: files were written")
     finally:
         shutil.rmtree(folder)
@@ -203,8 +203,8 @@ def read_mangled_file(place: Path, valid: dict[str, bytes], name: str, number: i
         (place / name).write_bytes(text.encode(encoding, errors="surrogatepass"))
     else:
         (place / name).write_bytes(mangled(chance, valid[name]))
-    known = {"wrap_angle": (180, "deg"), "channels": channels_of(name)}
-    return meet(f"{name} {number}", lambda: bf.read(place / name, **known), name, Path(name).stem)
+    expected = {"wrap_angle": (180, "deg"), "channels": channels_of(name)}
+    return meet(f"{name} {number}", lambda: bf.read(place / name, **expected), name, Path(name).stem)
 
 
 SETTINGS = (
@@ -245,14 +245,14 @@ def run_mangled_options(run: Callable[[Sequence[str]], tuple[int, str, str]], nu
     source = str(chance.choice(DATASETS)) if chance.random() < 0.8 else chance.choice(ODD_CELLS)
     # What fits, or asks a fit, is asked for a folder that is not there.
     verb = chance.choice((*["check"] * 20, "predict", "next", "calibrate", "length", "simulate"))
-    given = [verb, source if verb == "check" else chance.choice(("/nowhere/at/all", *ODD_CELLS))]
+    words = [verb, source if verb == "check" else chance.choice(("/nowhere/at/all", *ODD_CELLS))]
     for _ in range(chance.choice((1, 1, 2, 3))):
         option = chance.choice(tuple(OPTIONS))
         good = chance.random() < 0.5 and verb == "check" and option in GOOD
-        given += [option, GOOD[option] if good else OPTIONS[option](chance)]
-    given = [each.replace("\0", "") for each in given]
-    code, out, err = run(given)
-    case = f"options {number}, {given}"
+        words += [option, GOOD[option] if good else OPTIONS[option](chance)]
+    words = [item.replace("\0", "") for item in words]
+    code, out, err = run(words)
+    case = f"options {number}, {words}"
     ours = err.startswith(("Error: ", "Usage: ")) and "inside bowdenfit" not in err and "Traceback" not in err
     if code not in {0, 2} or (code == 2 and not ours) or len(err) > LONGEST_LIST or (code == 2 and out):
         raise Wrong(f"{case}: {code}, {err}")

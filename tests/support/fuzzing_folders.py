@@ -33,11 +33,11 @@ ODD_LINES = (
 def _stranger(chance: random.Random, text: str) -> str:
     """A value that nobody would write, or a line."""
     lines = text.splitlines(keepends=True)
-    at = chance.randrange(len(lines))
-    if chance.random() < 0.3 or "=" not in lines[at]:
-        lines.insert(at, chance.choice(ODD_LINES))
+    index = chance.randrange(len(lines))
+    if chance.random() < 0.3 or "=" not in lines[index]:
+        lines.insert(index, chance.choice(ODD_LINES))
     else:
-        lines[at] = f"{lines[at].partition('=')[0]}= {chance.choice(ODDER)}\n"
+        lines[index] = f"{lines[index].partition('=')[0]}= {chance.choice(ODDER)}\n"
     return "".join(lines)
 
 
@@ -45,10 +45,10 @@ def _person(chance: random.Random, text: str) -> str:
     """A name of a person, a condition, a cable or a file, of an odd kind."""
     odd = ("\x1b[2J", "a\0b", "../" * 30 + "x", "/dev/zero", "=1+1", "x" * 3000, "٣", "\u202e", "a\nb", "*", "[a]", "nan", "-")
     lines = text.splitlines(keepends=True)
-    at = chance.randrange(len(lines))
-    cells = lines[at].rstrip("\n").split(",")
+    index = chance.randrange(len(lines))
+    cells = lines[index].rstrip("\n").split(",")
     cells[chance.randrange(len(cells))] = chance.choice((*odd, *ODD_CELLS))
-    return "".join([*lines[:at], ",".join(cells) + "\n", *lines[at + 1 :]])
+    return "".join([*lines[:index], ",".join(cells) + "\n", *lines[index + 1 :]])
 
 
 def device(place: Path) -> Path:
@@ -60,10 +60,10 @@ def device(place: Path) -> Path:
 
 def meet_device(folder: Path) -> None:
     """All that is asked of a device."""
-    found = read_device(folder / "device.toml")
-    found.known(*KEYS)
-    found.needed("an answer", "motor.inertia", "joint.inertia")
-    assert found.count > 0
+    device_file = read_device(folder / "device.toml")
+    device_file.known(*KEYS)
+    device_file.needed("an answer", "motor.inertia", "joint.inertia")
+    assert device_file.count > 0
 
 
 def printed_study(place: Path) -> Path:
@@ -87,9 +87,9 @@ def study_of_persons(place: Path) -> Path:
 
 def meet_study(folder: Path) -> None:
     """All forms of its answer."""
-    found = bf.metabolic(folder)
-    assert metabolic_text(found) and found.to_csv()
-    json.dumps(plain_data(found), allow_nan=False)
+    study = bf.metabolic(folder)
+    assert metabolic_text(study) and study.to_csv()
+    json.dumps(plain_data(study), allow_nan=False)
 
 
 def fleet(place: Path) -> Path:
@@ -108,11 +108,11 @@ def meet_fleet(folder: Path) -> None:
     """Everything about it that is read."""
     with jax.enable_x64(True):
         cases = list(read_cases(folder, read_inspections(folder), {}))
-    broken = [each for each in cases if hasattr(each, "why")]
-    refuse_if_none_usable([each for each in cases if not hasattr(each, "why")], broken)
-    for each in broken:
-        if len(each.why) > 2000 or "Traceback" in each.why:
-            raise Wrong(each.why)
+    broken = [case for case in cases if hasattr(case, "why")]
+    refuse_if_none_usable([case for case in cases if not hasattr(case, "why")], broken)
+    for item in broken:
+        if len(item.why) > 2000 or "Traceback" in item.why:
+            raise Wrong(item.why)
 
 
 FOLDERS: dict[str, tuple[Callable[[Path], Path], Callable[[Path], None]]] = {
@@ -139,10 +139,10 @@ def read_mangled_folder(place: Path, name: str, number: int) -> Outcome:
         ways = (*DESCRIPTIONS, _stranger, _stranger) if file.suffix == ".toml" else (*TABLES, _person, _person)
         text = chance.choice(ways)(chance, text) or "\n"
     file.write_text(text, encoding="utf-8", errors="surrogatepass")
-    before = set(place.rglob("*"))
+    files_at_start = set(place.rglob("*"))
     try:
         outcome = meet(f"{name} {number}, {file.name}", lambda: meets(folder))
-        if set(place.rglob("*")) != before:
+        if set(place.rglob("*")) != files_at_start:
             raise Wrong(f"{name} {number}: files were written")
     finally:
         shutil.rmtree(folder)

@@ -78,15 +78,15 @@ def other_json(chance: random.Random, text: str) -> str:
 def other_lines(chance: random.Random, text: str) -> str:
     """Lines of JSON, one of them another, twice, gone, or cut."""
     lines = text.splitlines()
-    at, how = chance.randrange(len(lines)), chance.randrange(5)
+    index, how = chance.randrange(len(lines)), chance.randrange(5)
     if how == 0:
-        del lines[at]
+        del lines[index]
     elif how == 1:
-        lines.insert(at, lines[chance.randrange(len(lines))])
+        lines.insert(index, lines[chance.randrange(len(lines))])
     elif how == 2:
-        lines[at] = chance.choice(("", "null", "[]", "{}", lines[at][: len(lines[at]) // 2], "[" * 3000, "9" * 5000))
+        lines[index] = chance.choice(("", "null", "[]", "{}", lines[index][: len(lines[index]) // 2], "[" * 3000, "9" * 5000))
     else:
-        lines[at] = other_json(chance, lines[at])
+        lines[index] = other_json(chance, lines[index])
     return "\n".join(lines) + "\n"
 
 
@@ -108,10 +108,10 @@ def mangle(chance: random.Random, path: Path) -> None:
 
 def _mangle_checkpoint(chance: random.Random, path: Path) -> None:
     """Another heading, or records with other arrays, whose checksums are right."""
-    lines, found = path.read_bytes().split(b"\n", 2), read_records(path, SHAPES)
+    lines, records = path.read_bytes().split(b"\n", 2), read_records(path, SHAPES)
     first = other_json(chance, lines[1].decode()) if chance.random() < 0.5 else lines[1].decode()
     path.write_bytes(lines[0] + b"\n" + first.encode("utf-8", "surrogatepass") + b"\n")
-    for record in found:
+    for record in records:
         if chance.random() < 0.5:
             name = chance.choice(list(record))
             if chance.random() < 0.3:
@@ -178,8 +178,8 @@ def resume_calibration(folder: Path) -> None:
     from bowdenfit.questions.calibrate.rank_tests import summarize_replications
 
     read_seed(folder)
-    found = open_replications(folder, FINGERPRINT, resume=True, force=False)
-    summarize_replications(tuple(found.values()), {}, name="x", seed=3, assumed=(), truths=())
+    records = open_replications(folder, FINGERPRINT, resume=True, force=False)
+    summarize_replications(tuple(records.values()), {}, name="x", seed=3, assumed=(), truths=())
 
 
 def begun_fleet(place: Path) -> Path:
@@ -195,8 +195,8 @@ def begun_fleet(place: Path) -> Path:
     about = {"name": "x", "seed": 3, "versions": installed_versions(), "quantities": {"k": ["mu", "tau"]}}
     nothing = np.full(3, np.nan)
     attributes = {"mu": {"units": "1"}}
-    drawn = FleetDraws(labels, ("a", "b", "c"), nothing, nothing, nothing, values, stats, attributes, about)
-    write_fleet_draws(place / FLEET_DRAWS, drawn)
+    fleet = FleetDraws(labels, ("a", "b", "c"), nothing, nothing, nothing, values, stats, attributes, about)
+    write_fleet_draws(place / FLEET_DRAWS, fleet)
     page = {"seed": 3, "versions": installed_versions(), "fitted": [], CHECKSUM: file_checksum(place / FLEET_DRAWS)}
     (place / FLEET_PAGE).write_text(json.dumps(page) + "\n")
     store.keep([PieceFit(name, np.ones((2, 8)), "laplace", 0.1, 400.0, ("why",)) for name in "de"])
@@ -205,8 +205,8 @@ def begun_fleet(place: Path) -> Path:
 
 def resume_fleet(folder: Path) -> None:
     """What `fleet --resume` reads."""
-    before = read_start(folder)
-    store = FleetStore(folder, {"seed": int(before["seed"]), "versions": installed_versions()}).open(resume=True, force=False)
+    initial = read_start(folder)
+    store = FleetStore(folder, {"seed": int(initial["seed"]), "versions": installed_versions()}).open(resume=True, force=False)
     assert all(isinstance(fit, PieceFit) and fit.values.ndim == 2 for fit in store.values())
 
 
@@ -216,13 +216,13 @@ def ask_fit(folder: Path) -> None:
 
     read_answers(folder)
     read_figure_data(folder)
-    found = bf.load(folder)
-    found.summary()
-    found.verdict()
+    fit = bf.load(folder)
+    fit.summary()
+    fit.verdict()
 
 
 def read_mangled_results(
-    place: Path, whole: Path, name: str, number: int, meets: Callable[[Path], object], *said: str
+    place: Path, whole: Path, name: str, number: int, meets: Callable[[Path], object], *message: str
 ) -> Outcome:
     """A case of a file in a results folder.
 
@@ -232,14 +232,14 @@ def read_mangled_results(
         name: Of the file, or a pattern of one.
         number: Of the case.
         meets: What reads the folder.
-        said: What a refusal names one of; the file or the folder if omitted.
+        message: What a refusal names one of; the file or the folder if omitted.
     """
     folder = place / "results"
     shutil.copytree(whole, folder)
     (file,) = folder.glob(name)
     mangle(random.Random(f"{name} {number}"), file)
     try:
-        outcome = meet(f"{name} {number}", lambda: meets(folder), *(said or (file.name, str(folder))))
+        outcome = meet(f"{name} {number}", lambda: meets(folder), *(message or (file.name, str(folder))))
     finally:
         shutil.rmtree(folder)
     return outcome

@@ -17,10 +17,10 @@ class Readings:
     force_in: np.ndarray
     force_out: np.ndarray
 
-    def swapped(self, where: np.ndarray | slice = slice(None)) -> "Readings":
+    def swapped(self, rows: np.ndarray | slice = slice(None)) -> "Readings":
         """With input and output exchanged in some rows."""
         force_in, force_out = self.force_in.copy(), self.force_out.copy()
-        force_in[where], force_out[where] = self.force_out[where], self.force_in[where]
+        force_in[rows], force_out[rows] = self.force_out[rows], self.force_in[rows]
         return replace(self, force_in=force_in, force_out=force_out)
 
 
@@ -102,8 +102,8 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "cable.toml").write_text(description + more)
     lines = [
-        f"{label},{at:.6g},{STROKES[int(stroke)]},{force_in:.8g},{force_out:.8g}"
-        for label, at, stroke, force_in, force_out in zip(
+        f"{label},{place:.6g},{STROKES[int(stroke)]},{force_in:.8g},{force_out:.8g}"
+        for label, place, stroke, force_in, force_out in zip(
             rows.label, rows.place, rows.stroke, rows.force_in, rows.force_out, strict=True
         )
     ]

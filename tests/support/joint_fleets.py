@@ -85,21 +85,21 @@ def joint_draws(
     posterior, inspections = cases[0].shaped.posterior, [case.inspection for case in cases]
     free = posterior.model.space.free
     places = np.array([[p.name for p in free].index(name) for name in names])
-    others = np.setdiff1d(np.arange(len(free)), places)
+    remaining = np.setdiff1d(np.arange(len(free)), places)
     median = np.log([float(free[i].prior.median) for i in places])
     sd = np.array([float(free[i].prior.log_sd) for i in places])
-    cables = list(dict.fromkeys(each.cable for each in inspections))
-    cable = np.array([cables.index(each.cable) for each in inspections])
-    cycles = np.array([each.cycles for each in inspections])
-    circumstances = np.array([[float(each.lubricated), each.temperature - 20.0] for each in inspections])
-    told = np.ptp(circumstances, axis=0) > 0
-    circumstances, of_effects = circumstances[:, told], np.array([OIL, DEGREE])[told]
+    cables = list(dict.fromkeys(inspection.cable for inspection in inspections))
+    cable = np.array([cables.index(inspection.cable) for inspection in inspections])
+    cycles = np.array([inspection.cycles for inspection in inspections])
+    circumstances = np.array([[float(inspection.lubricated), inspection.temperature - 20.0] for inspection in inspections])
+    varies = np.ptp(circumstances, axis=0) > 0
+    circumstances, of_effects = circumstances[:, varies], np.array([OIL, DEGREE])[varies]
     readings = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(case.shaped.data for case in cases))
     worn, n, k = cycles / cycles.max(), len(cables), len(names)
     of_all = Straight.through(np.concatenate([about.mean, np.log(about.spread), about.effects], axis=1))
     with_all = np.linalg.lstsq(of_all.away, about.cables.reshape(len(about.cables), -1), rcond=None)[0].reshape(-1, n, k + 1)
     of_cables = [Straight.through(about.cables[:, i] - of_all.away @ with_all[:, i]) for i in range(n)]
-    center, root = (np.stack([getattr(each, name) for each in of_cables]) for name in ("center", "root"))
+    center, root = (np.stack([getattr(item, name) for item in of_cables]) for name in ("center", "root"))
 
     def values_of(z):
         """Population and cables."""
@@ -116,8 +116,8 @@ def joint_draws(
         minus += jnp.sum((effects / of_effects) ** 2) / 2
         minus += jnp.sum(((cables - mean) / spread) ** 2) / 2 + n * jnp.sum(jnp.log(spread))
         minus += jnp.sum(z["rest"] ** 2) / 2
-        at = cables[cable, :k] + (cables[cable, k] * worn + circumstances @ effects)[:, None]
-        single = jnp.zeros((len(cases), len(free))).at[:, places].set((at - median) / sd).at[:, others].set(z["rest"])
+        expected = cables[cable, :k] + (cables[cable, k] * worn + circumstances @ effects)[:, None]
+        single = jnp.zeros((len(cases), len(free))).at[:, places].set((expected - median) / sd).at[:, remaining].set(z["rest"])
         terms = jax.vmap(posterior.log_likelihoods)(single, readings)
         total = minus - sum(jnp.sum(term) for term in terms.values())
         return jnp.where(jnp.isnan(total), jnp.inf, total)
@@ -127,12 +127,12 @@ def joint_draws(
     z = {
         "population": jnp.array(generator.standard_normal((CHAINS, len(of_all.center)))),
         "cables": jnp.array(generator.standard_normal((CHAINS, n, k + 1))),
-        "rest": jnp.array(0.2 * generator.standard_normal((CHAINS, len(cases), len(others)))),
+        "rest": jnp.array(0.2 * generator.standard_normal((CHAINS, len(cases), len(remaining)))),
     }
     kernel = NUTS(potential_fn=minus_log_density, target_accept_prob=0.85)
     chains = MCMC(
         kernel, num_warmup=WARM_UP, num_samples=draws, num_chains=CHAINS, chain_method="sequential", progress_bar=False
     )
     chains.run(jax.random.key(seed), init_params=z, extra_fields=("diverging",))
-    found = jax.jit(jax.vmap(jax.vmap(values_of)))(chains.get_samples(group_by_chain=True))
-    return Joint(*map(np.asarray, found), int(chains.get_extra_fields()["diverging"].sum()))
+    drawn_values = jax.jit(jax.vmap(jax.vmap(values_of)))(chains.get_samples(group_by_chain=True))
+    return Joint(*map(np.asarray, drawn_values), int(chains.get_extra_fields()["diverging"].sum()))

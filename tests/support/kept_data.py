@@ -9,6 +9,6 @@ def assert_kept(data, path):
     write_arrays(path, data)
     again = read_arrays(path, figure_data_types(data))
     assert list(again) == list(data)
-    for name, one in data.items():
-        assert type(again[name]) is type(one), name
-        assert serialize(again[name]) == serialize(one), name
+    for name, array in data.items():
+        assert type(again[name]) is type(array), name
+        assert serialize(again[name]) == serialize(array), name

@@ -38,10 +38,10 @@ forces = { file = "forces.csv" }
 LOGISTIC = {"settings": ["contact.0.wrap_angle.curve=logistic"]}
 Angles = Callable[[np.ndarray], np.ndarray]
 BELLS: tuple[Angles, Angles] = (
-    lambda at: 80 * np.exp(-(((at - 580) / 70) ** 2)),
-    lambda at: 70 * np.exp(-(((at - 400) / 70) ** 2)),
+    lambda length: 80 * np.exp(-(((length - 580) / 70) ** 2)),
+    lambda length: 70 * np.exp(-(((length - 400) / 70) ** 2)),
 )
-PLATEAU: tuple[Angles, Angles] = (lambda at: 80 / (1 + np.exp(-(at - 470) / 5)), BELLS[1])
+PLATEAU: tuple[Angles, Angles] = (lambda length: 80 / (1 + np.exp(-(length - 470) / 5)), BELLS[1])
 
 
 @dataclass(frozen=True)
@@ -118,13 +118,13 @@ class Laboratory:
     def truth(self) -> dict[str, float]:
         """Of the parameters of friction, and the best length [mm] where there is a route."""
         names = ["mu1", "mu2"] if self.angles else ["mu"]
-        known = dict(zip(names, self.rope.mu, strict=True))
+        truths = dict(zip(names, self.rope.mu, strict=True))
         more = {"drag": self.rope.drag, "load_exponent": self.rope.exponent, "stroke_difference": self.rope.asymmetry}
         best = {}
         if self.angles:
             along = np.linspace(LENGTHS[0], LENGTHS[-1], 100_001)
             best = {"best length": float(along[np.argmin(self._loss(along))])}
-        return known | {name: value for name, value in more.items() if value} | best
+        return truths | {name: value for name, value in more.items() if value} | best
 
     def _loss(self, places: np.ndarray) -> np.ndarray:
         bends = [angle(places) for angle in self.angles] or [places]
@@ -134,11 +134,11 @@ class Laboratory:
         """A folder with the tables of one session in this laboratory."""
         generator, places = np.random.default_rng(seed), np.asarray(self.places, dtype=float)
         loss = self._loss(places) + self.rope.scatter * generator.standard_normal(len(places))
-        one = np.array([(s, load) for s in self.strokes for load in self.loads for _ in range(self.repeats)])
-        plan = np.concatenate([generator.permutation(one) if self.rope.drift else one for _ in places])
-        run = np.repeat(np.arange(len(places)), len(one))
+        run_rows = np.array([(s, load) for s in self.strokes for load in self.loads for _ in range(self.repeats)])
+        plan = np.concatenate([generator.permutation(run_rows) if self.rope.drift else run_rows for _ in places])
+        run = np.repeat(np.arange(len(places)), len(run_rows))
         stroke, load = plan.T
-        later = np.tile(np.linspace(-0.5, 0.5, len(one)), len(places))
+        later = np.tile(np.linspace(-0.5, 0.5, len(run_rows)), len(places))
         out = self.rope.output(load, loss[run] * (1 + self.rope.drift * later), stroke)
         read = [f + sd * generator.standard_normal(len(f)) for f, sd in zip((load, out), self.noise, strict=True)]
         names = np.array(list(self.labels) or [str(i + 1) for i in range(len(places))])
@@ -152,7 +152,7 @@ class Laboratory:
     def _write_angles(self, folder: Path, generator: np.random.Generator) -> None:
         read = [angle(LENGTHS) + generator.standard_normal(len(LENGTHS)) for angle in self.angles]
         cells = [[f"{angle:.2f}" if angle >= LIMIT else f"<{LIMIT}" for angle in angles] for angles in read]
-        lines = [f"{at:g},{one},{other}" for at, one, other in zip(LENGTHS, *cells, strict=True)]
+        lines = [f"{length:g},{first},{other}" for length, first, other in zip(LENGTHS, *cells, strict=True)]
         (folder / "angles.csv").write_text(
             "\n".join(["cable_length_mm,free_angle_deg,squeezed_angle_deg", *lines]) + "\n"
         )

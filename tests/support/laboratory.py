@@ -28,7 +28,7 @@ PROBABILITY = 0.9
 SEED = 0
 
 
-def anything(measured: Dataset, drawn: Dataset) -> str:
+def anything(measured: Dataset, simulated: Dataset) -> str:
     """Every table that is drawn is fitted; for descriptions whose priors keep to plausible cables."""
     return ""
 
@@ -50,8 +50,8 @@ class Laboratory:
         """Draws of one posterior in z, one a row, by the package's usual sampler."""
         start = find_maximum_posterior(posterior, self.program(posterior, make_objective))
         programs = self.program(posterior, lambda p: compile_walkers(p, self.sampler))
-        asked = SamplingRequest(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
-        return sample(asked, programs).z.reshape(-1, posterior.model.space.size)
+        request = SamplingRequest(posterior, start, self.sampler, seed, diagnose=diagnose_few_draws)
+        return sample(request, programs).z.reshape(-1, posterior.model.space.size)
 
     def program(self, posterior: LogDensity, make: Callable[[LogDensity], Any]) -> Any:
         """What is compiled once for all data of one shape."""
@@ -71,8 +71,8 @@ class Laboratory:
             dataset = Dataset(description, empty_tables(description, design), {})
             plan = CalibrationPlan(dataset, dataset, SEED)
             self.benches[key] = Replicator(plan, self.fits, self.disturb, anything)
-        found = self.benches[key].replicate(list(seeds))
-        return [{name: each.rank for name, each in replication.ranked.items()} for replication in found]
+        replications = self.benches[key].replicate(list(seeds))
+        return [{name: ranks.rank for name, ranks in replication.ranked.items()} for replication in replications]
 
 
 def held(ranks: list[dict[str, float]]) -> dict[str, tuple[int, int]]:

@@ -46,12 +46,12 @@ def write(path, columns):
     np.savetxt(path, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
 
 
-def folder_of(path, each, *, angles=None, cable="", more="", entry=""):
+def folder_of(path, item, *, angles=None, cable="", more="", entry=""):
     """A data set of recordings of a loop; each at its wrap angle in degrees, or all at half a turn."""
     bend = '{ value = 180, unit = "deg" }' if angles is None else '{ column = "bend" }'
     lines = ["[[contact]]", 'name = "sheath"', 'friction = "mu"', f"wrap_angle = {bend}"]
     lines.append(more or "[tables]\nrecordings = {}")
-    for i, columns in enumerate(each):
+    for i, columns in enumerate(item):
         write(path / f"r{i}.csv", columns)
         lines += ["[[recording]]", f'file = "r{i}.csv"', entry]
         if angles is not None:
@@ -76,8 +76,8 @@ ANGLES, AMPLITUDES = (90, 180, 180, 270), (60, 20, 90, 60)
 def several_in(folder):
     """Four recordings, each with a mounting of its own; one of them never goes slack."""
     effects = 0.01 * np.random.default_rng(5).standard_normal(4)
-    each = [
+    recordings = [
         recorded(("sine", "triangle")[i % 2], amplitude, MU * math.radians(angle) + effects[i], seed=i)
         for i, (angle, amplitude) in enumerate(zip(ANGLES, AMPLITUDES, strict=True))
     ]
-    return folder_of(folder, each, angles=ANGLES)
+    return folder_of(folder, recordings, angles=ANGLES)

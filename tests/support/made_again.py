@@ -26,11 +26,11 @@ def measured_again(folder: Path, count: int, changes: list[str] | None = None, *
     with jax.enable_x64(True):
         dataset = load_dataset(folder, changes or [])
         model, tables = build_model(dataset), dataset.measurements
-        stated = json.loads((folder / "truth.json").read_text())["truth"]
-        truth = {p.name: stated.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
+        stated_truth = json.loads((folder / "truth.json").read_text())["truth"]
+        truth = {p.name: stated_truth.get(p.name, 0.0) / p.shown_scale for p in model.space.parameters} | values
         named = {name: jnp.asarray(value) for name, value in truth.items()}
         draw = jax.jit(lambda key: draw_readings(model.cable, tables, named, key))
         for seed in range(count):
-            drawn = jax.tree.map(np.asarray, draw(jax.random.key(seed)))
-            again = Measurements(tuple(iterate_replaced_tables(dataset.description, tables, drawn)))
+            draws = jax.tree.map(np.asarray, draw(jax.random.key(seed)))
+            again = Measurements(tuple(iterate_replaced_tables(dataset.description, tables, draws)))
             yield Dataset(dataset.description, again, {})

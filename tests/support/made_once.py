@@ -15,8 +15,8 @@ DATASETS = Path(__file__).resolve().parents[2] / "datasets"
 
 def shared_folder(factory: pytest.TempPathFactory) -> Path:
     """The temporary folder of the whole run; that of every process lies in it where there are several."""
-    own = factory.getbasetemp()
-    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    own_folder = factory.getbasetemp()
+    return own_folder.parent if "PYTEST_XDIST_WORKER" in os.environ else own_folder
 
 
 def made_once(place: Path, make: Callable[[Path], object]) -> Path:

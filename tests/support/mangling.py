@@ -22,38 +22,38 @@ Mangle = Callable[[random.Random, str], str]
 def cell(chance: random.Random, text: str) -> str:
     """Another value in one cell."""
     lines = text.splitlines(keepends=True)
-    at = chance.randrange(len(lines))
-    cells = lines[at].rstrip("\r\n").split(",")
+    index = chance.randrange(len(lines))
+    cells = lines[index].rstrip("\r\n").split(",")
     cells[chance.randrange(len(cells))] = chance.choice(ODD_CELLS)
-    lines[at] = ",".join(cells) + "\n"
+    lines[index] = ",".join(cells) + "\n"
     return "".join(lines)
 
 
 def line(chance: random.Random, text: str) -> str:
     """A line more, less, twice, cut, empty, or in another place."""
     lines = text.splitlines(keepends=True)
-    at, to = chance.randrange(len(lines)), chance.randrange(len(lines))
-    odd = ("\n", ",,,\n", "# remark\n", "mean,1,2\n", lines[at], "\x00\n", '"open\n', lines[at][: len(lines[at]) // 2])
+    index, to = chance.randrange(len(lines)), chance.randrange(len(lines))
+    odd = ("\n", ",,,\n", "# remark\n", "mean,1,2\n", lines[index], "\x00\n", '"open\n', lines[index][: len(lines[index]) // 2])
     how = chance.randrange(4)
     if how == 0:
-        del lines[at]
+        del lines[index]
     elif how == 1:
-        lines[at], lines[to] = lines[to], lines[at]
+        lines[index], lines[to] = lines[to], lines[index]
     elif how == 2:
-        lines[at] = chance.choice(odd)
+        lines[index] = chance.choice(odd)
     else:
-        lines.insert(at, chance.choice(odd))
+        lines.insert(index, chance.choice(odd))
     return "".join(lines)
 
 
 def letters(chance: random.Random, text: str) -> str:
     """A few letters changed, taken out or put in."""
     for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(text) + 1)
+        index = chance.randrange(len(text) + 1)
         text = (
-            text[:at]
+            text[:index]
             + chance.choice(["", "\0", ",", ";", '"', "\n", "é", "\u2028", "-", "9", "e", "[", "{", "="])
-            + text[at + 1 :]
+            + text[index + 1 :]
         )
     return text
 
@@ -61,32 +61,32 @@ def letters(chance: random.Random, text: str) -> str:
 def column(chance: random.Random, text: str) -> str:
     """A column less, twice, under another heading, or of one odd value."""
     rows = [row.split(",") for row in text.splitlines()]
-    at = chance.randrange(max(len(row) for row in rows))
+    index = chance.randrange(max(len(row) for row in rows))
     how, odd = chance.randrange(4), chance.choice(ODD_CELLS)
     for number, row in enumerate(rows):
-        if at < len(row):
+        if index < len(row):
             if how == 0:
-                del row[at]
+                del row[index]
             elif how == 1:
-                row.append(row[at])
+                row.append(row[index])
             elif (how == 2 and number == 0) or (how == 3 and number):
-                row[at] = odd
+                row[index] = odd
     return "\n".join(",".join(row) for row in rows) + "\n"
 
 
 def cut(chance: random.Random, text: str) -> str:
     """The end, or the beginning, is missing."""
-    at = chance.randrange(len(text))
-    return text[:at] if chance.random() < 0.7 else text[at:]
+    index = chance.randrange(len(text))
+    return text[:index] if chance.random() < 0.7 else text[index:]
 
 
 def setting(chance: random.Random, text: str) -> str:
     """Another value, key or place of a setting in a description."""
-    found = list(re.finditer(r"^([\w.]+) *= *(.+)$", text, re.M))
-    if not found:
+    matches = list(re.finditer(r"^([\w.]+) *= *(.+)$", text, re.M))
+    if not matches:
         return text + "x = 1\n"
-    one = chance.choice(found)
-    key, value = one.group(1), one.group(2)
+    picked = chance.choice(matches)
+    key, value = picked.group(1), picked.group(2)
     new = chance.choice(
         [
             f"{key} = {chance.choice(ODD_VALUES)}",
@@ -96,7 +96,7 @@ def setting(chance: random.Random, text: str) -> str:
             f"{key} = {value}\n{key} = {value}",
         ]
     )
-    return text[: one.start()] + new + text[one.end() :]
+    return text[: picked.start()] + new + text[picked.end() :]
 
 
 TABLES: tuple[Mangle, ...] = (cell, cell, cell, line, letters, column, cut)

@@ -26,9 +26,9 @@ def _joined(rows: list[list[str]]) -> str:
 def encoding(chance: random.Random, text: str) -> str:
     """Saved in another encoding, all or from some place on."""
     name = chance.choice(("utf-16", "utf-16-be", "utf-32", "utf-8-sig", "latin-1", "cp1252", "cp437", "utf-7", "shift-jis"))
-    at = 0 if chance.random() < 0.7 else chance.randrange(len(text))
-    coded = (chance.choice(LETTERS) + text[at:]).encode(name, errors="replace")
-    return text[:at] + coded.decode("utf-8", errors=BYTES)
+    index = 0 if chance.random() < 0.7 else chance.randrange(len(text))
+    coded = (chance.choice(LETTERS) + text[index:]).encode(name, errors="replace")
+    return text[:index] + coded.decode("utf-8", errors=BYTES)
 
 
 def separators(chance: random.Random, text: str) -> str:
@@ -61,8 +61,8 @@ def transposed(chance: random.Random, text: str) -> str:
 
 def long_table(chance: random.Random, text: str) -> str:
     """The whole table, or its rows, many times."""
-    head, _, rest = text.partition("\n")
-    body = rest if chance.random() < 0.8 else text
+    head, _, tail = text.partition("\n")
+    body = tail if chance.random() < 0.8 else text
     return f"{head}\n" + body * min(chance.choice((2, 30, 1000)), LONGEST // (len(body) + 1) + 1)
 
 
@@ -78,14 +78,14 @@ def wide_table(chance: random.Random, text: str) -> str:
 def heading(chance: random.Random, text: str) -> str:
     """Another unit or name in the heading of a column, or of two exchanged."""
     rows = _rows(text)
-    at, to = (chance.randrange(len(rows[0])) for _ in range(2))
+    index, to = (chance.randrange(len(rows[0])) for _ in range(2))
     how = chance.randrange(4)
     if how == 0:
-        rows[0][at], rows[0][to] = rows[0][to], rows[0][at]
+        rows[0][index], rows[0][to] = rows[0][to], rows[0][index]
     elif how == 1:
-        rows[0][at] = re.sub(r"_[^_]*$", f"_{chance.choice(UNITS)}", rows[0][at])
+        rows[0][index] = re.sub(r"_[^_]*$", f"_{chance.choice(UNITS)}", rows[0][index])
     elif how == 2:
-        rows[0][at] = chance.choice((*HEADINGS, *ODD_CELLS))
+        rows[0][index] = chance.choice((*HEADINGS, *ODD_CELLS))
     else:
         rows.insert(1, [chance.choice(UNITS) for _ in rows[0]])
     return _joined(rows)
@@ -94,15 +94,15 @@ def heading(chance: random.Random, text: str) -> str:
 def numbers(chance: random.Random, text: str) -> str:
     """A column of numbers multiplied, rounded, made one, negative, or written otherwise."""
     rows = _rows(text)
-    at, factor = chance.randrange(len(rows[0])), 10.0 ** chance.choice((-300, -15, -3, -1, 1, 3, 14, 15, 300))
-    one, how = chance.choice(ODD_CELLS), chance.randrange(6)
+    index, factor = chance.randrange(len(rows[0])), 10.0 ** chance.choice((-300, -15, -3, -1, 1, 3, 14, 15, 300))
+    picked, how = chance.choice(ODD_CELLS), chance.randrange(6)
     changes = (
-        lambda value: repr(value * factor), lambda value: f"{value:.0f}", lambda value: one, lambda value: repr(-value),
+        lambda value: repr(value * factor), lambda value: f"{value:.0f}", lambda value: picked, lambda value: repr(-value),
         lambda value: f"{value:g} N", lambda value: f"{value:.3e}".translate(str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")),
     )  # fmt: skip
     for row in rows[1:]:
         try:
-            row[at] = changes[how](float(row[at]))
+            row[index] = changes[how](float(row[index]))
         except (ValueError, IndexError, OverflowError):
             continue
     return _joined(rows)
@@ -142,19 +142,19 @@ def list_of_many(chance: random.Random, text: str) -> str:
          '["a.csv", "a.csv"]', f'"{"x" * chance.choice((250, 10_001, 100_000))}"', '"*"', '"**/*"', '"."', '"cable.toml"')
     )  # fmt: skip
     lines = text.splitlines()
-    at = chance.choice([k for k, line in enumerate(lines) if "=" in line] or [0])
-    lines[at] = f"{lines[at].partition('=')[0]}= {value}"
+    index = chance.choice([k for k, line in enumerate(lines) if "=" in line] or [0])
+    lines[index] = f"{lines[index].partition('=')[0]}= {value}"
     return "\n".join(lines) + "\n"
 
 
 def names(chance: random.Random, text: str) -> str:
     """Another name of everything that has one, wherever it stands."""
-    stated = sorted(set(re.findall(r'"([^"\n]{1,60})"', text))) or ["x"]
+    stated_value = sorted(set(re.findall(r'"([^"\n]{1,60})"', text))) or ["x"]
     odd = (
         "x" * 52, "x" * 300, "a/b", "$x_$", "=1+1", "\\u001b[2J", "\\u202e", "drag", "tau", "noise", "optimal_length", " ",
         "a.b", "_", "é",
     )  # fmt: skip
-    return text.replace(f'"{chance.choice(stated)}"', f'"{chance.choice((*odd, *stated))}"')
+    return text.replace(f'"{chance.choice(stated_value)}"', f'"{chance.choice((*odd, *stated_value))}"')
 
 
 def magnitude(chance: random.Random, text: str) -> str:
@@ -162,8 +162,10 @@ def magnitude(chance: random.Random, text: str) -> str:
     places = list(re.finditer(r"(?<![\w.])\d+\.?\d*(?![\w.])", text))
     if not places:
         return text
-    one = chance.choice(places)
-    return text[: one.start()] + chance.choice(("-", "", "0.", "1e5", "1e-9", "1e30")) + one.group() + text[one.end() :]
+    picked = chance.choice(places)
+    return (
+        text[: picked.start()] + chance.choice(("-", "", "0.", "1e5", "1e-9", "1e30")) + picked.group() + text[picked.end() :]
+    )
 
 
 def moved(chance: random.Random, text: str) -> str:
@@ -199,25 +201,25 @@ MORE_DESCRIPTIONS: tuple[Mangle, ...] = (
 
 def replace_file(chance: random.Random, path: Path) -> str:
     """Put something else in the place of a file of a data set, and return what."""
-    others = sorted(other for other in path.parent.iterdir() if other.is_file() and other != path)
-    what = chance.choice(("gone", "pipe", "folder", "loop", "nowhere", "endless", "system", "empty", "exchanged", "linked"))
-    if what == "exchanged" and others:
-        other = chance.choice(others)
+    other_files = sorted(other for other in path.parent.iterdir() if other.is_file() and other != path)
+    way = chance.choice(("gone", "pipe", "folder", "loop", "nowhere", "endless", "system", "empty", "exchanged", "linked"))
+    if way == "exchanged" and other_files:
+        other = chance.choice(other_files)
         content = path.read_bytes()
         path.write_bytes(other.read_bytes())
         other.write_bytes(content)
-        return what
-    target = {"endless": "/dev/zero", "system": "/proc/self/environ", "nowhere": "nowhere", "loop": path.name}.get(what)
-    if what == "linked":
+        return way
+    target = {"endless": "/dev/zero", "system": "/proc/self/environ", "nowhere": "nowhere", "loop": path.name}.get(way)
+    if way == "linked":
         shutil.copy(path, path.with_name("other.bin"))
         target = "other.bin"
     path.unlink()
     if target:
         path.symlink_to(target)
-    elif what == "pipe":
+    elif way == "pipe":
         os.mkfifo(path)
-    elif what == "folder":
+    elif way == "folder":
         path.mkdir()
-    elif what == "empty":
+    elif way == "empty":
         path.touch()
-    return what
+    return way

@@ -43,28 +43,30 @@ def measured(folder, cables, seed):
     preload = 17.5 + 0.3 * draw.standard_normal(cables)
     exponent = mu[:, None] * ANGLE + tau[:, None] * draw.standard_normal((cables, MOUNTINGS + 2))
     (folder / "cable.toml").write_text(CABLE)
-    found = []
+    results = []
     for i in range(cables):
-        lines = ["wrap_angle_deg,efficiency", *(f"90,{np.exp(-each):.6f}" for each in exponent[i, :MOUNTINGS])]
+        lines = ["wrap_angle_deg,efficiency", *(f"90,{np.exp(-loss):.6f}" for loss in exponent[i, :MOUNTINGS])]
         (folder / "efficiencies.csv").write_text("\n".join(lines) + "\n")
-        own, pulled = exponent[i, MOUNTINGS], LOADS + NOISE * draw.standard_normal(len(LOADS))
-        arrives = np.minimum(LOADS - 2 * preload[i] * own, LOADS * np.exp(-own))  # slack from 2 P Lambda/(1 - exp(-Lambda)) on
+        own_values, pulled = exponent[i, MOUNTINGS], LOADS + NOISE * draw.standard_normal(len(LOADS))
+        arrives = np.minimum(
+            LOADS - 2 * preload[i] * own_values, LOADS * np.exp(-own_values)
+        )  # slack from 2 P Lambda/(1 - exp(-Lambda)) on
         shown = arrives + NOISE * draw.standard_normal(len(LOADS))
-        rows = [f"90,pull,{one:.4f},{other:.4f}" for one, other in zip(pulled, shown, strict=True)]
+        rows = [f"90,pull,{first:.4f},{other:.4f}" for first, other in zip(pulled, shown, strict=True)]
         (folder / "loop.csv").write_text("\n".join(["wrap_angle_deg,stroke,input_force_N,output_force_N", *rows]) + "\n")
-        found.append(load_dataset(folder))
-    return found, exponent[:, -1], preload
+        results.append(load_dataset(folder))
+    return results, exponent[:, -1], preload
 
 
 def fitted(datasets, seed):
     """Fits of them all in one program, by the engines of a fleet; None of those that did not settle."""
     model = build_model(datasets[0])
-    each = [LogDensity(replace_data(model, dataset)) for dataset in datasets]
+    loss = [LogDensity(replace_data(model, dataset)) for dataset in datasets]
     seeds = [seed + i for i in range(len(datasets))]
-    fits = fit_batch(each[0], [posterior.data for posterior in each], seeds, RANK_SETTINGS)
+    fits = fit_batch(loss[0], [posterior.data for posterior in loss], seeds, RANK_SETTINGS)
     return [
-        None if fit.reasons else _record(dataset, model, fit.z, own)
-        for dataset, fit, own in zip(datasets, fits, seeds, strict=True)
+        None if fit.reasons else _record(dataset, model, fit.z, own_values)
+        for dataset, fit, own_values in zip(datasets, fits, seeds, strict=True)
     ]
 
 

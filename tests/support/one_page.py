@@ -27,10 +27,10 @@ def faults(page: str, lines: int = 25) -> list[str]:
         lines: How many there may be.
     """
     rows = page.splitlines()
-    found = [f"wider than 80: {row}" for row in rows if len(row.encode()) > 80]
-    found += [f"{len(rows)} lines"] if len(rows) > lines else []
-    found += ["no answer in three lines"] if not ANSWER.search(" ".join(rows[:3])) else []
-    return found + jargon(page) + _terms(page, STATISTICS)
+    page_faults = [f"wider than 80: {row}" for row in rows if len(row.encode()) > 80]
+    page_faults += [f"{len(rows)} lines"] if len(rows) > lines else []
+    page_faults += ["no answer in three lines"] if not ANSWER.search(" ".join(rows[:3])) else []
+    return page_faults + jargon(page) + _terms(page, STATISTICS)
 
 
 def jargon(text: str) -> list[str]:

@@ -61,8 +61,8 @@ def fleet_draws(
     values = {f"mu_{k}": np.exp(logs[:, :, k]) for k in range(count)}
     about = {"units": "1", "symbol": "$\\mu$", "role": "friction", "prior": PRIOR}
     stats = {"shape": np.array(["one"] * total, dtype=object), "trusted": np.ones(total, dtype="int8")}
-    found = FleetDraws(
+    fleet = FleetDraws(
         labels, tuple(np.repeat(names, len(cycles))), np.tile(np.array(cycles), cables), np.full(total, 20.0), oiled.ravel(),
         values, stats, dict.fromkeys(values, about), {"name": "made", "seed": 1},
     )  # fmt: skip
-    return found, np.concatenate([start, wear[:, None]], axis=1)
+    return fleet, np.concatenate([start, wear[:, None]], axis=1)

@@ -16,10 +16,10 @@ def sentences() -> Iterator[tuple[Path, str]]:
     quoted = json.loads((PUBLISHED / "quoted.json").read_text(encoding="utf-8"))
     summary = json.loads((PUBLISHED / "summary.json").read_text(encoding="utf-8"))
     details = one_line((PUBLISHED / "details.txt").read_text(encoding="utf-8"))
-    found, best = summary["parameters"], summary["optimal"]["length"]
-    span = {name: f"{found[name]['q05']:.3f} to {found[name]['q95']:.3f}" for name in PLACES}
+    parameters, best = summary["parameters"], summary["optimal"]["length"]
+    span = {name: f"{parameters[name]['q05']:.3f} to {parameters[name]['q95']:.3f}" for name in PLACES}
     for name, place in PLACES.items():
-        yield STORY, f"| {place} | {name} = {found[name]['median']:.3f} | {span[name]} |"
+        yield STORY, f"| {place} | {name} = {parameters[name]['median']:.3f} | {span[name]} |"
     low, middle, high = (f"{best[key]:.0f}" for key in ("q05", "median", "q95"))
     yield STORY, f"The best length is {middle} mm (90 % interval {low} to {high} mm)"
     yield STORY, f"one curve gives {low} to {high} mm"
@@ -43,7 +43,7 @@ def sentences() -> Iterator[tuple[Path, str]]:
 def missing() -> list[str]:
     """What does not stand where it should."""
     pages = {page: one_line(page.read_text(encoding="utf-8").replace("\n> ", "\n")) for page in (STORY, TRUST)}
-    return [f"{page.relative_to(ROOT)} should say: {said}" for page, said in sentences() if said not in pages[page]]
+    return [f"{page.relative_to(ROOT)} should say: {message}" for page, message in sentences() if message not in pages[page]]
 
 
 def one_line(text: str) -> str:
@@ -53,13 +53,13 @@ def one_line(text: str) -> str:
 
 def sentence(text: str, start: str, through: str = "") -> str:
     """From a beginning to the next full stop, behind certain words."""
-    rest = text[text.index(start) :]
-    return rest[: rest.index(". ", rest.index(through)) + 1]
+    tail = text[text.index(start) :]
+    return tail[: tail.index(". ", tail.index(through)) + 1]
 
 
-def interval(said: str) -> str:
+def interval(message: str) -> str:
     """The interval in "471 mm (450 to 478 mm; ± 12.2 mm)"."""
-    return said.partition("(")[2].partition(";")[0]
+    return message.partition("(")[2].partition(";")[0]
 
 
 def dashed(span: str) -> str:
@@ -70,9 +70,9 @@ def dashed(span: str) -> str:
 def least_squares(details: str) -> list[str]:
     """The three coefficients with their standard errors, the first two joined."""
     row = r"\b{} [\d.]+ [\d.]+ to [\d.]+ [\d.]+ ± [\d.]+ ([\d.]+) ± ([\d.]+) "
-    found = [re.findall(row.format(name), details)[0] for name in PLACES]
-    said = [f"{float(value):.3f} +- {float(error):.3f}" for value, error in found]
-    return [", ".join(said[:2]), said[2]]
+    matches = [re.findall(row.format(name), details)[0] for name in PLACES]
+    intervals = [f"{float(value):.3f} +- {float(error):.3f}" for value, error in matches]
+    return [", ".join(intervals[:2]), intervals[2]]
 
 
 def profile(text: str, name: str) -> str:

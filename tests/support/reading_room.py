@@ -17,13 +17,13 @@ class Reader:
     """A page as it was opened: what it said on the console, and what it asked for."""
 
     page: Any
-    said: list[str] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+    requested: list[str] = field(default_factory=list)
 
     def faults(self) -> list[str]:
         """What is wrong with the page, a sentence each."""
-        found = [f"on the console: {text}" for text in self.said] + [f"asked for {url}" for url in self.asked]
-        return found + self.page.evaluate(FAULTS)
+        complaints = [f"on the console: {text}" for text in self.messages] + [f"asked for {url}" for url in self.requested]
+        return complaints + self.page.evaluate(FAULTS)
 
     def sheets(self) -> int:
         """How many sheets of paper it is."""
@@ -57,13 +57,13 @@ def opened(chromium, path: Path, width=1200, **settings):
         def answer(route):
             if route.request.url == path.as_uri():
                 return route.continue_()
-            reader.asked.append(route.request.url)
+            reader.requested.append(route.request.url)
             return route.abort()
 
         context.route("**/*", answer)
-        reader.page.on("console", lambda message: reader.said.append(message.text))
-        reader.page.on("pageerror", lambda error: reader.said.append(str(error)))
-        reader.page.on("dialog", lambda dialog: (reader.said.append(dialog.message), dialog.dismiss()))
+        reader.page.on("console", lambda message: reader.messages.append(message.text))
+        reader.page.on("pageerror", lambda error: reader.messages.append(str(error)))
+        reader.page.on("dialog", lambda dialog: (reader.messages.append(dialog.message), dialog.dismiss()))
         reader.page.goto(path.as_uri())
         yield reader
     finally:

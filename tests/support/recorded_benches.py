@@ -57,8 +57,10 @@ class RecordedBench:
     def unusual(self) -> str:
         """What is not as usual, in words."""
         plain = RecordedBench()
-        each = ((f.name, getattr(self, f.name), getattr(plain, f.name)) for f in fields(self))
-        return ", ".join(f"{name} {value:g}" if name != "wave" else str(value) for name, value, usual in each if value != usual)
+        changes = ((f.name, getattr(self, f.name), getattr(plain, f.name)) for f in fields(self))
+        return ", ".join(
+            f"{name} {value:g}" if name != "wave" else str(value) for name, value, usual in changes if value != usual
+        )
 
 
 def channels(bench: RecordedBench, generator: np.random.Generator) -> dict[str, np.ndarray]:
@@ -67,22 +69,22 @@ def channels(bench: RecordedBench, generator: np.random.Generator) -> dict[str, 
     samples = round(bench.length * bench.rate)
     fine = np.arange(samples * finer) / (bench.rate * finer)
     exponent = bench.exponent + bench.scatter * generator.standard_normal()
-    given = (1 - bench.preload) / np.exp(exponent)
-    motor = _position(bench, fine, generator) * (given + (1 - bench.preload) / bench.stiffness)
+    output = (1 - bench.preload) / np.exp(exponent)
+    motor = _position(bench, fine, generator) * (output + (1 - bench.preload) / bench.stiffness)
     forces = [_filtered(force, bench.cutoff / (bench.rate * finer)) for force in _forces(bench, motor, exponent)]
     time = fine[::finer]
-    pulled, given = forces[0][::finer], np.interp(time - bench.delay, fine, forces[1])
+    pulled, output = forces[0][::finer], np.interp(time - bench.delay, fine, forces[1])
     white = generator.standard_normal((2, samples))
     if bench.correlated:
-        kept = np.exp(-1 / (bench.correlated * bench.rate))
-        white[0] = lfilter([np.sqrt(1 - kept**2)], [1, -kept], white[0])
+        decay = np.exp(-1 / (bench.correlated * bench.rate))
+        white[0] = lfilter([np.sqrt(1 - decay**2)], [1, -decay], white[0])
     drift = bench.drift * (np.arange(samples) / samples - 0.5)
-    found = {
+    columns = {
         "time_s": time,
         "input_force_N": bench.load * (pulled + bench.noise * white[0]),
-        "output_force_N": bench.load * (given + bench.noise * white[1] + drift),
+        "output_force_N": bench.load * (output + bench.noise * white[1] + drift),
     }
-    return found | ({"velocity_mm/s": 50 * np.gradient(motor, fine)[::finer]} if bench.velocity else {})
+    return columns | ({"velocity_mm/s": 50 * np.gradient(motor, fine)[::finer]} if bench.velocity else {})
 
 
 def _position(bench: RecordedBench, time: np.ndarray, generator: np.random.Generator) -> np.ndarray:
@@ -104,22 +106,22 @@ def _position(bench: RecordedBench, time: np.ndarray, generator: np.random.Gener
 
 def _forces(bench: RecordedBench, motor: np.ndarray, exponent: float) -> tuple[np.ndarray, np.ndarray]:
     """Input and output force for a motion of the motor; the spring is of unit stiffness, and at rest at the start."""
-    stiff, rest = bench.stiffness, bench.preload
+    stiff, preload = bench.stiffness, bench.preload
     ends = []
     for ratio in (np.exp(exponent), np.exp(-exponent)):
-        ends.append(np.maximum((stiff * motor + (rest + bench.drag) * (1 - ratio)) / (stiff + ratio), 0.0).tolist())
-    at, places = 0.0, []
+        ends.append(np.maximum((stiff * motor + (preload + bench.drag) * (1 - ratio)) / (stiff + ratio), 0.0).tolist())
+    value, places = 0.0, []
     for least, most in zip(*ends, strict=True):
-        at = least if at < least else most if at > most else at
-        places.append(at)
+        value = least if value < least else most if value > most else value
+        places.append(value)
     place = np.array(places)
-    return stiff * (motor - place) + rest, rest + place
+    return stiff * (motor - place) + preload, preload + place
 
 
 def _filtered(force: np.ndarray, cutoff: float) -> np.ndarray:
     """By a filter of first order; the cutoff as a share of the sampling rate, 0 for none."""
-    kept = np.exp(-2 * np.pi * cutoff)
-    return lfilter([1 - kept], [1, -kept], force, zi=[kept * force[0]])[0] if cutoff else force
+    decay = np.exp(-2 * np.pi * cutoff)
+    return lfilter([1 - decay], [1, -decay], force, zi=[decay * force[0]])[0] if cutoff else force
 
 
 def write(bench: RecordedBench, folder: Path, seed: int) -> Path:

@@ -122,11 +122,11 @@ def _bag2(path: Path, plugin: StoragePlugin) -> None:
     folder, types = path.with_suffix(""), get_typestore(Stores.ROS2_HUMBLE)
     with Bag2Writer(folder, version=8, storage_plugin=plugin) as writer:
         _topics(writer, types, types.serialize_cdr)
-    (found,) = folder.glob(f"*{path.suffix}")
+    (written_path,) = folder.glob(f"*{path.suffix}")
     if path.suffix == ".db3":
-        with closing(sqlite3.connect(found)) as database:
+        with closing(sqlite3.connect(written_path)) as database:
             database.execute("vacuum")
-    found.rename(path)
+    written_path.rename(path)
     shutil.rmtree(folder)
 
 

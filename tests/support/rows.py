@@ -31,7 +31,7 @@ def of_rows(loss: np.ndarray, angle: np.ndarray, angle_sd: float | np.ndarray = 
     ]
     tables = {"efficiencies": {"file": "efficiencies.csv"}}
     description = parse_description({"name": "rows", "contact": contacts, "tables": tables} | more)
-    own = OwnAngles(tuple(f"angle_{i + 1}" for i in range(k)), angle, np.broadcast_to(angle_sd, angle.shape).copy())
+    own_angles = OwnAngles(tuple(f"angle_{i + 1}" for i in range(k)), angle, np.broadcast_to(angle_sd, angle.shape).copy())
     origin = RowOrigin(("efficiencies.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2))
-    table = EfficiencyTable(np.full(n, np.nan), np.exp(-loss), np.zeros(n), own, origin)
+    table = EfficiencyTable(np.full(n, np.nan), np.exp(-loss), np.zeros(n), own_angles, origin)
     return Dataset(description, Measurements((table,)), {})

@@ -10,8 +10,8 @@ from bowdenfit.results.answer_cache import CHECKSUM, page_checksum
 
 def sealed(page: dict[str, Any]) -> str:
     """A page with the checksum of what it says."""
-    said = {key: value for key, value in page.items() if key != CHECKSUM}
-    return json.dumps(said | {CHECKSUM: page_checksum(said)})
+    contents = {key: value for key, value in page.items() if key != CHECKSUM}
+    return json.dumps(contents | {CHECKSUM: page_checksum(contents)})
 
 
 def edit_sealed(path: Path, change: Callable[[dict[str, Any]], None]) -> None:

@@ -8,5 +8,5 @@ import pytest
 
 def some_slow(cases: Iterable[Any], usual: Collection[Any]) -> list[Any]:
     """Parameters of a test, in order; a tuple is a case of several."""
-    each = [(case, case if isinstance(case, tuple) else (case,)) for case in cases]
-    return [pytest.param(*parts, marks=() if case in usual else pytest.mark.slow) for case, parts in each]
+    named_cases = [(case, case if isinstance(case, tuple) else (case,)) for case in cases]
+    return [pytest.param(*parts, marks=() if case in usual else pytest.mark.slow) for case, parts in named_cases]

@@ -60,14 +60,14 @@ class Block:
 
 def blocks(*languages: str, pages: tuple[Path, ...] = PAGES) -> list[Block]:
     """All blocks of some languages."""
-    found = []
+    results = []
     for page in pages:
         text = page.read_text(encoding="utf-8")
         for match in _BLOCK.finditer(text):
             if match["language"] in languages:
                 line = text.count("\n", 0, match.start()) + 1
-                found.append(Block(page, line, match["language"], match["text"]))
-    return found
+                results.append(Block(page, line, match["language"], match["text"]))
+    return results
 
 
 def as_shown(shown: str, printed: str, as_read: Callable[[str], str] = str) -> bool:

@@ -66,32 +66,32 @@ def problem(name: str) -> Problem:
     return Problem(raw["name"], x, y, MODELS[name], starts, certified, sd, raw["residual_sum_of_squares"])
 
 
-def certify(given: Problem) -> tuple[Certification, Certification]:
+def certify(regression: Problem) -> tuple[Certification, Certification]:
     """The package's solver on a problem, from both starts."""
-    evaluate, calls = given.evaluate(), []
+    evaluate, calls = regression.evaluate(), []
 
     def counted(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         calls.append(1)
         return evaluate(b)
 
-    found = []
-    for start in given.starts:
+    results = []
+    for start in regression.starts:
         calls.clear()
         minimum = minimize(counted, start)
-        residual_sd = np.sqrt(minimum.sum_of_squares / (len(given.y) - len(start)))
+        residual_sd = np.sqrt(minimum.sum_of_squares / (len(regression.y) - len(start)))
         errors = residual_sd * np.linalg.norm(orthogonalize(minimum.jacobian)[1], axis=1)
         digits = [
-            digits_alike(minimum.x, given.certified),
-            digits_alike(errors, given.standard_deviation),
-            digits_alike(np.array([minimum.sum_of_squares]), np.array([given.residual_sum_of_squares])),
+            digits_alike(minimum.x, regression.certified),
+            digits_alike(errors, regression.standard_deviation),
+            digits_alike(np.array([minimum.sum_of_squares]), np.array([regression.residual_sum_of_squares])),
         ]
-        found.append(Certification(minimum.succeeded, *digits, len(calls)))
-    return found[0], found[1]
+        results.append(Certification(minimum.succeeded, *digits, len(calls)))
+    return results[0], results[1]
 
 
-def digits_alike(found: np.ndarray, certified: np.ndarray) -> float:
+def digits_alike(estimates: np.ndarray, certified: np.ndarray) -> float:
     """Log relative error: decimal digits in which the worst of several numbers agrees."""
-    error = np.max(np.abs(found - certified) / np.abs(certified))
+    error = np.max(np.abs(estimates - certified) / np.abs(certified))
     return float(np.clip(-np.log10(max(error, 1e-300)), 0.0, MOST_DIGITS)) if np.isfinite(error) else 0.0
 
 

@@ -38,9 +38,11 @@ def write_loggers(
     columns = channels(bench, generator)
     time, forces = columns["time_s"] + pause, (columns["input_force_N"], columns["output_force_N"])
     begins = np.arange(0.0, time[-1] * 0.97, 1 / rates[0]), np.arange(shift, time[-1], 1 / rates[1])
-    for name, at, force, origin, fast in zip("io", begins, forces, origins, (0.0, drift), strict=True):
-        clock = origin + (at - at[0]) * (1 + fast)
-        shown = np.interp(at, time, force) + (at < pause) * bench.load * bench.noise * generator.standard_normal(len(at))
+    for name, begin, force, origin, fast in zip("io", begins, forces, origins, (0.0, drift), strict=True):
+        clock = origin + (begin - begin[0]) * (1 + fast)
+        shown = np.interp(begin, time, force) + (begin < pause) * bench.load * bench.noise * generator.standard_normal(
+            len(begin)
+        )
         table = np.column_stack([clock, shown])
         np.savetxt(folder / f"{name}.csv", table, ("%.6f", "%.7g"), ",", header="time_s,Force (N)", comments="")
     (folder / "cable.toml").write_text(

@@ -41,7 +41,7 @@ def check(function: Any) -> Any:
 def _of_either(hint: Any) -> Any:
     """A hint, of arrays of JAX or NumPy where it is of JAX's."""
     if get_origin(hint) in (Union, UnionType):
-        return reduce(or_, (_of_either(one) for one in get_args(hint)))
+        return reduce(or_, (_of_either(part) for part in get_args(hint)))
     if getattr(hint, "array_type", None) is jax.Array:
         return hint.dtype[jax.Array | np.ndarray | np.generic, hint.dim_str]
     return hint

@@ -18,18 +18,18 @@ class Share:
     share: Interval
 
 
-def shares(found: Annotated[Any, RESULTS, FIT]) -> tuple[Share, ...]:
+def shares(fit: Annotated[Any, RESULTS, FIT]) -> tuple[Share, ...]:
     """Shares of all contacts with a constant wrap angle."""
-    contacts = found.dataset.description.contact
-    parts = [found.draws().values[c.friction] * c.wrap_angle.constant.to("angle") for c in contacts]
+    contacts = fit.dataset.description.contact
+    parts = [fit.draws().values[c.friction] * c.wrap_angle.constant.to("angle") for c in contacts]
     whole = np.sum(parts, axis=0)
     return tuple(Share(c.name, Interval.of(part / whole)) for c, part in zip(contacts, parts, strict=True))
 
 
 def words(answer, _):
     """A line a contact."""
-    lines = [f"{each.contact}: {each.share.median:.0%} of the loss" for each in answer]
-    return Reply("\n".join(lines) + "\n", lambda: {each.contact: each.share.median for each in answer})
+    lines = [f"{item.contact}: {item.share.median:.0%} of the loss" for item in answer]
+    return Reply("\n".join(lines) + "\n", lambda: {item.contact: item.share.median for item in answer})
 
 
 VERB = Verb(shares, words, "Say which contact takes what share of the loss.")
@@ -53,6 +53,6 @@ def draw(answer, width=None):
     from bowdenfit.plots.layout import panels
 
     figure, (axes,) = panels([1.5], 1, 0.1, (0, 0), width or 4.6)
-    axes.bar([each.contact for each in answer], [each.share.median for each in answer])
+    axes.bar([item.contact for item in answer], [item.share.median for item in answer])
     axes.set_ylabel("Share of the loss")
     return figure

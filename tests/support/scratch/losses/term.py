@@ -31,7 +31,7 @@ class LossTerms(TermKind[LossTable]):
         labels = tuple(f"{force:g} N" for force in table.input_force)
         return (LossTerm(cable, {"reading": table.loss, "input_force": table.input_force}, labels),)
 
-    def parameters(self, table, at):
+    def parameters(self, table, point):
         return [Parameter(NOISE, r"$\sigma$ loss", "noise of a lost force", "noise", HalfNormal(1.0), "N")]
 
     def draw(self, table, truth):

@@ -2,7 +2,7 @@
 
     python scripts/check_benches.py [--verdicts N] [--intervals N] [--no-comparison] [--write FILE] [LABORATORY ...]
 
-The laboratories are those of `tests/support/laboratories.py`, in NumPy alone, with loads of 0.5 N to 20 kN, one mounting to
+The laboratories are those of `tests/support/bench_simulator.py`, in NumPy alone, with loads of 0.5 N to 20 kN, one mounting to
 twenty, hung weights or cells, and what goes wrong on benches. In each
 
 - every model is fitted by least squares to `--verdicts` sessions: the right one must be trusted, and any other end with a
@@ -26,8 +26,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
-from investigations import HELD, ending, fault, held  # noqa: E402
-from laboratories import LABORATORIES, Laboratory  # noqa: E402
+from bench_simulator import LABORATORIES, Laboratory  # noqa: E402
+from laboratory_fits import HELD, ending, fault, held  # noqa: E402
 
 import bowdenfit as bf  # noqa: E402
 from bowdenfit.words import table  # noqa: E402

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 from corruptions import corrupt  # noqa: E402
-from endings import ENDS, WRONG, answers, end_of  # noqa: E402
+from mistaken_data_sets import ENDS, WRONG, answers, end_of  # noqa: E402
 
 import bowdenfit as bf  # noqa: E402
 from bowdenfit.words import table  # noqa: E402

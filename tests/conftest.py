@@ -121,7 +121,7 @@ def on_body() -> Path:
 @pytest.fixture(scope="session")
 def finished(on_body, tmp_path_factory) -> tuple[bf.Fit, Path]:
     """A quick, converged fit of the on-body data, and the folder with all its results; no test changes either."""
-    from made_once import made_once, shared_folder
+    from fits import made_once, shared_folder
 
     def make(folder):
         bf.fit(on_body, output=folder, seed=11, settings=QUICK)
@@ -145,7 +145,7 @@ def quick_results(finished) -> Path:
 @pytest.fixture(scope="session")
 def loop_results(on_body, tmp_path_factory) -> Path:
     """The folder of a quick fit of the synthetic loop, without figures; no test changes it."""
-    from made_once import made_once, shared_folder
+    from fits import made_once, shared_folder
 
     quick = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=3000")
 
@@ -158,7 +158,7 @@ def loop_results(on_body, tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def least_squares_of(tmp_path_factory):
     """Least squares of a published data set, by its name; no test changes it."""
-    from made_once import least_squares_of
+    from fits import least_squares_of
 
     return least_squares_of(tmp_path_factory)
 

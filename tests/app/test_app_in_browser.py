@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from app_in_browser import served, visiting
-from half_turn import describe_half_turn
-from reading_room import browser
+from half_turn_bench import describe_half_turn
+from offline_browser import browser
 
 import bowdenfit as bf
 

@@ -4,8 +4,8 @@ import shutil
 
 import pytest
 from app_in_browser import served, visiting, watch
-from half_turn import describe_half_turn
-from reading_room import FAULTS, browser
+from half_turn_bench import describe_half_turn
+from offline_browser import FAULTS, browser
 
 import bowdenfit as bf
 

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from half_turn import TABLE, describe_half_turn
+from half_turn_bench import TABLE, describe_half_turn
 
 import bowdenfit as bf
 from bowdenfit.app.brought_folder import put_in_place

@@ -1,7 +1,7 @@
 """Rows that are added to a table: read as the reader reads them, refused at their cell, and written whole or not at all."""
 
 import pytest
-from half_turn import TABLE, describe_half_turn
+from half_turn_bench import TABLE, describe_half_turn
 
 import bowdenfit as bf
 from bowdenfit.app.new_rows import list_tables, open_table

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from laboratory import Laboratory
+from simulated_coverage import Laboratory
 
 import bowdenfit as bf
 from bowdenfit.cable.curves import LineCurve, LogisticCurve

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from elastic_cables import HOUSING, TRUTH, bench, elastic_cable
-from laboratory import Laboratory
-from rows import of_rows
+from own_angle_tables import of_rows
+from simulated_coverage import Laboratory
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset

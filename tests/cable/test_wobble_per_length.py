@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from laboratory import Laboratory
+from simulated_coverage import Laboratory
 
 import bowdenfit as bf
 from bowdenfit.errors import DescriptionError

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from one_page import faults, jargon
+from terminal_pages import faults, jargon
 
 pytestmark = pytest.mark.extended
 

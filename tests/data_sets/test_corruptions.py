@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from corruptions import CORRUPTIONS, corrupt, read_by_a_fit
-from endings import HARMLESS, NOT_TRUSTED, REFUSED, WRONG, answers, end_of
+from mistaken_data_sets import HARMLESS, NOT_TRUSTED, REFUSED, WRONG, answers, end_of
 
 import bowdenfit as bf
 

@@ -1,8 +1,8 @@
 """Simulated laboratories unlike ours: only the right model is trusted, and any other end names its cause."""
 
 import pytest
-from investigations import ending, fault, held
-from laboratories import LABORATORIES
+from bench_simulator import LABORATORIES
+from laboratory_fits import ending, fault, held
 from scipy.stats import binomtest
 
 pytestmark = pytest.mark.extended

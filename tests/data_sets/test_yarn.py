@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from figure_words import assert_readable
-from one_page import faults
 from scipy import stats
+from terminal_pages import faults
 
 import bowdenfit
 from bowdenfit.dataset import Dataset

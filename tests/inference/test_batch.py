@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rows import of_rows
+from own_angle_tables import of_rows
 
 import bowdenfit as bf
 from bowdenfit.dataset import load_dataset

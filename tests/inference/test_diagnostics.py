@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from arviz_stats.base import array_stats
-from one_page import jargon
+from terminal_pages import jargon
 
 from bowdenfit.inference.diagnostics import (
     MAXIMUM_DRIFT,

@@ -18,8 +18,8 @@ from cables import CONTACTS, cable, other_design
 from cables import TRUTH as CABLE_TRUTH
 from densities import over_rows
 from elastic_cables import CONSTANT, ELASTIC, TRUTH, bench, changed, elastic_cable
-from laboratory import Laboratory, held, p_values, table
 from scipy import stats
+from simulated_coverage import Laboratory, held, p_values, table
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 import pytest
 from conftest import ROOT
-from made_again import measured_again
+from repeated_measurements import measured_again
 from slow_cases import some_slow
 
 import bowdenfit as bf

@@ -5,7 +5,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
-from rows import of_rows
+from own_angle_tables import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from rows import of_rows
+from own_angle_tables import of_rows
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import bowdenfit as bf

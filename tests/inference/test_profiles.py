@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from cables import cable, measured
-from rows import of_rows
+from own_angle_tables import of_rows
 from scipy import optimize, stats
 from strd import Problem, problem
 

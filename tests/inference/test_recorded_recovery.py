@@ -16,9 +16,9 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
-from laboratory import Laboratory as Fits
 from raw_recordings import to_raw
 from scipy import stats
+from simulated_coverage import Laboratory
 
 import bowdenfit
 from bowdenfit.cable.sensors import DELAY_ERROR
@@ -153,11 +153,11 @@ def internal_values(posterior: LogDensity) -> Callable[[np.ndarray], jax.Array]:
     return jax.jit(jax.vmap(posterior.model.space.vector))
 
 
-class Laboratory:
+class RecordedLaboratory:
     """Fits recorded cables, and keeps what was compiled for them."""
 
     def __init__(self) -> None:
-        self.fits, self.models = Fits(sampler=SAMPLER), {}
+        self.fits, self.models = Laboratory(sampler=SAMPLER), {}
 
     def posterior(self, dataset: Dataset) -> LogDensity:
         """Of the first model of its kind: a delay that is known otherwise is the same delay in other units of time."""
@@ -187,9 +187,9 @@ class Laboratory:
 
 
 @pytest.fixture(scope="module")
-def laboratory() -> Laboratory:
+def laboratory() -> RecordedLaboratory:
     """One for all tests, so that each shape of data is compiled for once."""
-    return Laboratory()
+    return RecordedLaboratory()
 
 
 @pytest.fixture(scope="module")
@@ -231,7 +231,7 @@ def naive_ranks(cable: Cable) -> dict[str, float]:
 @pytest.mark.slow
 @SEVEN_OR_TEN
 def test_over_recorded_cables_nine_in_ten_intervals_hold_the_truth(
-    laboratory: Laboratory, several: list[tuple[Cable, Dataset]]
+    laboratory: RecordedLaboratory, several: list[tuple[Cable, Dataset]]
 ):
     """Both coefficients, the total exponent, tau and the gain error, with the delay found in the recordings themselves.
 
@@ -243,7 +243,7 @@ def test_over_recorded_cables_nine_in_ten_intervals_hold_the_truth(
 
 
 @pytest.mark.slow
-def test_over_a_hundred_recorded_cables_ranks_are_uniform(laboratory: Laboratory):
+def test_over_a_hundred_recorded_cables_ranks_are_uniform(laboratory: RecordedLaboratory):
     """The whole distribution, with a delay drawn from what is stated of it, so that the ranks are exactly uniform.
 
     Ten tests, Kolmogorov-Smirnov and binomial; the smallest p times their number is below 0.001 once in a thousand seeds.
@@ -277,7 +277,7 @@ def test_least_squares_of_all_pulling_samples_does_not_hold_the_truth():
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_whole_recordings_give_the_coefficients_that_their_sliding_runs_give(laboratory: Laboratory, seed: int):
+def test_whole_recordings_give_the_coefficients_that_their_sliding_runs_give(laboratory: RecordedLaboratory, seed: int):
     """Every block through the play operator: the same exponents, with a little more known of them."""
     cable = simulated(seed)
     runs, whole = (laboratory.draws(prepared(described(kind), cable), seed) for kind in ("runs", "whole"))

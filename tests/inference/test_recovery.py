@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 from cables import CONTACTS, DESIGN, cable, other_design
-from laboratory import Laboratory, held, p_values, table
 from scipy import stats
+from simulated_coverage import Laboratory, held, p_values, table
 
 from bowdenfit.dataset import Dataset
 from bowdenfit.description import Description, SamplerSettings

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rows import of_rows
+from own_angle_tables import of_rows
 from scipy import stats
 
 from bowdenfit.description import PriorDefaults, SamplerSettings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from catheters import TRUTH, Catheter, bench, cycles
-from spoiling import copied, spoil
+from spoiled_input import copied, spoil
 
 import bowdenfit as bf
 from bowdenfit.kinds.displacement.table import DisplacementTable, follow_motor

@@ -1,7 +1,7 @@
 """Bad tables of stretch, preload and loops, and good ones that are remarked on."""
 
 import pytest
-from spoiling import copied, spoil
+from spoiled_input import copied, spoil
 
 NAMES = ("cable.toml", "stretch.csv", "preload.csv", "loop.csv")
 LOOP = """wrap_angle_deg,stroke,input_force_N,output_force_N,preload_N

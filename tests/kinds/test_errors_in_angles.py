@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from cables import DESIGN, cable, measured
-from rows import of_rows
+from own_angle_tables import of_rows
 from scipy import optimize
 
 from bowdenfit.dataset import Dataset

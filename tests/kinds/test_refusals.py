@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from spoiling import copied, spoil
+from spoiled_input import copied, spoil
 
 from bowdenfit import cli
 from bowdenfit.dataset import read_dataset

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from cables import CONTACTS, DESIGN, cable, other_design
 from conftest import ROOT
-from reading_room import browser, opened
+from offline_browser import browser, opened
 from scipy import stats
-from spoiling import copied
+from spoiled_input import copied
 
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.description import Description, SamplerSettings

@@ -10,14 +10,14 @@ import jax
 import numpy as np
 import pytest
 from figure_words import check_words
-from laboratory import Laboratory
 from scipy import stats
+from simulated_coverage import Laboratory
 
 import bowdenfit as bf
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import Diagnostics
 from bowdenfit.inference.draws import shown_values
-from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.inference.predictive_checks import check_uniformity, draw_randomized_pit, predict_left_out
 from bowdenfit.inference.prior_sensitivity import (
     SENSITIVE,
@@ -483,7 +483,7 @@ class Checked:
         self.laboratory, self.programs = Laboratory(), {}
 
     def __call__(self, dataset, seed):
-        density = Density(build_model(dataset))
+        density = LogDensity(build_model(dataset))
         z = self.laboratory.draws(density, seed)
         z = z[: len(z) // ROWS * ROWS]
         # The priors of some cables, and how many of their readings are but bounds, depend on what was read.

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 from cables import cable, measured
-from reading_room import browser, opened
+from offline_browser import browser, opened
 from scipy import stats
 
 import bowdenfit as bf

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from figure_words import assert_answer_readable
-from one_page import faults as faults_of_page
+from terminal_pages import faults as faults_of_page
 
 import bowdenfit as bf
 from bowdenfit.description.device import read_device

@@ -5,9 +5,9 @@ import dataclasses
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
-from kept_data import assert_kept
+from shared_figures import DrawnOnce
+from stored_figure_data import assert_kept
 
 from bowdenfit.plots.curves import choose_evenly
 from bowdenfit.questions.bends.bending_loss_figure import BendingLoss, EfficiencyLine

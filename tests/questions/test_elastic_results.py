@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from figure_words import assert_readable
-from one_page import faults
 from scipy import stats
+from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit import predict

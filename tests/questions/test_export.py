@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from exported import HOSTILE, cable
+from exported_cables import HOSTILE, cable
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exported import HOSTILE, cable, motion
+from exported_cables import HOSTILE, cable, motion
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.c import build_fmu, c_header

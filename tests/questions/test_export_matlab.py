@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
+from exported_cables import CASES, CREEPING, HOSTILE, cable, crept, followed, motion, of_equations, points
 
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.matlab import function_name, matlab_function

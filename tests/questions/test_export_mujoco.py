@@ -9,9 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from exported import HOSTILE, cable, with_rope
+from exported_cables import HOSTILE, cable, with_rope
 
-from bowdenfit.device.plant import LoopTransmission as Loop
+from bowdenfit.device.plant import LoopTransmission
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.export.mujoco import mujoco_model
 
@@ -45,7 +45,7 @@ def loop_of(computed, place):
     exponent, lost, k = (
         np.interp(place, route_points, table) for table in (median.exponent[0], median.taut_loss, median.stiffness)
     )
-    return Loop(jnp.asarray(1000 * k), jnp.asarray(lost / (2 * exponent)), jnp.asarray(exponent))
+    return LoopTransmission(jnp.asarray(1000 * k), jnp.asarray(lost / (2 * exponent)), jnp.asarray(exponent))
 
 
 def by_node(loop, motor):

@@ -7,7 +7,18 @@ import types
 
 import numpy as np
 import pytest
-from exported import CASES, CREEPING, HOSTILE, cable, changing_speed, crept, followed, motion, of_equations, points
+from exported_cables import (
+    CASES,
+    CREEPING,
+    HOSTILE,
+    cable,
+    changing_speed,
+    crept,
+    followed,
+    motion,
+    of_equations,
+    points,
+)
 
 from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.python import python_module

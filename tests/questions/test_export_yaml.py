@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from exported import CASES, HOSTILE, cable
+from exported_cables import CASES, HOSTILE, cable
 
 from bowdenfit.questions.export.tables import LEVELS
 from bowdenfit.questions.export.yaml import yaml_lines, yaml_parameters

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from hand_bench import BENDS, pull
-from one_page import faults
+from terminal_pages import faults
 
 import bowdenfit as bf
 

@@ -13,16 +13,16 @@ import pytest
 from cables import DESIGN, cable, measured, other_design
 from elastic_cables import ELASTIC, elastic_cable
 from elastic_cables import TRUTH as ELASTIC_TRUTH
-from laboratory import Laboratory
-from one_page import faults
 from scipy import stats
+from simulated_coverage import Laboratory
+from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset
 from bowdenfit.errors import UsageError
 from bowdenfit.finished_fit import Fit
 from bowdenfit.inference.draws import curve_function, for_each_draw, value_function
-from bowdenfit.inference.log_density import LogDensity as Density
+from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.candidate import Candidate
 from bowdenfit.kinds.descriptions import make_design
 from bowdenfit.kinds.efficiencies.kind import EfficiencyTable
@@ -44,8 +44,7 @@ from bowdenfit.questions.next.variance_reduction import (
 from bowdenfit.questions.next.words import format_width, next_measurement_text
 from bowdenfit.questions.simulate.tables import empty_tables
 from bowdenfit.results.along_route import make_optimizer
-from bowdenfit.results.record import Draws
-from bowdenfit.results.record import Provenance as Origin
+from bowdenfit.results.record import Draws, Provenance
 
 pytestmark = pytest.mark.extended
 
@@ -73,7 +72,7 @@ def pretended(dataset: Dataset, center: np.ndarray | dict[str, float], spread: f
     best = for_each_draw(make_optimizer(model), model.space.size)(z) if model.description.route else ()
     optimum = {name: b[None] for name, b in zip(("optimal_length", "optimal_efficiency"), best, strict=False)}
     draws = Draws(z[None], {k: v[None] for k, v in shown.items()}, optimum, {}, {}, {}, {}, {}, 1, n, 0.3)
-    return Fit(dataset, None, draws, True, (), Origin(1, {}))  # type: ignore[arg-type]
+    return Fit(dataset, None, draws, True, (), Provenance(1, {}))  # type: ignore[arg-type]
 
 
 # How much a reading explains --------------------------------------------------------------------------------------
@@ -276,7 +275,7 @@ def test_a_run_like_those_recorded_so_far_has_the_noise_of_blocks(on_body):
     assert run.noise == "sigma_block"
     assert set(run.stroke) == {-1.0, 1.0}
     assert len(run.input_force) == 24 < run.n_effective.sum()
-    candidates = list_candidates(Fit(dataset, None, None, True, (), Origin(1, {})))  # type: ignore[arg-type]
+    candidates = list_candidates(Fit(dataset, None, None, True, (), Provenance(1, {})))  # type: ignore[arg-type]
     assert {c.kind for c in candidates} == {"angle", "force"}
     assert Candidate("force", 430.0) in candidates
 
@@ -559,7 +558,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
     """
     design = make_design(angles=(420.0, 470.0, 500.0, 540.0, 590.0), efficiencies=(440.0, 500.0, 560.0))
     dataset, _ = measured(cable(2, ("angles", "efficiencies")), 3, design=design)
-    laboratory, density = Laboratory(), Density(build_model(dataset))
+    laboratory, density = Laboratory(), LogDensity(build_model(dataset))
     z = laboratory.draws(density, 1)
     length = for_each_draw(make_optimizer(density.model), density.model.space.size)
     initial, generator = length(z)[0], np.random.default_rng(2)
@@ -573,7 +572,7 @@ def test_refits_with_the_readings_added_narrow_the_best_length_as_expected():
             add = _with_efficiency if candidate.kind == "efficiency" else _with_angles
             value = reading[draw, 0, 0] if candidate.kind == "efficiency" else reading[draw, 0]
             terms = build_model(add(dataset, candidate.route, value)).terms
-            extended = Density(Model(density.model.cable, density.model.space, terms))
+            extended = LogDensity(Model(density.model.cable, density.model.space, terms))
             left.append(np.var(length(laboratory.draws(extended, k))[0]) / np.var(initial))
         realized[candidate] = 1 - np.mean(left), np.std(left) / np.sqrt(10)
     for candidate, (share, error) in realized.items():

@@ -12,12 +12,12 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn_once import DrawnOnce
 from figure_words import assert_readable, check_words, words
 from fontTools.ttLib import TTFont
-from kept_data import assert_kept
 from matplotlib.collections import PolyCollection
 from matplotlib.contour import ContourSet
+from shared_figures import DrawnOnce
+from stored_figure_data import assert_kept
 
 from bowdenfit.inference.interval import Interval
 from bowdenfit.plots.curves import BAND_QUANTILES, NEW_RUN, Band, density

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cables import cable, measured
 from figure_words import assert_readable
-from one_page import faults
+from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit.errors import UsageError

@@ -5,9 +5,9 @@ import dataclasses
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn_once import DrawnOnce
 from figure_words import check_words, words
-from kept_data import assert_kept
+from shared_figures import DrawnOnce
+from stored_figure_data import assert_kept
 
 from bowdenfit.plots.panels import extremes
 from bowdenfit.questions.figures import FIGURES, write_figure_files

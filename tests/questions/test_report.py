@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from reading_room import browser, opened
+from offline_browser import browser, opened
 
 import bowdenfit as bf
 from bowdenfit.questions.report.page import report_page

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from one_page import faults
+from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit.inference.interval import Interval

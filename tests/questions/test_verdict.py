@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pytest
 from hand_bench import pull, write
-from one_page import faults
+from terminal_pages import faults
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset, load_dataset

@@ -10,7 +10,7 @@ import numpy as np
 import pandas
 import pytest
 import scipy.io
-from spoiling import replaced
+from spoiled_input import replaced
 
 from bowdenfit.dataset import load_dataset
 from bowdenfit.errors import DatasetError

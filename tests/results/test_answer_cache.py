@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sealed import edit_sealed
+from forged_fits import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.questions import figures

@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 from conftest import ROOT
-from sealed import edit_sealed
+from forged_fits import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.inference.checkpoint import checkpoint_header, read_fingerprint

@@ -4,7 +4,7 @@ import os
 import shutil
 
 import pytest
-from attempts import Attempts
+from limited_processes import Attempts
 from slow_cases import some_slow
 
 pytestmark = pytest.mark.extended

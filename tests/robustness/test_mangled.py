@@ -7,7 +7,6 @@ Usually some 1,000 cases; with the marker `slow` 100,000 others. `./scripts/test
 import resource
 
 import pytest
-from attempts import Attempts
 from fuzzing import (
     DATASETS,
     check_strange_data_set,
@@ -18,6 +17,7 @@ from fuzzing import (
     valid_files,
 )
 from fuzzing_folders import FOLDERS, read_mangled_folder
+from limited_processes import Attempts
 from recorded_files import WRITERS
 
 pytestmark = pytest.mark.extended

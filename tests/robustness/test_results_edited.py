@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from sealed import sealed
+from forged_fits import sealed
 
 import bowdenfit as bf
 from bowdenfit.arguments import read_quantity

@@ -7,9 +7,9 @@ import zipfile
 import h5py
 import numpy as np
 import pytest
-from forging import ask_forged_folder, reseal
+from forged_fits import edit_sealed
+from forged_folders import ask_forged_folder, reseal
 from fuzzing import try_cases
-from sealed import edit_sealed
 
 import bowdenfit as bf
 from bowdenfit.inputs import open_arrays

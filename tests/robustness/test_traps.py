@@ -53,7 +53,7 @@ def test_the_reader_of_binary_files_the_fit_of_the_app_and_the_workers_of_a_flee
 
 def small_fleet(folder):
     """Write two inspections."""
-    from half_turn import TABLE, describe_half_turn
+    from half_turn_bench import TABLE, describe_half_turn
 
     for cable in ("one", "two"):
         (folder / cable).mkdir(parents=True)

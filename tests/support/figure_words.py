@@ -10,7 +10,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Text
-from one_page import jargon
+from terminal_pages import jargon
 
 from bowdenfit.questions.figure_files import draw_answer_figure
 from bowdenfit.questions.figures import draw_with_title, figure_caption

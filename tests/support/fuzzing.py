@@ -14,9 +14,9 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
-from byte_mangling import mangled
-from mangling import DESCRIPTIONS, ODD_CELLS, ODD_VALUES, TABLES
-from mangling_more import BYTES, MORE_DESCRIPTIONS, MORE_TABLES, replace_file
+from mangled_bytes import mangled
+from mangled_inputs import DESCRIPTIONS, ODD_CELLS, ODD_VALUES, TABLES
+from odd_inputs import BYTES, MORE_DESCRIPTIONS, MORE_TABLES, replace_file
 from recorded_files import WRITERS, channels_of
 
 import bowdenfit as bf

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jax
 from fuzzing import ROOT, Outcome, Wrong, meet
-from mangling import DESCRIPTIONS, ODD_CELLS, TABLES
+from mangled_inputs import DESCRIPTIONS, ODD_CELLS, TABLES
 
 import bowdenfit as bf
 from bowdenfit.description.device import read_device

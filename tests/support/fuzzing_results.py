@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from byte_mangling import mangled
 from fuzzing import Outcome, meet
+from mangled_bytes import mangled
 
 import bowdenfit as bf
 from bowdenfit.dataset import Dataset

@@ -16,9 +16,9 @@ from zlib import crc32
 
 import h5py
 import numpy as np
+from forged_fits import sealed
 from fuzzing import SLOWEST, Outcome, Wrong, ended_in_time
 from fuzzing_results import ODD_ARRAYS, other_json
-from sealed import sealed
 
 from bowdenfit import cli
 from bowdenfit.results.answer_cache import file_checksum

@@ -4,14 +4,13 @@ from pathlib import Path
 
 import jax
 import numpy as np
-from laboratories import Laboratory
+from bench_simulator import Laboratory
 
 import bowdenfit as bf
 from bowdenfit.inference.draws import for_each_draw
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.models import Model, build_model
-from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
-from bowdenfit.questions.calibrate.replicator import replace_data
+from bowdenfit.questions.calibrate.replicator import BatchFitter, replace_data
 from bowdenfit.results.along_route import make_optimizer
 
 HELD = 0.9
@@ -45,7 +44,7 @@ def held(laboratory: Laboratory, sessions: int, scratch: Path) -> dict[str, int]
         data = [bf.read(folder, **options) for folder in folders]
         model = build_model(data[0])
         posteriors = [LogDensity(replace_data(model, item)) for item in data]
-        fits = Fits().fit_all(posteriors, list(range(sessions)))
+        fits = BatchFitter().fit_all(posteriors, list(range(sessions)))
         draws = [drawn(model, fit.z) for fit in fits if len(fit.z) and not fit.reasons]
     results = {}
     for name, true in laboratory.truth.items():

@@ -6,7 +6,7 @@ import re
 import shutil
 from pathlib import Path
 
-from mangling import ODD_CELLS, ODD_VALUES, Mangle
+from mangled_inputs import ODD_CELLS, ODD_VALUES, Mangle
 
 BYTES = "surrogateescape"  # how bytes that are no text stand in a text
 LETTERS = "αβγδ日本語é\u202e\u200b\ufeff"

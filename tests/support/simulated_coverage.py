@@ -19,8 +19,7 @@ from bowdenfit.inference.objective import make_objective
 from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.kind import Design
 from bowdenfit.models import build_model
-from bowdenfit.questions.calibrate.replicator import BatchFitter as Fits
-from bowdenfit.questions.calibrate.replicator import CalibrationPlan, Replicator
+from bowdenfit.questions.calibrate.replicator import BatchFitter, CalibrationPlan, Replicator
 from bowdenfit.questions.simulate.tables import empty_tables
 
 SAMPLER = SamplerSettings(n_ensembles=4, n_walkers=64, max_steps=1500, target_ess=500, target_r_hat=1.03)
@@ -38,7 +37,7 @@ class Laboratory:
 
     def __init__(self, disturb: Callable[[Dataset], Dataset] = lambda dataset: dataset, sampler=SAMPLER):
         self.disturb, self.sampler, self.programs = disturb, sampler, {}
-        self.fits, self.benches = Fits(BatchSettings(sampler, target_sd_error=np.inf)), {}
+        self.fits, self.benches = BatchFitter(BatchSettings(sampler, target_sd_error=np.inf)), {}
 
     def least_squares(self, dataset: Dataset) -> LeastSquares:
         """Classical estimates, as a fit without MCMC gives them."""

@@ -291,7 +291,7 @@ def _read_fits(value: Any, name: str) -> dict[str, Any]:
 
 
 def as_pair(quantity: Quantity | None) -> NumberWithUnit | None:
-    """Return a quantity that `checked` has read, which is no text any more, as type checkers cannot know."""
+    """Return a quantity that its `Reader` has read: no text any more, which type checkers cannot know."""
     assert not isinstance(quantity, str)
     return quantity
 

@@ -161,7 +161,7 @@ class LoopDrive:
         restart: PerTime | None = None,
         noise: PerTime | None = None,
     ) -> tuple[PerTime, PerTime]:
-        """Return the output force and its derivative by the friction exponent [N]; arguments as of `Rope.follow`."""
+        """Return the output force and its derivative by the friction exponent [N]; arguments as of `RopeDrive.follow`."""
         exponent = self.band(mounting)
 
         def limits(exponent: PerRecording) -> tuple[PerTime, PerTime]:

@@ -64,7 +64,7 @@ class SamplingRequest:
         checkpoint: File to which every stored state is written; see `bowdenfit.inference.checkpoint`.
         resume: Whether to continue from the states in `checkpoint`.
         report: Called after every block of steps.
-        diagnose: Computes diagnostics of all quantities: `diagnose_all`, or a function that has another process do it.
+        diagnose: Function that computes the diagnostics of all quantities by name; `diagnose_all` if omitted.
     """
 
     posterior: LogDensity

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -185,7 +185,7 @@ class Trajectories:
     """
 
     warm_up: int
-    total: int = field(metadata={"key": "drawn"})
+    total: int
     diverged: int
     fine: int
     fine_diverged: int

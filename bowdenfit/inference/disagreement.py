@@ -16,7 +16,7 @@ References:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,8 +52,8 @@ class Disagreement:
     sds: float
     conflict: float
     parameter: str
-    others: float = field(metadata={"key": "rest"})
-    others_sd: float = field(metadata={"key": "rest_sd"})
+    others: float
+    others_sd: float
     together: float
 
 

@@ -11,7 +11,7 @@ References:
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -49,7 +49,7 @@ class ParameterContraction:
     value: float
     sd: float
     prior_sd: float
-    most_correlated: str = field(metadata={"key": "most_alike"})
+    most_correlated: str
     correlation: float
     inflation: float
 

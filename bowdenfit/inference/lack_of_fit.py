@@ -13,7 +13,7 @@ References:
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import jax
@@ -71,7 +71,7 @@ class Departure:
     group: str
     against: str
     inside: bool
-    p_value: float = field(metadata={"key": "chance"})
+    p_value: float
     size: float
     low: float
     high: float
@@ -99,7 +99,7 @@ class FarReading:
 
     table: str
     label: str
-    p_value: float = field(metadata={"key": "chance"})
+    p_value: float
     sds: float
 
 

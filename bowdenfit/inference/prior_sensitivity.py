@@ -21,7 +21,7 @@ import numpy as np
 from bowdenfit.inference.diagnostics import array_stats
 from bowdenfit.inference.psis import RELIABLE_K, power_weights, smooth_weights
 
-if TYPE_CHECKING:  # another process works this out, without JAX
+if TYPE_CHECKING:
     from bowdenfit.parameters.priors import Prior
     from bowdenfit.parameters.space import Parameter
 

@@ -15,7 +15,7 @@ What else `Kind` has is optional; its plain default adds nothing and refuses not
 that has them derives from their class too:
 
 - `FrictionKind`: its readings show friction, at some lengths, wrap angles, forces and speeds, and of some groups
-  (`FrictionTableKind` in `kinds/friction_table.py` is one whose rows carry their own lengths and wrap angles);
+  (`FrictionTableKind` is one whose rows carry their own lengths and wrap angles);
 - `RopeKind`: its readings show the rope itself, at some bends and under some tensions;
 - `PlannedKind`: `bowdenfit simulate` can make such a table from the [design] of a plan.
 

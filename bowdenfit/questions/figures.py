@@ -1,8 +1,7 @@
 """All the figures of a fit, in the order in which they are read: each is a file, and a line here.
 
 A figure file has `HEADING`, `data`, what the figure shows of a fit as plain arrays, None where that has nothing of it, and of
-such data `draw`, the figure, as wide as it is told, and `caption`, what is drawn, in plain words. Data load no matplotlib and
-drawing loads no JAX, so that another process can draw while this one goes on.
+such data `draw`, the figure, as wide as it is told, and `caption`, what is drawn, in plain words. Data load no matplotlib.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -75,14 +74,13 @@ _FILES = (  # first what was measured beside the model, then what follows, then 
     autocorrelation_figure,
 )
 FIGURES = {file.__name__.rpartition(".")[2].removesuffix("_figure"): file for file in _FILES}
-AT_ONCE = ("coefficients", "pairs", "traces")  # whose data are there, so that drawing begins at once
 NARROWEST, WIDEST = 3.0, 20.0  # in, of a figure; a judgement
 HIGHEST = 40.0  # in, of a figure; a judgement
 
 
 def collect_figure_data(fit: "Record", names: Collection[str] = ()) -> Iterator[tuple[str, Any]]:
     """Yield name and data of each figure that a fit has something to show in, or of some of them."""
-    import jax  # here alone, because drawing loads no JAX
+    import jax  # here alone, because figures are drawn again from stored data without it
 
     for name in names or FIGURES:
         with jax.enable_x64(True):

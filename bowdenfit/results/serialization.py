@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -19,8 +19,7 @@ def plain_data(answer: Any) -> Any:
     """Return an answer as plain data for JSON; numbers that are not finite become None.
 
     A dataclass gives its fields, or what its `JSON` lists: names of attributes and methods, where `...` stands for all fields,
-    ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None. A field with
-    `metadata={"key": ...}` stands under that key.
+    ("key", "name") for an attribute under another key, and "name?" for one that is left out where it is None.
 
     Args:
         answer: Dataclasses, dictionaries, sequences, arrays and numbers, one in the other.
@@ -61,7 +60,7 @@ def _attributes(data: Any, listed: Iterable[Any]) -> Iterator[tuple[str, Any]]:
     """Yield keys and values of a dataclass."""
     for entry in listed:
         if entry is ...:
-            yield from ((stored_key(f), getattr(data, f.name)) for f in fields(data))
+            yield from ((f.name, getattr(data, f.name)) for f in fields(data))
             continue
         key, name = entry if isinstance(entry, tuple) else (entry.removesuffix("?"), entry)
         value = getattr(data, name.removesuffix("?"))
@@ -101,10 +100,9 @@ def deserialize(kind: Any, value: Any) -> Any:
         if not isinstance(value, dict):
             raise TypeError(f"{_shorten(value)} is no {kind.__name__}")
         hints = get_type_hints(kind)
-        named = [(f, stored_key(f)) for f in fields(kind)]
         required = [f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
-        present = [(f.name, key) for f, key in named if key in value or f.name in required]  # others are newer than the data
-        return kind(**{name: deserialize(hints[name], value[key]) for name, key in present})
+        present = [f.name for f in fields(kind) if f.name in value or f.name in required]  # others are newer than the data
+        return kind(**{name: deserialize(hints[name], value[name]) for name in present})
     if np.ndarray in (kind, origin, getattr(kind, "array_type", None)):
         return _array(kind, value)
     if kind in (str, int, bool) and type(value) is not kind:
@@ -113,13 +111,8 @@ def deserialize(kind: Any, value: Any) -> Any:
 
 
 def values_by_key(data: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass under their stored keys."""
+    """Return the fields of a dataclass by name."""
     return dict(_attributes(data, (...,)))
-
-
-def stored_key(field: Field[Any]) -> str:
-    """Return the key under which a field is stored: its name, or the "key" of its metadata."""
-    return str(field.metadata.get("key", field.name))
 
 
 def _array(kind: Any, value: list[Any]) -> np.ndarray:

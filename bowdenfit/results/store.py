@@ -36,7 +36,7 @@ from bowdenfit.results.serialization import deserialize, serialize, write_arrays
 if TYPE_CHECKING:
     from xarray import DataTree
 
-SCHEMA = 6  # counted up with every change of what files mean
+SCHEMA = 7  # counted up with every change of what files mean
 LOG_POSTERIOR, WALKER = "lp", "walker"
 _SAMPLERS = "emcee", "nuts"
 _WITHOUT_CHAINS = ("prior", "observed_data")  # groups of posterior.nc without chains

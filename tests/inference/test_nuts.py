@@ -223,7 +223,7 @@ def test_statistics_of_trajectories_are_stored_under_arviz_s_names(saved, tmp_pa
     assert np.all(energy > -lp - 1e-9)  # the rest is kinetic
     page = json.loads((tmp_path / "copy" / "summary.json").read_text())["sampler"]
     assert page["method"] == "nuts"
-    assert page["drawn"] == 8 * fit.posterior.steps
+    assert page["total"] == 8 * fit.posterior.steps
 
 
 def test_the_summary_says_how_trajectories_went(saved):

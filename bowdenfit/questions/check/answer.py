@@ -35,7 +35,7 @@ from bowdenfit.kinds.term import Term
 from bowdenfit.questions.check.table_checks import FALSE_ALARM, CheckedReading, TableChecks
 from bowdenfit.results.record import Record, cached_per_fit
 
-_COLUMNS = {"p_value": "chance", "influential": "decisive"}  # names of columns that differ from those of attributes
+_COLUMNS = {"influential": "decisive"}  # names of columns that differ from those of attributes
 _FEW_SPARE = 4  # readings beyond the number of coefficients, up to which noise counts as weakly identified; a judgement
 _DRAWS = 5000  # draws for the sensitivity to the priors: more are slower, and more precise
 _MIN_READINGS = 8  # readings of a table from which on the uniformity of their PIT is tested; fewer have no power

@@ -53,7 +53,7 @@ class CheckedReading(Part):
 
     JSON: ClassVar = (
         "table", "label", "unit", "at_most?", "measured?", "expected", "sd", "q05", "q95", "z", "probability",
-        ("chance", "p_value"), "pareto_k", "inside", "outlier", ("decisive", "influential"),
+        "p_value", "pareto_k", "inside", "outlier", ("decisive", "influential"),
     )  # fmt: skip
 
     @property

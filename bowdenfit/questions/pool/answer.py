@@ -77,7 +77,7 @@ class PooledCable(Part):
     n_from_readings: int
 
     JSON: ClassVar = (
-        "cable", "inspections", "last", "coefficients", ("alone", "unpooled"), "wear", "life", ("chance", "p_value"),
+        "cable", "inspections", "last", "coefficients", ("alone", "unpooled"), "wear", "life", "p_value",
         ("unlike", "departure"), "pooled", ("worth", "n_effective"), ("measured", "n_from_readings"),
     )  # fmt: skip
 

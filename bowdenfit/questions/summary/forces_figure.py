@@ -98,7 +98,7 @@ class ForcesData:
         count: How many readings there are, where not all are shown; else 0.
     """
 
-    places: tuple[ForcesAtBend, ...] = field(metadata={"key": "places"})
+    places: tuple[ForcesAtBend, ...]
     spread_load: np.ndarray
     spread: np.ndarray
     model: str

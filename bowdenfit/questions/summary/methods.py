@@ -177,7 +177,7 @@ def sampler_sentences(page: dict[str, Any]) -> list[str]:
 
 def _trajectories(sampler: dict[str, Any]) -> str:
     """Describe how the trajectories of NUTS went."""
-    diverged = f"{sampler['diverged']} of {sampler['drawn']} trajectories diverged" if sampler["diverged"] else ""
+    diverged = f"{sampler['diverged']} of {sampler['total']} trajectories diverged" if sampler["diverged"] else ""
     if sampler["diverged"] and not sampler["fine_diverged"]:
         diverged += f", none of the {sampler['fine']} of fine steps that reach where the others break off"
     mixing = sampler["energy_mixing"]

@@ -157,7 +157,7 @@ class Bench:
     other: Path | None
     only: Collection[str]
 
-    def asked(self, name: str) -> bool:
+    def is_requested(self, name: str) -> bool:
         """Whether a row or a group of them is to be measured."""
         return not self.only or name in self.only
 
@@ -182,12 +182,12 @@ class Bench:
             say("a fit to read")
             self.command(tree, ["fit", DATASET, "--seed", "1"], "unmeasured", self.finished(tree))
         for name, arguments in FITS.items():
-            if self.asked(name):
+            if self.is_requested(name):
                 yield self.row(name, ["fit", *arguments, "--seed", "SEED"], cold=True)
-        if self.asked(FILLED):
+        if self.is_requested(FILLED):
             yield self.row(FILLED, ["fit", DATASET, "--seed", "SEED"], writes=True)
         for name, arguments in READS.items():
-            if self.asked(name):
+            if self.is_requested(name):
                 yield self.row(name, arguments)
 
     def library(self) -> Row:
@@ -354,17 +354,17 @@ def main() -> None:
 def measurements(bench: Bench) -> tuple[list[Row], list[str]]:
     """All rows that are asked for, and what is to be said besides."""
     rows, remarks = list(bench.rows()), list[str]()
-    if bench.asked("plain"):
+    if bench.is_requested("plain"):
         computed = samplers(bench.folder, bench.repeats)
         rows += beside_plain(computed, [row for row in rows if row.name in {"fit", FILLED}])
         remarks += disagreements(computed)
-    if bench.asked("library"):
+    if bench.is_requested("library"):
         rows.append(bench.library())
-    if bench.asked("many"):
+    if bench.is_requested("many"):
         row, printed = bench.cables()
         rows += [bench.calibrations(), row]
         remarks.append(f"```text\n{printed}```")
-    return rows, [*remarks, *(counts() if bench.asked("counts") else ())]
+    return rows, [*remarks, *(counts() if bench.is_requested("counts") else ())]
 
 
 if __name__ == "__main__":

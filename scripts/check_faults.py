@@ -23,14 +23,14 @@ class Fault:
     """One line of the package that is wrong.
 
     Args:
-        what: In words.
-        file: Where, below `bowdenfit`.
-        right: The text that is replaced; it stands there once.
-        wrong: By what.
-        tests: Default tests that are there for it.
+        description: The fault in words.
+        file: Path of the file below `bowdenfit`.
+        right: Text that is replaced; the file has it once.
+        wrong: Text that replaces it.
+        tests: Test files that should notice it.
     """
 
-    what: str
+    description: str
     file: str
     right: str
     wrong: str
@@ -61,7 +61,7 @@ FAULTS = (
     ),
     Fault(
         "sampler: proposals are accepted without the factor of their move",
-        "inference/sweep.py",
+        "inference/walkers.py",
         "better = factors + proposed.value_in_w",
         "better = 0.0 * factors + proposed.value_in_w",
         ("tests/inference/test_proposals.py", "tests/inference/test_posterior.py"),
@@ -75,7 +75,7 @@ FAULTS = (
     ),
     Fault(
         "prediction: the length that is best most often is ranked by the worst efficiency",
-        "results/choices.py",
+        "results/optimal_length.py",
         "best = efficiency.max(axis=1, keepdims=True)",
         "best = efficiency.min(axis=1, keepdims=True)",
         ("tests/questions/test_predictions.py",),
@@ -83,13 +83,25 @@ FAULTS = (
 )
 
 
+def replace_line(fault: Fault, tree: Path) -> str:
+    """Return the text of a file of a tree with the fault in it."""
+    text = (tree / "bowdenfit" / fault.file).read_text(encoding="utf-8")
+    if text.count(fault.right) != 1:
+        raise ValueError(f"{fault.file} has not one place of {fault.right!r}; bring scripts/check_faults.py up to date.")
+    return text.replace(fault.right, fault.wrong)
+
+
+def copy_tree(target: Path) -> Path:
+    """Copy what the tests need of this checkout into a new folder."""
+    ignored = shutil.ignore_patterns(".git", ".venv*", "__pycache__", ".*_cache", "build", "dist")
+    return Path(shutil.copytree(ROOT, target, ignore=ignored))
+
+
 def noticed_by(fault: Fault, copy: Path) -> str:
     """Return the first default test that fails with a fault in a copy of the tree; empty if all pass."""
     path = copy / "bowdenfit" / fault.file
     text = path.read_text(encoding="utf-8")
-    if text.count(fault.right) != 1:
-        sys.exit(f"{fault.file} has not one place of {fault.right!r}; bring scripts/check_faults.py up to date.")
-    path.write_text(text.replace(fault.right, fault.wrong), encoding="utf-8")
+    path.write_text(replace_line(fault, copy), encoding="utf-8")
     try:
         done = subprocess.run(
             [sys.executable, "-m", "pytest", "-x", "-q", "-n0", *fault.tests],
@@ -105,12 +117,11 @@ def main() -> None:
     """Try all faults."""
     unnoticed = 0
     with tempfile.TemporaryDirectory() as place:
-        copy = Path(place) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache"))
+        copy = copy_tree(Path(place) / "copy")
         for fault in FAULTS:
             test = noticed_by(fault, copy)
             unnoticed += not test
-            print(f"{fault.what}: {test or 'UNNOTICED'}", flush=True)
+            print(f"{fault.description}: {test or 'UNNOTICED'}", flush=True)
     sys.exit(unnoticed > 0)
 
 

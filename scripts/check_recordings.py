@@ -28,7 +28,7 @@ from scipy.stats import binom
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
-from recorded_benches import WRAP, RecordedBench, drawn, write  # noqa: E402
+from recorded_benches import WRAP, RecordedBench, draw_bench, write  # noqa: E402
 
 import bowdenfit as bf  # noqa: E402
 
@@ -95,7 +95,7 @@ def main() -> None:
     options = parser.parse_args()
     ends, far = Counter[str](), 0
     for seed in range(options.first, options.first + options.benches):
-        bench = drawn(seed)
+        bench = draw_bench(seed)
         with tempfile.TemporaryDirectory() as scratch:
             end, sds, message = ending(bench, Path(scratch) / "bench", seed, options.sampled)
         ends[end] += 1

@@ -69,15 +69,15 @@ def warmed_up(key: jax.Array, x: jax.Array):
 
 @jax.jit
 @jax.vmap
-def drawn(key: jax.Array, state, step_size: jax.Array, inverse_mass_matrix: jax.Array):
+def draw_chain(key: jax.Array, state, step_size: jax.Array, inverse_mass_matrix: jax.Array):
     """The next draws of one chain."""
     step = blackjax.nuts(log_density, step_size, inverse_mass_matrix).step
 
-    def one(state, key: jax.Array):
+    def advance(state, key: jax.Array):
         state, _ = step(key, state)
         return state, state.position
 
-    state, positions = jax.lax.scan(one, state, jax.random.split(key, N_DRAWS))
+    state, positions = jax.lax.scan(advance, state, jax.random.split(key, N_DRAWS))
     return state, jax.vmap(values)(positions)
 
 
@@ -89,7 +89,7 @@ def run(seed: int) -> np.ndarray:
     blocks: list[np.ndarray] = []
     while not blocks or onbody.smallest_ess(np.concatenate(blocks, axis=1)) < onbody.TARGET:
         key = jax.random.fold_in(key, len(blocks))
-        state, draws = drawn(jax.random.split(key, N_CHAINS), state, *tuned)
+        state, draws = draw_chain(jax.random.split(key, N_CHAINS), state, *tuned)
         blocks.append(np.asarray(draws))
     return np.concatenate(blocks, axis=1)
 

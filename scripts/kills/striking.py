@@ -19,7 +19,7 @@ LITTLE = 850e6  # bytes, with which a fit has too little
 AT_ONCE = 0.05  # s behind the beginning of a phase
 
 
-def drawn(chance: random.Random, job: Job, number: int, reference: Known) -> Blow:
+def next_blow(chance: random.Random, job: Job, number: int, reference: Known) -> Blow:
     """The next blow at a job."""
     sent, phase = SIGNALS[number % len(SIGNALS)], chance.choice(job.phases)
     value = chance.uniform(0, AT_ONCE) if chance.random() < 0.25 else chance.random() * reference.seconds[phase]
@@ -69,7 +69,7 @@ def blows(chance: random.Random, jobs: tuple[Job, ...], place: Path) -> Iterator
     reference = {job.name: run_whole(job, place / job.name) for job in jobs}
     for number in count():
         job = jobs[number % len(jobs)]
-        blow = drawn(chance, job, number // len(jobs), reference[job.name])
+        blow = next_blow(chance, job, number // len(jobs), reference[job.name])
         strike(blow, reference[job.name], place / f"{number}")
         shutil.rmtree(place / f"{number}", ignore_errors=True)
         yield blow

@@ -90,11 +90,11 @@ def test_the_node_never_gains_energy(node, motor, joint, preload, exponent):
 def released(plant, start, seconds, step):
     """Motion and energy of a plant that is let go, at every step."""
 
-    def one(motion, _):
+    def make_step(motion, _):
         motion = advance(plant, motion, jnp.zeros(()), jnp.zeros(()), step)
         return motion, (motion, mechanical_energy(plant, motion))
 
-    return jax.lax.scan(one, settle_node(plant, start), None, length=round(seconds / step))[1]
+    return jax.lax.scan(make_step, settle_node(plant, start), None, length=round(seconds / step))[1]
 
 
 @settings(max_examples=20, deadline=None)
@@ -112,12 +112,12 @@ def test_a_device_that_is_let_go_never_gains_energy(motor, joint, motor_speed, j
 def test_a_mass_on_a_spring_with_dry_friction_loses_twice_f_over_k_a_half_swing():
     stiffness, mass, friction, step = 20.0, 1e-3, 0.05, 1e-5
 
-    def one(state, _):
+    def make_step(state, _):
         position, speed = state
         speed = apply_dry_friction(speed - step * stiffness * position / mass, jnp.asarray(step * friction / mass))
         return (position + step * speed, speed), (position + step * speed, speed)
 
-    points, speed = jax.lax.scan(one, (jnp.asarray(0.1), jnp.asarray(0.0)), None, length=60_000)[1]
+    points, speed = jax.lax.scan(make_step, (jnp.asarray(0.1), jnp.asarray(0.0)), None, length=60_000)[1]
     turns = np.flatnonzero(np.asarray(speed[:-1]) * np.asarray(speed[1:]) < 0)
     peaks = np.concatenate([[0.1], np.abs(np.asarray(points)[turns])])
     np.testing.assert_allclose(-np.diff(peaks)[:15], 2 * friction / stiffness, rtol=1e-3)

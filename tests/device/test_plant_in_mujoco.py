@@ -54,20 +54,20 @@ def in_mujoco(friction):
     return np.array(seen)
 
 
-def here():
+def integrate():
     loop = LoopTransmission(jnp.asarray(STIFFNESS), jnp.asarray(0.7), jnp.asarray(T_F / 1.4))
     plant = Plant(loop, *(jnp.asarray(v) for v in (J_M, B_M, F_M, J_J, B_J, B_C)))
 
-    def one(motion, torque):
+    def make_step(motion, torque):
         seen = jnp.stack([motion.motor, motion.joint, rope_torques(plant, motion)[1]])
         hand = -HAND[0] * motion.joint - HAND[1] * motion.joint_speed
         return advance(plant, motion, torque, hand, STEP), seen
 
-    return np.asarray(jax.lax.scan(one, settle_node(plant, Motion.at_rest(jnp.zeros(()))), jnp.asarray(TORQUE))[1])
+    return np.asarray(jax.lax.scan(make_step, settle_node(plant, Motion.at_rest(jnp.zeros(()))), jnp.asarray(TORQUE))[1])
 
 
 def test_the_plant_moves_as_mujoco_says_and_otherwise_with_other_friction():
-    expected, computed = in_mujoco(T_F), here()
+    expected, computed = in_mujoco(T_F), integrate()
     assert np.max(np.abs(computed[:, 2])) < 0.7 * (2 - T_F / 0.7), "taut, so that friction is a constant torque"
     size = np.ptp(expected, axis=0)
     assert np.all(size > [0.05, 0.02, 2 * T_F])

@@ -218,11 +218,11 @@ def test_undetected_angles_have_the_probability_of_lying_below_the_limit(on_body
     model = on_body_model
     term = model.terms[0]
 
-    def at(z, data):
+    def evaluate(z, data):
         values = model.space.constrain(z)
         return term.expected(values, data), term.log_likelihood(values, data), values["sigma_theta"]
 
-    expected, computed, sigma = over_rows(at, draws(model, 50, 1), term.data)
+    expected, computed, sigma = over_rows(evaluate, draws(model, 50, 1), term.data)
     n, theta, sigma = len(term.data["angle"]), np.deg2rad(expected), sigma[:, None]
     np.testing.assert_allclose(
         computed[:, n:], stats.norm.logcdf((np.deg2rad(10.0) - theta[:, n:]) / sigma), rtol=1e-9, atol=1e-15

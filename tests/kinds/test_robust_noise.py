@@ -167,12 +167,12 @@ def _of(model: Model, z: np.ndarray):
     """Log likelihoods, residuals and expected readings of every table, and the values, at many z."""
     posterior = LogDensity(model)
 
-    def at(z, data):
+    def evaluate(z, data):
         values = model.space.constrain(z)
         expected = {t.name: t.expected(values, d) for t, d in zip(model.terms, data, strict=True)}
         return posterior.log_likelihoods(z, data), posterior.residuals(z, data), expected, values
 
-    program = compile_program(jax.vmap(at, in_axes=(0, None)), z, posterior.data, run_once=True)
+    program = compile_program(jax.vmap(evaluate, in_axes=(0, None)), z, posterior.data, run_once=True)
     return jax.tree.map(np.asarray, program(z, posterior.data))
 
 
@@ -225,7 +225,7 @@ def _standardized(model: Model, name: str, draws: int) -> np.ndarray:
     """Readings of a table drawn many times, in units of their scale about what is expected of them."""
     term = next(t for t in model.terms if t.name == name)
 
-    def at(keys, data):
+    def evaluate(keys, data):
         values = model.space.constrain(jnp.zeros(model.space.size))
         scale = values[term.noise]
         if name in ("efficiency", "loop_output_force"):
@@ -235,7 +235,7 @@ def _standardized(model: Model, name: str, draws: int) -> np.ndarray:
         return jax.vmap(lambda key: term.simulate(values, data, key))(keys), term.expected(values, data), scale
 
     keys = jax.random.split(jax.random.key(5), draws)
-    sample, expected, scale = compile_program(at, keys, term.data, run_once=True)(keys, term.data)
+    sample, expected, scale = compile_program(evaluate, keys, term.data, run_once=True)(keys, term.data)
     if term.unit == "1":
         return np.asarray((jnp.log(expected) - jnp.log(sample)) / scale).ravel()
     if term.unit == "deg":

@@ -214,18 +214,18 @@ def test_a_prior_that_too_few_readings_leave_to_set_widths_is_told_first():
 
 
 def test_few_readings_that_leave_widths_to_a_prior_are_told_where_widths_follow_it():
-    def said(doubled, told_by):
+    def checks_text(doubled, told_by):
         widths = (WidthSensitivity("tau", doubled, 0.95, 0.1, 0.1),)
         return describe_assumed_widths(
             Checks((), (Sensitivity("mu", "mu", 0.01, 0.1, 0.1, 0.03, 0.1, 0.0, widths),), (), told_by),
             {"tau": "scatter between mountings"},
         )
 
-    assert said(1.5, {"tau": (2, 1)}) == (
+    assert checks_text(1.5, {"tau": (2, 1)}) == (
         "Interval widths depend on the prior of tau (scatter between mountings), with only 2 readings for 1 coefficient: add "
         "readings."
     )
-    assert said(1.1, {"tau": (2, 1)}) == said(1.5, {}) == ""
+    assert checks_text(1.1, {"tau": (2, 1)}) == checks_text(1.5, {}) == ""
 
 
 def test_a_width_of_which_the_draws_cannot_tell_is_no_number_and_no_all_clear():
@@ -264,7 +264,7 @@ def fit(quick_fit):
     return quick_fit
 
 
-def said(fit):
+def checks_text(fit):
     """What the summary says of the checks, in one line."""
     return " ".join(describe_checks(fit.checks).split())
 
@@ -289,7 +289,7 @@ def test_the_on_body_fit_has_no_outlier_and_says_so_of_550_mm(fit):
     assert at_550["measured"] == pytest.approx(0.678)
     assert at_550["q05"] < at_550["measured"] < at_550["q95"]
     assert at_550["q95"] - at_550["q05"] > 0.04  # wider than the 3 points of a prediction that has seen it
-    text = said(fit)
+    text = checks_text(fit)
     assert "No reading is an outlier." in text
     assert re.search(r"Outside the range of the curves: efficiency at 550 mm: measured 67.8 %, expected 6[6-9]\.", text)
     assert len(describe_checks(fit.checks)) <= 12 * 100  # a quarter of it says what priors do to widths
@@ -408,7 +408,7 @@ def forces(tmp_path_factory):
 @pytest.mark.parametrize(("prior", "conflict"), [("value=0.15, sd=0.01", True), ("value=0.12, sd=0.01", False)])
 def test_a_prior_that_is_wrong_and_narrow_is_reported_as_a_conflict(forces, prior, conflict):
     fit = bf.fit(forces, wrap_angle=(180.0, "deg"), seed=2, settings=(*QUICK, f"friction.mu.measured={{{prior}}}"))
-    text = said(fit)
+    text = checks_text(fit)
     assert ("Prior and readings disagree about mu" in text) == conflict
     assert ("Check the prior, its unit first." in text) == conflict
     (sensitivity,) = fit.checks.sensitivities

@@ -192,7 +192,7 @@ ONCE = DrawnOnce(CASES)
 forget = ONCE.forgotten()
 
 
-def drawn(name, case="four angles"):
+def draw_figure(name, case="four angles"):
     return ONCE.figure(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
@@ -220,13 +220,13 @@ def spans(axes, label):
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
     for name in NAMES:
-        check_words(drawn(name, case), name)
+        check_words(draw_figure(name, case), name)
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", CASES)
 def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
-    figure = drawn(name, case)
+    figure = draw_figure(name, case)
     for axes in figure.axes:
         place = axes.get_position()
         below = [a for a in figure.axes if abs(a.get_position().x0 - place.x0) < 0.01]
@@ -238,7 +238,7 @@ def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", CASES)
 def test_no_legend_covers_a_panel_or_a_title(name, case):
-    figure = drawn(name, case)
+    figure = draw_figure(name, case)
     figure.draw_without_rendering()
     legends = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
     for legend in (*figure.legends, *legends):
@@ -265,12 +265,12 @@ def test_no_legend_covers_a_panel_or_a_title(name, case):
     ],
 )  # fmt: skip
 def test_names_and_units_are_the_words_of_the_field(name, shown):
-    assert shown <= {text for text, _ in words(drawn(name))}
+    assert shown <= {text for text, _ in words(draw_figure(name))}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_without_draws_there_are_lines_and_neither_intervals_nor_medians(name):
-    figure = drawn(name, "no draws")
+    figure = draw_figure(name, "no draws")
     assert not any(bands(axes) for axes in figure.axes)
     assert not [text for text in labels_of(figure) if "interval" in text or "edian" in text or "probability" in text]
     assert name == "bending_loss" or any("least squares" in text.lower() for text in labels_of(figure))
@@ -279,7 +279,7 @@ def test_without_draws_there_are_lines_and_neither_intervals_nor_medians(name):
 def test_stretch_shows_both_branches_and_fills_what_was_read_while_loading():
     data = glove((90.0,))
     (curve,) = data["stretch"]
-    axes, _ = drawn("stretch", data).axes
+    axes, _ = draw_figure("stretch", data).axes
     up, down = (a for a in axes.get_lines() if len(a.get_xdata()) == len(LOADS))
     np.testing.assert_array_equal(up.get_ydata(), curve.loading[1])
     np.testing.assert_array_equal(down.get_ydata(), curve.unloading[1])
@@ -294,7 +294,7 @@ def test_stretch_shows_both_branches_and_fills_what_was_read_while_loading():
 
 def test_negative_stretch_is_shown_below_a_line_at_zero():
     data = glove()
-    axes, _ = drawn("stretch", data).axes
+    axes, _ = draw_figure("stretch", data).axes
     lowest = min(c.points_stretch.min() for c in data["stretch"])
     assert axes.get_ylim()[0] < lowest < 0
     assert [a for a in axes.get_lines() if list(a.get_xdata()) == [0, 1] and set(a.get_ydata()) == {0.0}]
@@ -302,10 +302,10 @@ def test_negative_stretch_is_shown_below_a_line_at_zero():
 
 def test_wrap_angles_differ_in_color_and_marker_and_are_sorted():
     data = glove((270.0, 0.0, 90.0))
-    figure = drawn("stretch", data)
+    figure = draw_figure("stretch", data)
     assert [text for text in labels_of(figure) if "deg" in text] == ["0 deg", "90 deg", "270 deg"]
     for case, count in (("eight angles", 8), ("twelve angles", 8)):
-        axes, _ = drawn("stretch", case).axes
+        axes, _ = draw_figure("stretch", case).axes
         named = [a for a in axes.get_lines() if "deg" in a.get_label()]
         assert len({a.get_marker() for a in named}) == len({a.get_color() for a in named}) == count
         luminance = [float(np.array(a.get_color()[:3]) @ (0.299, 0.587, 0.114)) for a in named]
@@ -315,18 +315,18 @@ def test_wrap_angles_differ_in_color_and_marker_and_are_sorted():
 def test_of_many_wrap_angles_an_even_choice_is_shown_and_this_is_said():
     assert choose_evenly(range(12), 6) == [0, 2, 4, 7, 9, 11]
     assert choose_evenly(range(3), 6) == [0, 1, 2]
-    assert "8 of 12 shown" in labels_of(drawn("stretch", "twelve angles"))
-    loops = drawn("loops", "twelve angles")
+    assert "8 of 12 shown" in labels_of(draw_figure("stretch", "twelve angles"))
+    loops = draw_figure("loops", "twelve angles")
     assert len(loops.axes[::2]) == 6 and loops.axes[-2].get_title() == "990 deg"
     assert "6 of 12 wrap angles shown" in labels_of(loops)
-    assert not any("shown" in text for name in ("stretch", "loops") for text in labels_of(drawn(name)))
+    assert not any("shown" in text for name in ("stretch", "loops") for text in labels_of(draw_figure(name)))
 
 
 @pytest.mark.parametrize("name", ["stretch", "preload", "loops"])
 def test_residuals_below_are_readings_less_the_line(name):
     data = glove((90.0,))
     (shown,) = data[name] if isinstance(data[name], tuple) else (data[name],)
-    main, strip = drawn(name, data).axes[:2]
+    main, strip = draw_figure(name, data).axes[:2]
     read, line = {
         "stretch": lambda: (shown.points_stretch[~shown.points_unloading], (shown.load, shown.loading)),
         "preload": lambda: (shown.points_preload, (shown.wrap_angle, shown.preload)),
@@ -339,14 +339,14 @@ def test_residuals_below_are_readings_less_the_line(name):
 
 
 def test_a_rope_that_was_only_loaded_has_one_branch():
-    labels = labels_of(drawn("stretch", "no unloading"))
+    labels = labels_of(draw_figure("stretch", "no unloading"))
     assert "Median" in labels and not any("unloading" in text for text in labels)
 
 
 def test_slack_is_shaded_by_its_probability_in_both_panels():
     data = glove()
     curve = data["preload"]
-    for axes in drawn("preload", data).axes:
+    for axes in draw_figure("preload", data).axes:
         ((light, dark),) = spans(axes, "Slack with 5 % to 50 % probability")
         ((start, stop),) = spans(axes, "Slack with more than 50 % probability")
         assert light < dark == pytest.approx(start, abs=0.2) and stop == curve.wrap_angle[-1]
@@ -365,7 +365,7 @@ def test_stretches_of_true_values_are_found_to_the_last_place():
 )
 def test_slack_has_a_panel_only_where_there_is_some(case, panels):
     data = CASES[case]()
-    figure = drawn("preload", data)
+    figure = draw_figure("preload", data)
     assert len(figure.axes) == panels + 1  # and a strip of residuals
     assert any("lack" in text for text in labels_of(figure)) == (panels == 2)
     if panels == 2:
@@ -374,14 +374,14 @@ def test_slack_has_a_panel_only_where_there_is_some(case, panels):
 
 def test_preload_shows_curve_band_and_readings_from_zero():
     data = glove()
-    curve, axes = data["preload"], drawn("preload", data).axes[0]
+    curve, axes = data["preload"], draw_figure("preload", data).axes[0]
     np.testing.assert_array_equal(line(axes, "Median").get_ydata(), curve.preload[1])
     np.testing.assert_array_equal(line(axes, "Reading").get_xydata().T, [curve.points_wrap_angle, curve.points_preload])
     assert bands(axes)[0][:, 1].max() == curve.preload[2].max()
     low, high = axes.get_ylim()
     assert -0.1 * high < low < 0
     bare = dataclasses.replace(curve, points_wrap_angle=np.zeros(0), points_preload=np.zeros(0))
-    assert "Reading" not in labels_of(drawn("preload", {"preload": bare}))
+    assert "Reading" not in labels_of(draw_figure("preload", {"preload": bare}))
 
 
 @pytest.mark.parametrize("scale", [0.005, 1.0, 200.0])
@@ -394,7 +394,7 @@ def test_a_preload_of_any_size_keeps_its_words_on_the_page(scale):
 def test_each_efficiency_has_the_capstan_equation_dashed_in_its_color():
     data = glove()
     loss = data["bending_loss"]
-    for axes, lines in zip(drawn("bending_loss", data).axes, (loss.coefficients, loss.preloads), strict=True):
+    for axes, lines in zip(draw_figure("bending_loss", data).axes, (loss.coefficients, loss.preloads), strict=True):
         curves = [a for a in axes.get_lines() if len(a.get_xdata())]
         solid = [a for a in curves if a.get_linestyle() == "-"]
         dashed = [a for a in curves if a.get_linestyle() == "--"]
@@ -409,7 +409,7 @@ def test_each_efficiency_has_the_capstan_equation_dashed_in_its_color():
 
 
 def test_both_panels_of_bending_loss_have_one_efficiency_axis_and_other_colors():
-    first, second = drawn("bending_loss").axes
+    first, second = draw_figure("bending_loss").axes
     assert first.get_ylim() == second.get_ylim()
     colors = [{tuple(h.get_color()) for h in axes.get_legend().get_lines()} for axes in (first, second)]
     assert not colors[0] & colors[1]
@@ -418,17 +418,17 @@ def test_both_panels_of_bending_loss_have_one_efficiency_axis_and_other_colors()
 def test_bending_loss_without_other_coefficients_or_preloads_has_fewer_panels():
     data = glove()
     loss = data["bending_loss"]
-    (axes,) = drawn("bending_loss", "far window").axes
+    (axes,) = draw_figure("bending_loss", "far window").axes
     assert axes.get_title() == "Preload, at 50 N input force"
     bare = {"bending_loss": dataclasses.replace(loss, coefficients=(), preloads=())}
-    (axes,) = drawn("bending_loss", bare).axes
+    (axes,) = draw_figure("bending_loss", bare).axes
     assert axes.get_title() == "Efficiency, at 50 N input force" and axes.get_legend() is None
 
 
 def test_loops_show_both_ways_and_the_readings_by_stroke():
     data = glove()
     _, recorded, read, _ = data["loops"]
-    _, second, first, _ = drawn("loops", data).axes[::2]
+    _, second, first, _ = draw_figure("loops", data).axes[::2]
     np.testing.assert_array_equal(line(first, "Forward, median").get_ydata(), read.forward[1])
     np.testing.assert_array_equal(line(first, "Back, median").get_ydata(), read.back[1])
     np.testing.assert_array_equal(line(first, "Forward, no preload").get_ydata(), read.capstan)
@@ -443,7 +443,7 @@ def test_loops_show_both_ways_and_the_readings_by_stroke():
 
 def test_the_slack_load_parts_both_branches_with_its_interval():
     data = glove()
-    loop, axes = data["loops"][1], drawn("loops", data).axes[2]
+    loop, axes = data["loops"][1], draw_figure("loops", data).axes[2]
     assert set(line(axes, "Return side goes slack").get_xdata()) == {loop.slack_load[1]}
     (interval,) = axes.patches
     assert (interval.get_x(), interval.get_x() + interval.get_width()) == pytest.approx(tuple(loop.slack_load[[0, 2]]))
@@ -456,14 +456,14 @@ def test_the_slack_load_parts_both_branches_with_its_interval():
 def test_a_slack_load_outside_the_shown_forces_is_left_out():
     data = glove((90.0,))
     far = dataclasses.replace(data["loops"][0], slack_load=np.array([190.0, 200.0, 210.0]))
-    axes, _ = drawn("loops", {"loops": (far,)}).axes
+    axes, _ = draw_figure("loops", {"loops": (far,)}).axes
     assert not axes.texts and not axes.patches and axes.get_xlim()[1] < 100
-    assert "Return side goes slack" not in labels_of(drawn("loops", {"loops": (far,)}))
+    assert "Return side goes slack" not in labels_of(draw_figure("loops", {"loops": (far,)}))
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_branches_are_named_clear_of_the_loop(case):
-    figure = drawn("loops", case)
+    figure = draw_figure("loops", case)
     figure.draw_without_rendering()
     for axes in figure.axes:
         curves = [a for a in axes.get_lines() if a.get_label().startswith(("Forward", "Back", "Read"))]
@@ -479,7 +479,7 @@ def test_the_branches_are_named_clear_of_the_loop(case):
 def test_the_window_and_the_lowest_preload_stand_in_both_panels():
     data = glove()
     window = data["preload_window"]
-    for axes in drawn("preload_window", data).axes:
+    for axes in draw_figure("preload_window", data).axes:
         ((start, stop),) = spans(axes, "Taut with at least 95 % probability")
         assert np.interp(start, window.preload, window.taut_probability) == pytest.approx(0.95, abs=0.01)
         assert stop == window.preload[-1]
@@ -490,7 +490,7 @@ def test_the_window_and_the_lowest_preload_stand_in_both_panels():
 def test_preload_window_shows_friction_and_probability_in_percent():
     data = glove()
     window = data["preload_window"]
-    cost, gain = drawn("preload_window", data).axes
+    cost, gain = draw_figure("preload_window", data).axes
     np.testing.assert_array_equal(line(cost, "Friction, median").get_ydata(), window.friction[1])
     assert bands(cost)[0][:, 1].max() == window.friction[2].max()
     probability = line(gain, "Probability that both sides stay taut").get_ydata()
@@ -498,7 +498,7 @@ def test_preload_window_shows_friction_and_probability_in_percent():
 
 
 def test_a_window_that_is_not_shown_is_put_in_words():
-    figure = drawn("preload_window", "far window")
+    figure = draw_figure("preload_window", "far window")
     labels = labels_of(figure)
     assert "No preload shown is taut with 95 %" in labels and "Lowest preload off the axis, 184 N" in labels
     assert [axes.get_xlim() for axes in figure.axes] == [(0.0, 12.0)] * 2

@@ -28,7 +28,7 @@ FEW = changed(
 )
 
 
-def known(description: Description, spread: float = 0.0, n: int = 1, **truth: float) -> Fit:
+def known_fit(description: Description, spread: float = 0.0, n: int = 1, **truth: float) -> Fit:
     """A fit that found the true values; with a spread, draws of a narrow posterior around them."""
     dataset, values = bench(description, TRUTH | truth, noise=False, design=FEW)
     nothing = LeastSquares({}, {}, {}, 1.0, 0.0, np.zeros(0), True, "")
@@ -67,7 +67,7 @@ def test_without_preload_and_lengthening_every_prediction_is_that_of_the_capstan
     """To machine precision: efficiency, forces both ways, friction, slack, and the stretch of the one side that pulls."""
     tables = ("stretch", "preload", "loop")[: 3 if kind == "loop" else 2]
     no_preload = {"model": "stretch", "value": {"value": 0, "unit": "N"}}
-    elastic = known(elastic_cable(tables, kind=kind, preload=no_preload, prior={"lengthening": {"fixed": 0.0}})).elastic
+    elastic = known_fit(elastic_cable(tables, kind=kind, preload=no_preload, prior={"lengthening": {"fixed": 0.0}})).elastic
     loss = np.exp(-MU * BENDS)
     if kind == "loop":
         for force in (0.5, 100.0, 3000.0):
@@ -90,7 +90,7 @@ def test_without_preload_and_lengthening_every_prediction_is_that_of_the_capstan
 
 
 def test_under_a_small_load_a_loop_loses_twice_its_preload_times_the_exponent():
-    elastic = known(elastic_cable(preload=CONSTANT), preload=100.0).elastic
+    elastic = known_fit(elastic_cable(preload=CONSTANT), preload=100.0).elastic
     for force in (0.0, 5.0, 60.0):
         output, friction = elastic.output_force(BENDS, force)[0], elastic.friction(BENDS)[0]
         np.testing.assert_allclose(force - output, 200 * MU * BENDS, rtol=1e-13, atol=1e-12)
@@ -101,8 +101,8 @@ def test_under_a_small_load_a_loop_loses_twice_its_preload_times_the_exponent():
 def test_efficiency_falls_faster_with_the_wrap_angle_than_the_capstan_equation_where_bending_tightens_the_loop():
     """The loss of log efficiency per radian exceeds mu everywhere, more so the more the cable is bent."""
     bends = np.deg2rad(np.arange(75.0, 155.0, 5.0))
-    follows = known(elastic_cable(), preload=10.0).elastic
-    constant = known(elastic_cable(preload=CONSTANT), preload=10.0).elastic
+    follows = known_fit(elastic_cable(), preload=10.0).elastic
+    constant = known_fit(elastic_cable(preload=CONSTANT), preload=10.0).elastic
     taut = 0.9 * follows.slack_load(bends)[0].min()
     assert taut > 10
     slopes = [-np.diff(np.log(e.efficiency(bends, taut)[0])) / np.diff(bends) for e in (follows, constant)]
@@ -118,7 +118,7 @@ def test_efficiency_falls_faster_with_the_wrap_angle_than_the_capstan_equation_w
 @pytest.mark.extended
 def test_answers_do_not_depend_on_the_setting_of_float_size_where_they_are_asked():
     """A notebook has JAX's own setting, 32 bits."""
-    elastic = known(elastic_cable()).elastic
+    elastic = known_fit(elastic_cable()).elastic
     wide = elastic.efficiency(BENDS, 33.3)[0], elastic.preload_window((0.1, 2.9)).lowest.median
     with jax.enable_x64(False):
         narrow = elastic.efficiency(BENDS, 33.3)[0], elastic.preload_window((0.1, 2.9)).lowest.median
@@ -149,7 +149,7 @@ def returning(preload: np.ndarray, bends: np.ndarray, force: float) -> np.ndarra
 @pytest.mark.parametrize("force", [0.0, 20.0, 60.0])
 @pytest.mark.parametrize("ends", [(0.0, 180.0), (45.0, 135.0), (100.0, 200.0)])
 def test_the_lowest_preload_is_the_smallest_of_all_tried_at_which_no_side_is_slack(ends, force):
-    elastic, bends = known(elastic_cable()).elastic, np.linspace(*np.deg2rad(ends), 25)
+    elastic, bends = known_fit(elastic_cable()).elastic, np.linspace(*np.deg2rad(ends), 25)
     there = preloads(bends)
     taut = np.all((there >= 0) & (returning(there, bends, force) >= 0), axis=1)
     first = np.argmax(taut)
@@ -161,7 +161,7 @@ def test_the_lowest_preload_is_the_smallest_of_all_tried_at_which_no_side_is_sla
 @pytest.mark.extended
 @pytest.mark.parametrize("limit", [2.0, 5.0, 12.0])
 def test_the_highest_preload_is_the_largest_of_all_tried_that_is_felt_as_no_more_than_the_limit(limit):
-    elastic, bends = known(elastic_cable()).elastic, np.linspace(0.3, 2.0, 25)
+    elastic, bends = known_fit(elastic_cable()).elastic, np.linspace(0.3, 2.0, 25)
     felt = np.max(2 * np.maximum(preloads(bends), 0.0) * MU * bends, axis=1)
     last = np.flatnonzero(felt <= limit)[-1]
     limit_preload = elastic.preload_window((bends[0], bends[-1]), friction=limit).highest
@@ -176,13 +176,13 @@ def test_a_limit_that_no_preload_meets_is_said_to_be_impossible():
     felt = np.max(2 * preloads(bends) * MU * bends, axis=1)
     limit = 0.5 * float(felt[0])
     assert limit > 1
-    window = known(elastic_cable()).elastic.preload_window((bends[0], bends[-1]), friction=limit)
+    window = known_fit(elastic_cable()).elastic.preload_window((bends[0], bends[-1]), friction=limit)
     assert window.possible == 0.0
 
 
 @pytest.mark.extended
 def test_a_load_does_not_slacken_a_rope_that_has_no_other_side():
-    elastic = known(elastic_cable(("stretch", "preload"), kind="single")).elastic
+    elastic = known_fit(elastic_cable(("stretch", "preload"), kind="single")).elastic
     lowest = [elastic.preload_window((0.0, np.pi), force).lowest.median for force in (0.0, 60.0)]
     assert lowest[0] == lowest[1] > 1
 
@@ -190,7 +190,7 @@ def test_a_load_does_not_slacken_a_rope_that_has_no_other_side():
 @pytest.mark.extended
 @pytest.mark.parametrize(("force", "limit"), [(0.0, 8.0), (30.0, 18.0)])
 def test_the_best_preload_keeps_the_cable_taut_in_95_of_100_draws(force, limit):
-    fit = known(elastic_cable(), spread=0.1, n=400)
+    fit = known_fit(elastic_cable(), spread=0.1, n=400)
     window = fit.elastic.preload_window((0.0, np.pi), force, friction=limit)
     bends, lowest, felt = np.linspace(0.0, np.pi, 25), [], []
     values = jax.jit(jax.vmap(fit.model.space.constrain))(fit.draws().flat_z)
@@ -237,7 +237,7 @@ def numerical_stiffness(move: Callable[[float], float], force: float) -> float:
 
 @pytest.mark.parametrize("load", [1.0, 10.0, 60.0])
 def test_the_stiffness_of_a_single_rope_is_the_slope_of_its_stretch(load):
-    elastic = known(elastic_cable(("stretch",), kind="single")).elastic
+    elastic = known_fit(elastic_cable(("stretch",), kind="single")).elastic
     expected = [numerical_stiffness(lambda f, x=MU * b: displacement(f, x, None, ROPE), load) for b in BENDS]
     np.testing.assert_allclose(elastic.stiffness(BENDS, load)[0], expected, rtol=1e-6)
 
@@ -245,7 +245,7 @@ def test_the_stiffness_of_a_single_rope_is_the_slope_of_its_stretch(load):
 @pytest.mark.parametrize(("load", "side"), [(5.0, "taut"), (15.0, "taut"), (40.0, "slack"), (80.0, "slack")])
 def test_the_stiffness_of_a_loop_is_the_slope_of_its_displacement(load, side):
     """Of a linear rope; while the return side is taut, its two sides are about twice as stiff as one."""
-    elastic = known(elastic_cable(preload=CONSTANT, prior=LINEAR)).elastic
+    elastic = known_fit(elastic_cable(preload=CONSTANT, prior=LINEAR)).elastic
     rope = (ROPE[0], 0.0, 1.0)
     assert np.all((elastic.slack_load(BENDS)[0] > load) == (side == "taut"))
     expected = [numerical_stiffness(lambda f, x=MU * b: displacement(f, x, 10.0, rope), load) for b in BENDS]
@@ -257,7 +257,7 @@ def test_the_stiffness_of_a_loop_is_the_slope_of_its_displacement(load, side):
 @pytest.mark.parametrize("load", [2.0, 10.0, 60.0])
 def test_the_stiffness_of_a_loop_that_beds_in_is_that_slope_within_two_percent(load):
     """Its sides' mean tensions do not quite add up to twice the preload, as the formula has it; see physics.loop."""
-    elastic = known(elastic_cable(preload=CONSTANT)).elastic
+    elastic = known_fit(elastic_cable(preload=CONSTANT)).elastic
     expected = [numerical_stiffness(lambda f, x=MU * b: displacement(f, x, 10.0, ROPE), load) for b in BENDS]
     np.testing.assert_allclose(elastic.stiffness(BENDS, load)[0], expected, rtol=0.02)
 
@@ -266,7 +266,7 @@ def test_the_stiffness_of_a_loop_that_beds_in_is_that_slope_within_two_percent(l
 def test_the_position_error_of_a_loop_is_how_far_its_pulling_side_stretches(load):
     """The load side driving, forward and back; with backlash added, and never less than no lost motion."""
     settings = {"kind": "loop", "backlash": {"value": 50, "unit": "um"}}
-    elastic = known(elastic_cable(preload=CONSTANT, prior=LINEAR, cable=settings)).elastic
+    elastic = known_fit(elastic_cable(preload=CONSTANT, prior=LINEAR, cable=settings)).elastic
     rope = (ROPE[0], 0.0, 1.0)
     forward = np.array([displacement(load, MU * b, 10.0, rope) for b in BENDS])
     back = np.array([displacement(load, -MU * b, 10.0, rope) for b in BENDS])
@@ -280,7 +280,7 @@ def test_the_position_error_of_a_loop_is_how_far_its_pulling_side_stretches(load
 
 def test_the_position_error_of_a_preloaded_rope_counts_from_its_preload_and_its_slack():
     """One rope between fixed ends whose preload follows the stretch: slack where bent least, so that it must be taken up."""
-    elastic = known(elastic_cable(("stretch", "preload"), kind="single"), preload=8.0).elastic
+    elastic = known_fit(elastic_cable(("stretch", "preload"), kind="single"), preload=8.0).elastic
     preload, slack = (answer[0] for answer in elastic.preload(BENDS))
     assert slack[0] > 0
     assert preload[-1] > 25
@@ -296,7 +296,7 @@ def test_the_position_error_of_a_preloaded_rope_counts_from_its_preload_and_its_
 
 def test_a_rope_of_which_only_the_preload_was_read_still_has_its_answers():
     """No table says with which friction it is stretched; then it is the one that it slides with."""
-    elastic = known(elastic_cable(("preload",), kind="single", stretch={})).elastic
+    elastic = known_fit(elastic_cable(("preload",), kind="single", stretch={})).elastic
     error, lost = elastic.position(BENDS, 25.0)
     assert np.all(np.isfinite(error))
     assert np.all(lost >= 0)
@@ -319,7 +319,7 @@ def test_a_rope_of_which_only_the_preload_was_read_still_has_its_answers():
 def test_a_bend_below_twenty_rope_diameters_is_warned_of_in_check_and_summary(diameter, radius, sharp):
     """And none at twenty, which is what makers recommend."""
     sizes = {"kind": "single", "rope_diameter": diameter, "bend_radius": radius}
-    fit = known(elastic_cable(("stretch",), cable=sizes), spread=0.01, n=4)
+    fit = known_fit(elastic_cable(("stretch",), cable=sizes), spread=0.01, n=4)
     says = re.compile(r"bend radius is [\d.]+ rope diameters")
     assert bool(says.search(describe_data_set(fit.dataset))) == sharp
     assert bool(says.search(" ".join(describe_elastic(fit).split()))) == sharp

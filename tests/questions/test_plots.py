@@ -205,7 +205,7 @@ ONCE = DrawnOnce(CASES)
 forget = ONCE.forgotten()
 
 
-def drawn(name, data=None):
+def draw_figure(name, data=None):
     return ONCE.figure(name, "on body") if data is None else FIGURES[name].draw(data[name])
 
 
@@ -276,12 +276,12 @@ def test_every_axis_says_what_it_shows_or_shares_one_that_does(case):
     ],
 )
 def test_names_and_units_are_the_same_everywhere(name, labels):
-    assert labels <= {text for text, _ in words(drawn(name))}
+    assert labels <= {text for text, _ in words(draw_figure(name))}
 
 
 def test_wrap_angles_show_every_reading_as_what_it_is():
     data = paper_data()
-    axes = drawn("wrap_angles", data).axes[0]
+    axes = draw_figure("wrap_angles", data).axes[0]
     curve = data["wrap_angles"].curves[0]
     np.testing.assert_array_equal(line(axes, "Reading").get_xydata().T, [curve.route, curve.angle])
     np.testing.assert_array_equal(
@@ -295,7 +295,7 @@ def test_wrap_angles_show_every_reading_as_what_it_is():
 
 def test_bands_hold_the_quantiles_of_the_curve():
     data = paper_data()
-    axes = drawn("wrap_angles", data).axes[0]
+    axes = draw_figure("wrap_angles", data).axes[0]
     low, _, median, _, high = data["wrap_angles"].curves[0].band.quantiles
     np.testing.assert_array_equal(line(axes, "Median").get_ydata(), median)
     widest = next(c for c in axes.collections if c.get_label() == "90 % interval")
@@ -306,15 +306,15 @@ def test_bands_hold_the_quantiles_of_the_curve():
 def test_without_draws_there_is_a_line_and_no_band():
     data = without_draws(paper_data())
     for name in ("wrap_angles", "efficiency"):
-        axes = drawn(name, data).axes[0]
+        axes = draw_figure(name, data).axes[0]
         assert line(axes, "Least squares")
         assert not [c for c in axes.collections if isinstance(c, PolyCollection)]
-    assert len(drawn("efficiency", data).axes) == 2  # the curve and its residuals
+    assert len(draw_figure("efficiency", data).axes) == 2  # the curve and its residuals
 
 
 def test_no_curve_is_drawn_outside_the_range():
     for name in ("wrap_angles", "efficiency"):
-        axes = drawn(name).axes[0]
+        axes = draw_figure(name).axes[0]
         route = line(axes, "Median").get_xdata()
         assert (route.min(), route.max()) == RANGE
         assert axes.get_xlim()[1] > 550.0
@@ -323,7 +323,7 @@ def test_no_curve_is_drawn_outside_the_range():
 
 def test_efficiency_marks_points_outside_with_their_prediction():
     data = paper_data()
-    axes = drawn("efficiency", data).axes[0]
+    axes = draw_figure("efficiency", data).axes[0]
     np.testing.assert_allclose(line(axes, "Measured").get_ydata(), 100 * EFFICIENCIES[:3])
     outside = line(axes, "Measured, outside the range")
     np.testing.assert_allclose(outside.get_xydata(), [[550.0, 67.8]])
@@ -334,7 +334,7 @@ def test_efficiency_marks_points_outside_with_their_prediction():
 
 def test_optimum_window_and_choices_stand_below_the_efficiency():
     data = paper_data()
-    _, strip, location, which = drawn("efficiency", data).axes
+    _, strip, location, which = draw_figure("efficiency", data).axes
     np.testing.assert_allclose(strip.get_lines()[0].get_ydata(), -0.2, atol=1e-9)
     window = next(p for p in location.patches if "best with 95 %" in p.get_label())
     assert (window.get_x(), window.get_x() + window.get_width()) == (455.0, 484.0)
@@ -345,7 +345,7 @@ def test_optimum_window_and_choices_stand_below_the_efficiency():
 def test_runs_stand_beside_the_lines_between_which_nine_of_ten_lie():
     data = with_many_runs(paper_data())
     ends = data["efficiency"].efficiency.quantiles[[0, -1]] + [[-0.02], [0.02]]
-    axes = drawn("efficiency", changed(data, "efficiency", new_run=ends)).axes[0]
+    axes = draw_figure("efficiency", changed(data, "efficiency", new_run=ends)).axes[0]
     shown = [line.get_ydata() for line in axes.get_lines() if line.get_label() == NEW_RUN]
     np.testing.assert_allclose(shown, 100 * ends)
 
@@ -353,7 +353,7 @@ def test_runs_stand_beside_the_lines_between_which_nine_of_ten_lie():
 def test_a_missing_window_is_not_drawn():
     data = paper_data()
     nowhere = dataclasses.replace(data["efficiency"].optimum, window=Window(0.01, 0.95, float("nan"), float("nan")))
-    figure = drawn("efficiency", changed(data, "efficiency", optimum=nowhere))
+    figure = draw_figure("efficiency", changed(data, "efficiency", optimum=nowhere))
     assert not [text for text, _ in words(figure) if "probability" in text]
 
 
@@ -361,7 +361,7 @@ def test_an_optimum_at_the_edge_is_said_to_be_there():
     share = at_the_edge()["efficiency"].optimum.at_edge
     assert share > 0.1
     assert f"at an end of the range with {100 * share:.3g} % probability" in [
-        t for t, _ in words(drawn("efficiency", at_the_edge()))
+        t for t, _ in words(draw_figure("efficiency", at_the_edge()))
     ]
 
 
@@ -376,7 +376,7 @@ def test_what_is_said_of_an_edge_stands_beside_the_density(width):
 
 def test_coefficients_show_prior_posterior_and_least_squares():
     data = paper_data()
-    axes = drawn("coefficients", data).axes
+    axes = draw_figure("coefficients", data).axes
     assert len(axes) == 3
     for panel, p in zip(axes, data["coefficients"], strict=True):
         assert {"With the measurements", "Before them (prior)"} <= {artist.get_label() for artist in panel.get_lines()}
@@ -391,7 +391,7 @@ def test_coefficients_show_prior_posterior_and_least_squares():
 def test_a_far_least_squares_estimate_is_written_not_drawn():
     data = paper_data()
     far = dataclasses.replace(data["coefficients"][0], least_squares=5.0)
-    (axes,) = drawn("coefficients", {"coefficients": (far,)}).axes
+    (axes,) = draw_figure("coefficients", {"coefficients": (far,)}).axes
     assert not axes.containers
     assert [t.get_text() for t in axes.texts] == ["Least squares: off the axis, 5"]
 
@@ -399,7 +399,7 @@ def test_a_far_least_squares_estimate_is_written_not_drawn():
 @pytest.mark.parametrize("force", [1e-6, 1e-7, 1e6])
 def test_densities_of_very_small_and_very_large_quantities_have_short_numbers(force):
     (small,) = (coefficient("drag", "$D$", 1.2 * force, 0.3 * force, "N"),)
-    figure = drawn("coefficients", {"coefficients": (small, *paper_data()["coefficients"][:2])})
+    figure = draw_figure("coefficients", {"coefficients": (small, *paper_data()["coefficients"][:2])})
     check_words(figure, "coefficients")
     (axes, *_) = figure.axes
     numbers = [text for text in axes.get_yticklabels() if text.get_text()]
@@ -423,7 +423,7 @@ def fit_of_nine():
 
 
 def test_pair_plot_shows_at_most_eight_and_keeps_the_optimum():
-    texts = [text for text, _ in words(drawn("pairs", {"pairs": pairs_figure.data(fit_of_nine())}))]
+    texts = [text for text, _ in words(draw_figure("pairs", {"pairs": pairs_figure.data(fit_of_nine())}))]
     assert texts.count("Optimum (mm)") == 2  # below its column and left of its row
     symbols = {text for text in texts if text.startswith("$")}
     assert len(symbols) == 6
@@ -435,14 +435,14 @@ def test_traces_tell_a_stray_ensemble():
     stray = first.draws.copy()
     stray[: WALKERS // ENSEMBLES] += 0.05
     moved = dataclasses.replace(first, draws=stray)
-    figure = drawn("traces", {"traces": Traces([moved], ENSEMBLES, 310, 600)})
+    figure = draw_figure("traces", {"traces": Traces([moved], ENSEMBLES, 310, 600)})
     medians = [line.get_ydata().mean() for line in figure.axes[0].lines if line.get_linewidth() == 1.0]
     assert len(medians) == ENSEMBLES
     assert medians[0] > max(medians[1:]) + 0.04
 
 
 def test_residuals_are_measured_minus_predicted_in_points():
-    figure = drawn("residuals")
+    figure = draw_figure("residuals")
     axes, strip = figure.axes
     np.testing.assert_allclose(line(axes, "Measured").get_xdata(), 100 * EFFICIENCIES[:3])
     np.testing.assert_allclose(line(strip, "Measured").get_xdata(), -0.2, atol=1e-12)
@@ -451,7 +451,7 @@ def test_residuals_are_measured_minus_predicted_in_points():
 
 
 def test_angle_residuals_are_readings_minus_the_curve():
-    for axes in drawn("wrap_angles").axes[1::2]:
+    for axes in draw_figure("wrap_angles").axes[1::2]:
         np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 0.5)
 
 
@@ -469,7 +469,7 @@ def test_a_density_integrates_to_one_up_to_its_bound():
 def test_the_95_percent_region_holds_95_percent_of_the_draws():
     x, y = np.random.default_rng(0).standard_normal((2, WALKERS, 20_000 // WALKERS))
     shown = [SampledQuantity(name, draws, (-np.inf, np.inf)) for name, draws in (("x", x), ("y", y))]
-    panel = next(axes for axes in drawn("pairs", {"pairs": Pairs(shown)}).axes if axes.get_xlabel() and axes.get_ylabel())
+    panel = next(axes for axes in draw_figure("pairs", {"pairs": Pairs(shown)}).axes if axes.get_xlabel() and axes.get_ylabel())
     outlines = next(c for c in panel.collections if isinstance(c, ContourSet) and not c.filled)
     at_95 = outlines.get_paths()[0]  # the lowest level of density
     inside = at_95.contains_points(np.column_stack([x.ravel(), y.ravel()]))
@@ -557,7 +557,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_temporary_one(tmp_path):
     path = tmp_path / "coefficients.nonsense"
     path.write_text("old")
     with pytest.raises(ValueError, match="nonsense"):
-        write(drawn("coefficients"), path)
+        write(draw_figure("coefficients"), path)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     assert path.read_text() == "old"
 

@@ -160,7 +160,7 @@ ONCE = DrawnOnce(CASES)
 forget = ONCE.forgotten()
 
 
-def drawn(name, case="four"):
+def draw_figure(name, case="four"):
     return ONCE.figure(name, case) if isinstance(case, str) else FIGURES[name].draw(case[name])
 
 
@@ -175,13 +175,13 @@ def legend_of(figure):
 @pytest.mark.parametrize("case", CASES)
 def test_no_words_overlap_or_leave_the_page(case):
     for name in NAMES:
-        check_words(drawn(name, case), name)
+        check_words(draw_figure(name, case), name)
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("case", CASES)
 def test_every_axis_is_labeled_or_shares_one_that_is(name, case):
-    figure = drawn(name, case)
+    figure = draw_figure(name, case)
     lowest = max(axes.get_subplotspec().rowspan.stop for axes in figure.axes)
     for axes in figure.axes:
         place = axes.get_subplotspec()
@@ -205,12 +205,12 @@ def test_deviations_that_alternate_are_correlated_in_turn():
 
 @pytest.mark.parametrize(("name", "count"), list(zip(NAMES[:4], (9, 8, 8, 8), strict=True)))
 def test_some_of_twenty_recordings_are_shown_from_first_to_last(name, count):
-    figure = drawn(name, "twenty, long names")
+    figure = draw_figure(name, "twenty, long names")
     assert len(figure.axes) == count
     assert f"{count} of 20 recordings shown" in legend_of(figure)
     titles = [axes.get_title() for axes in figure.axes]
     assert titles[0].endswith("00") and titles[-1].endswith("19") and all(t.startswith("…") for t in titles)
-    assert not any("shown" in text for text in legend_of(drawn(name, "seven")))
+    assert not any("shown" in text for text in legend_of(draw_figure(name, "seven")))
 
 
 @pytest.mark.parametrize("width", [None, 3.5])
@@ -226,14 +226,14 @@ def test_recordings_take_no_more_room_however_many_they_are(width):
 
 @pytest.mark.parametrize(("case", "columns"), [("one", 1), ("two", 2), ("four", 4), ("seven", 4)])
 def test_fewer_recordings_take_fewer_columns(case, columns):
-    starts = {round(axes.get_position().x0, 6) for axes in drawn("hysteresis", case).axes}
+    starts = {round(axes.get_position().x0, 6) for axes in draw_figure("hysteresis", case).axes}
     assert len(starts) == columns
 
 
 def test_recordings_show_forces_fit_and_interval():
     data = CASES["one"]()
     (recording,) = data["recordings"]
-    (axes,) = drawn("recordings", data).axes
+    (axes,) = draw_figure("recordings", data).axes
     start = recording.time[0]
     np.testing.assert_allclose(line(axes, "Input").get_xydata().T, [recording.time - start, recording.input_force])
     np.testing.assert_allclose(line(axes, "Output").get_ydata(), recording.output_force)
@@ -245,7 +245,7 @@ def test_recordings_show_forces_fit_and_interval():
 
 def test_phases_are_shaded_where_the_rope_is_in_them_in_fills_that_differ_in_gray():
     data = data_of([trace()])
-    ((recording,), (axes,)) = data["recordings"], drawn("recordings", data).axes
+    ((recording,), (axes,)) = data["recordings"], draw_figure("recordings", data).axes
     fills = {c.get_label(): c for c in axes.collections}
     for stroke, name in ((1, "Pulling"), (-1, "Returning"), (0, "Switching or held")):
         inside = np.zeros(BLOCKS, dtype=bool)
@@ -260,18 +260,18 @@ def test_phases_are_shaded_where_the_rope_is_in_them_in_fills_that_differ_in_gra
 
 
 def test_samples_left_out_are_marked_by_kind_on_the_axes():
-    (axes,) = drawn("recordings", "one").axes
+    (axes,) = draw_figure("recordings", "one").axes
     low, high = axes.get_ylim()
     for kind, count in (("dropout", 1), ("spike", 4), ("saturated", 2), ("quiet", 2)):
         y = line(axes, f"Left out: {kind}").get_ydata()
         assert len(y) == count and y.min() >= low and y.max() <= high
     assert line(axes, "Left out: dropout").get_ydata()[0] == low
     assert high in line(axes, "Left out: spike").get_ydata()
-    assert legend_of(drawn("recordings", "four")).count("Left out: spike") == 1
+    assert legend_of(draw_figure("recordings", "four")).count("Left out: spike") == 1
 
 
 def test_lines_are_broken_where_nothing_was_recorded():
-    axes = drawn("recordings", data_of([with_a_gap()])).axes[0]
+    axes = draw_figure("recordings", data_of([with_a_gap()])).axes[0]
     for label in ("Input", "Output", "Output fitted"):
         assert np.isnan(line(axes, label).get_ydata()).sum() == 1
     for phase in (c for c in axes.collections if c.get_label() in ("Pulling", "Returning", "Switching or held")):
@@ -281,20 +281,20 @@ def test_lines_are_broken_where_nothing_was_recorded():
 
 
 def test_recordings_unlike_each_other_have_their_own_axes():
-    limits = [axes.get_xlim() for axes in drawn("recordings", "unlike each other").axes]
+    limits = [axes.get_xlim() for axes in draw_figure("recordings", "unlike each other").axes]
     assert [round(high - low) for low, high in limits] == [40, 3, 40]
-    assert len({axes.get_xlim() for axes in drawn("recordings", "four").axes}) == 1
+    assert len({axes.get_xlim() for axes in draw_figure("recordings", "four").axes}) == 1
 
 
 def test_of_many_cycles_only_the_first_are_shown_and_this_is_said():
     many = trace(n=4000, cycles=40, seconds=200.0)
-    figure = drawn("recordings", data_of([many]))
+    figure = draw_figure("recordings", data_of([many]))
     assert "First 8 cycles shown" in legend_of(figure)
     shown = cut_to_first_cycles(many.over_time)
     assert shown.time[-1] == pytest.approx(8 * 5.0, abs=1.5)
     assert shown.predicted.shape == (3, len(shown.time)) == (3, len(shown.stroke))
     assert shown.flagged_kind == ("dropout",) and shown.flagged_time.tolist() == [40.0]
-    assert not any("cycles" in text for text in legend_of(drawn("recordings", "four")))
+    assert not any("cycles" in text for text in legend_of(draw_figure("recordings", "four")))
 
 
 def test_thinned_lines_keep_every_peak():
@@ -303,14 +303,14 @@ def test_thinned_lines_keep_every_peak():
     assert len(indices) <= 200 and {values.argmin(), values.argmax()} <= set(indices.tolist())
     np.testing.assert_array_equal(extremes(values[:150], 100), np.arange(150))
     long = trace(n=20_000)
-    (axes,) = drawn("recordings", data_of([long])).axes
+    (axes,) = draw_figure("recordings", data_of([long])).axes
     assert len(line(axes, "Output").get_ydata()) <= POINTS
     assert line(axes, "Output").get_ydata().max() == long.over_time.output_force.max()
 
 
 def test_hysteresis_shows_the_loop_between_both_capstan_lines():
     recording = trace().hysteresis
-    (axes,) = drawn("hysteresis", {"hysteresis": (recording,)}).axes
+    (axes,) = draw_figure("hysteresis", {"hysteresis": (recording,)}).axes
     assert axes.get_xlim() == axes.get_ylim()
     box = axes.get_window_extent()
     assert box.width == pytest.approx(box.height, rel=1e-3)
@@ -328,15 +328,15 @@ def test_hysteresis_shows_the_loop_between_both_capstan_lines():
 
 def test_hysteresis_writes_the_exponent_and_its_interval():
     exact = dataclasses.replace(trace().hysteresis, own_exponent=0.25)
-    (text,) = drawn("hysteresis", {"hysteresis": (exact,)}).axes[0].texts
+    (text,) = draw_figure("hysteresis", {"hysteresis": (exact,)}).axes[0].texts
     assert text.get_text() == "exponent 0.250\nexpected 0.240\n(0.220 to 0.260)"
-    (text,) = drawn("hysteresis", data_of([trace(draws=False)])).axes[0].texts
+    (text,) = draw_figure("hysteresis", data_of([trace(draws=False)])).axes[0].texts
     assert "(" not in text.get_text()
 
 
 @pytest.mark.parametrize("case", ["one", "two", "seven", "twenty, long names", "unlike each other"])
 def test_the_exponent_is_written_clear_of_the_loop(case):
-    figure = drawn("hysteresis", case)
+    figure = draw_figure("hysteresis", case)
     figure.draw_without_rendering()
     for axes in figure.axes:
         box = axes.texts[0].get_window_extent()
@@ -356,7 +356,7 @@ def test_sample_efficiencies_are_below_one_both_ways():
 
 def test_sample_efficiency_shows_samples_mean_and_expectation_in_percent():
     recording = trace().samples
-    (axes,) = drawn("sample_efficiency", {"sample_efficiency": (recording,)}).axes
+    (axes,) = draw_figure("sample_efficiency", {"sample_efficiency": (recording,)}).axes
     values, stroke = recording.efficiency, recording.stroke
     np.testing.assert_allclose(line(axes, "Returning").get_ydata(), 100 * values[stroke == -1])
     assert line(axes, "Mean of the run").get_ydata()[0] == 100 * recording.mean
@@ -368,7 +368,7 @@ def test_sample_efficiency_shows_samples_mean_and_expectation_in_percent():
 
 
 def test_a_recording_of_one_phase_has_one_mark():
-    labels = legend_of(drawn("sample_efficiency", "one phase"))
+    labels = legend_of(draw_figure("sample_efficiency", "one phase"))
     assert "Pulling" in labels and "Returning" not in labels
 
 
@@ -383,13 +383,13 @@ def test_an_unknown_mean_or_exponent_is_left_out():
             )
         ]
     )
-    assert "Mean of the run" not in legend_of(drawn("sample_efficiency", data))
-    assert "nan" not in "".join(text for text, _ in words(drawn("hysteresis", data)))
+    assert "Mean of the run" not in legend_of(draw_figure("sample_efficiency", data))
+    assert "nan" not in "".join(text for text, _ in words(draw_figure("hysteresis", data)))
 
 
 def test_autocorrelation_has_the_band_of_its_own_number_of_blocks():
     recording = trace().autocorrelation
-    (axes,) = drawn("autocorrelation", {"autocorrelation": (recording,)}).axes
+    (axes,) = draw_figure("autocorrelation", {"autocorrelation": (recording,)}).axes
     band = next(p for p in axes.patches if "95 %" in p.get_label())
     assert 2 * 1.96 / np.sqrt(recording.n_blocks) == pytest.approx(band.get_height())
     np.testing.assert_array_equal(line(axes, "Deviations from the fit").get_ydata(), recording.correlation)
@@ -397,7 +397,7 @@ def test_autocorrelation_has_the_band_of_its_own_number_of_blocks():
 
 def test_dependence_shows_curve_constant_and_points():
     load, speed = both()
-    first, second = drawn("dependence", data_of([], (load, speed))).axes
+    first, second = draw_figure("dependence", data_of([], (load, speed))).axes
     assert (first.get_title(), second.get_title()) == ("Load at 470 mm", "Speed at 470 mm")
     assert (first.get_xscale(), second.get_xscale()) == ("linear", "log")
     np.testing.assert_allclose(line(first, "Median").get_ydata(), 100 * load.quantiles[1])
@@ -408,12 +408,12 @@ def test_dependence_shows_curve_constant_and_points():
     np.testing.assert_allclose(points[0].get_ydata(), 100 * load.points_efficiency[4:8])
     np.testing.assert_allclose([np.ptp(bar[:, 1]) for bar in points[2][0].get_segments()], 2 * 0.3)
     assert set(line(first, "Capstan equation alone").get_ydata()) == {78.7}
-    assert "Measured in 12 runs" in legend_of(drawn("dependence", "two"))
+    assert "Measured in 12 runs" in legend_of(draw_figure("dependence", "two"))
 
 
 def test_without_draws_there_are_lines_and_no_intervals():
     for name in NAMES:
-        labels = legend_of(drawn(name, "least squares only"))
+        labels = legend_of(draw_figure(name, "least squares only"))
         assert not [text for text in labels if "interval" in text and "readings" not in text]
         assert name == "autocorrelation" or any("least squares" in text.lower() for text in labels)
 
@@ -426,7 +426,7 @@ def test_recorded_efficiencies_are_drawn_like_those_of_runs():
     assert find_readings(RECORDED).axis == find_readings("run_efficiency").axis
     route = np.array([450.0, 500.0])
     points = EfficiencyPoints(True, ("a", "b"), route, 0.8 + 0 * route, np.full((5, 2), 0.79), np.ones(2, dtype=bool))
-    assert {"a", "b"} <= {text for text, _ in words(drawn("residuals", {"residuals": Residuals((points,))}))}
+    assert {"a", "b"} <= {text for text, _ in words(draw_figure("residuals", {"residuals": Residuals((points,))}))}
 
 
 @pytest.mark.slow

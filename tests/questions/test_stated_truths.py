@@ -36,20 +36,20 @@ def truths(**page: object) -> tuple[StatedTruth, ...]:
     return parse_truths(page, SPACE, "truth.toml")
 
 
-def drawn(truth: StatedTruth, n: int = 2000) -> np.ndarray:
+def draw_truth(truth: StatedTruth, n: int = 2000) -> np.ndarray:
     """True values in shown units."""
     generator, prior = np.random.default_rng(1), truth.parameter.prior
     return np.array([float(prior.constrain(truth.draw_z(generator))) for _ in range(n)]) * truth.parameter.shown_scale
 
 
 def test_a_number_is_the_truth_of_every_replication():
-    np.testing.assert_allclose(drawn(*truths(mu_edge=0.31), n=5), 0.31, rtol=1e-12)
+    np.testing.assert_allclose(draw_truth(*truths(mu_edge=0.31), n=5), 0.31, rtol=1e-12)
 
 
 def test_a_range_of_what_is_positive_is_drawn_by_factors():
     """Halves of a logarithmic range: each of 200 draws 5 standard deviations wide, by chance out once in a million seeds."""
     (truth,) = truths(sigma_F=[0.01, 1.0])
-    values = drawn(truth, 200)
+    values = draw_truth(truth, 200)
     assert truth.text == "sigma_F log-uniform from 0.01 to 1 N"
     assert 0.01 <= values.min() < values.max() <= 1.0
     assert abs(np.mean(values < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
@@ -62,7 +62,7 @@ def test_so_are_ranges_of_whatever_default_priors_leave_positive(name):
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
     (truth,) = parse_truths({name: [0.01, 1.0]}, space, "truth.toml")
     assert " log-uniform from 0.01 to 1" in truth.text
-    assert abs(np.mean(drawn(truth, 200) < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
+    assert abs(np.mean(draw_truth(truth, 200) < 0.1) - 0.5) < 5 * np.sqrt(0.25 / 200)
 
 
 def test_a_range_of_either_sign_is_drawn_uniformly():
@@ -70,7 +70,7 @@ def test_a_range_of_either_sign_is_drawn_uniformly():
     description = cable(1, ("angles",), prior=prior)
     space = build_model(Dataset(description, empty_tables(description, DESIGN), {})).space
     (truth,) = parse_truths({"free_angle_b": [-1.0, 3.0]}, space, "truth.toml")
-    values = drawn(truth, 200)
+    values = draw_truth(truth, 200)
     assert truth.text == "free_angle_b uniform from -1 to 3"
     assert -1.0 <= values.min() < values.max() <= 3.0
     assert abs(np.mean(values < 1.0) - 0.5) < 5 * np.sqrt(0.25 / 200)

@@ -102,7 +102,7 @@ def swapped(raw: RawRecording) -> RawRecording:
     return replace(raw, input_force=raw.output_force, output_force=raw.input_force)
 
 
-def found(
+def find(
     velocity: str = "recorded", by_hand: tuple[Phase, ...] = (), block: float | None = None, **settings: Any
 ) -> Found:
     recording = simulated(**settings)
@@ -119,7 +119,7 @@ def found(
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 @pytest.mark.parametrize("case", CASES)
 def test_the_phases_found_are_the_true_ones(case, noise, velocity):
-    result = found(velocity, noise=noise, **CASES[case])
+    result = find(velocity, noise=noise, **CASES[case])
     judged, strokes = result.judged, result.strokes
     assert judged.sum() > 40
     assert np.mean(strokes.stroke[judged] == result.truth[judged]) >= 0.97
@@ -132,7 +132,7 @@ def test_the_phases_found_are_the_true_ones(case, noise, velocity):
 @pytest.mark.parametrize("case", CASES)
 def test_the_exponent_of_a_recording_is_the_true_one(case, noise):
     setting = CASES[case]
-    strokes = found(noise=noise, **setting).strokes
+    strokes = find(noise=noise, **setting).strokes
     if case == "drag":  # the loop is wider at low forces; its drag is found beside it
         assert strokes.drag == pytest.approx(5.0, rel=0.02 if noise == 0 else 0.3)
         assert strokes.exponent > 0.2
@@ -144,14 +144,14 @@ def test_the_exponent_of_a_recording_is_the_true_one(case, noise):
 @pytest.mark.parametrize("velocity", ["recorded", "turned around"])
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_nothing_counts_as_sliding_while_the_motor_rests(velocity, noise):
-    result = found(velocity, noise=noise, pause=1.0, lead_in=1.0)
+    result = find(velocity, noise=noise, pause=1.0, lead_in=1.0)
     resting = result.blocks.velocity == 0  # for the whole block
     assert resting.sum() > 50
     assert not result.strokes.used_sliding[resting].any()
 
 
 def test_with_a_velocity_of_zero_throughout_nothing_slides():
-    result = found()
+    result = find()
     blocks = replace(result.blocks, velocity=np.zeros(len(result.blocks.time)))
     strokes = find_strokes(blocks, "run.csv", "run")
     assert not strokes.used_sliding.any()
@@ -160,7 +160,7 @@ def test_with_a_velocity_of_zero_throughout_nothing_slides():
 
 def test_blocks_beside_a_change_of_the_contact_are_not_used():
     for velocity in ("recorded", "absent"):
-        strokes = found(velocity, noise=0.5, partial_reversals=PARTIAL).strokes
+        strokes = find(velocity, noise=0.5, partial_reversals=PARTIAL).strokes
         state, used = strokes.stroke, strokes.used_sliding
         edges = np.flatnonzero(np.diff(state))
         assert len(edges) > 10
@@ -170,7 +170,7 @@ def test_blocks_beside_a_change_of_the_contact_are_not_used():
 
 
 def test_phases_set_by_hand_come_before_those_found():
-    alone = found(noise=0.5)
+    alone = find(noise=0.5)
     time = alone.blocks.time
     spans = (
         Phase(start=0.2, end=0.5, stroke="return"),
@@ -178,7 +178,7 @@ def test_phases_set_by_hand_come_before_those_found():
         Phase(start=1.2001, end=1.4, stroke="ignore"),
         Phase(start=2.0, end=2.3, stroke="pull"),
     )
-    strokes = found(noise=0.5, by_hand=spans).strokes
+    strokes = find(noise=0.5, by_hand=spans).strokes
     assert strokes.by_hand
     assert not alone.strokes.by_hand
     covered = np.zeros(len(time), dtype=bool)
@@ -193,7 +193,7 @@ def test_phases_set_by_hand_come_before_those_found():
 
 
 def test_a_phase_by_hand_does_not_use_saturated_blocks():
-    result = found(noise=0.5)
+    result = find(noise=0.5)
     saturated = (result.blocks.time > 0.5) & (result.blocks.time < 0.7)
     blocks = replace(result.blocks, saturated=saturated)
     strokes = find_strokes(blocks, "run.csv", "run", (Phase(start=0.4, end=0.8, stroke="pull"),))
@@ -203,24 +203,24 @@ def test_a_phase_by_hand_does_not_use_saturated_blocks():
 
 def test_a_phase_outside_the_recording_is_refused():
     with pytest.raises(DatasetError, match=r"from 100 to 200 s holds nothing of the recording, which goes from"):
-        found(by_hand=(Phase(start=100.0, end=200.0, stroke="pull"),))
+        find(by_hand=(Phase(start=100.0, end=200.0, stroke="pull"),))
 
 
 def test_a_recording_of_a_few_blocks_is_refused():
     with pytest.raises(DatasetError, match=r"too few blocks .*\(5, at least 10 needed\).*shorter block"):
-        found(block=2.0, cycles=3)
+        find(block=2.0, cycles=3)
 
 
 def test_time_without_load_is_neither_used_nor_in_the_way():
     settings = {"lead_in": 3.0, "unloaded": 2.0, "cycles": 1, "noise": 0.5}
     for velocity in ("recorded", "absent"):
-        result = found(velocity, **settings)
+        result = find(velocity, **settings)
         assert not result.strokes.used_sliding[result.blocks.time < 2.0].any()
         assert result.strokes.exponent == pytest.approx(0.2, rel=0.03)
 
 
 def test_drag_is_not_found_where_there_is_none_to_tell_it_by():
-    strokes = found(noise=0.5, exponent=0.02).strokes
+    strokes = find(noise=0.5, exponent=0.02).strokes
     assert strokes.drag < 20.0  # noise in logarithms shrinks with drag, and must not be mistaken for a better fit
 
 

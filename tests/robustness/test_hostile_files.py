@@ -182,11 +182,11 @@ def test_files_read_at_the_same_time_and_in_a_copy_of_the_process_get_their_own_
     for i in range(6):
         scipy.io.savemat(tmp_path / f"{i}.mat", {"F": np.full(50_000, float(i)), "t": np.arange(50_000.0)})
 
-    def found(i):
+    def read_nth(i):
         return float(np.median(read_channels(tmp_path / f"{i}.mat").channels[0].values))
 
     with ThreadPoolExecutor(6) as threads:
-        assert list(threads.map(found, range(6))) == list(range(6))
+        assert list(threads.map(read_nth, range(6))) == list(range(6))
     program = (
         "import os, sys; import numpy as np; from pathlib import Path; from bowdenfit.files import read_channels\n"
         "of = lambda i: float(np.median(read_channels(Path(sys.argv[1]) / f'{i}.mat').channels[0].values))\n"

@@ -145,14 +145,14 @@ def test_names_of_figures_lead_nowhere_else(folder):
     (folder / "mine.png").write_text("x")
     (folder / "figures" / "x.png").write_text("x")
 
-    def drawn(name):
+    def draws_of(name):
         page = {"with": installed_version("matplotlib"), "captions": {name: "A figure."}}
         page["files"] = {f"{name}.png": file_checksum(folder / "figures" / f"{name}.png")}
         edit_sealed(folder / "answers.json", lambda answers: answers["answers"].update(drawn=page))
         return captions_if_unchanged(folder, (), ("png",))
 
-    assert drawn("x") == {"x": "A figure."}
-    assert drawn("../mine") is None
+    assert draws_of("x") == {"x": "A figure."}
+    assert draws_of("../mine") is None
 
 
 @pytest.mark.extended

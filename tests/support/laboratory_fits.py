@@ -45,7 +45,7 @@ def held(laboratory: Laboratory, sessions: int, scratch: Path) -> dict[str, int]
         model = build_model(data[0])
         posteriors = [LogDensity(replace_data(model, item)) for item in data]
         fits = BatchFitter().fit_all(posteriors, list(range(sessions)))
-        draws = [drawn(model, fit.z) for fit in fits if len(fit.z) and not fit.reasons]
+        draws = [draw_values(model, fit.z) for fit in fits if len(fit.z) and not fit.reasons]
     results = {}
     for name, true in laboratory.truth.items():
         ends = np.array([np.quantile(draw[name], ((1 - HELD) / 2, (1 + HELD) / 2)) for draw in draws])
@@ -53,7 +53,7 @@ def held(laboratory: Laboratory, sessions: int, scratch: Path) -> dict[str, int]
     return results | {"": len(draws)}
 
 
-def drawn(model: Model, z: np.ndarray) -> dict[str, np.ndarray]:
+def draw_values(model: Model, z: np.ndarray) -> dict[str, np.ndarray]:
     """Draws of every parameter, and of the best length where there is a route."""
     values = np.asarray(jax.vmap(model.space.vector)(z))
     estimates = {p.name: values[:, i] for i, p in enumerate(model.space.free)}

@@ -140,7 +140,7 @@ def write(bench: RecordedBench, folder: Path, seed: int) -> Path:
     return folder
 
 
-def drawn(seed: int) -> RecordedBench:
+def draw_bench(seed: int) -> RecordedBench:
     """A bench drawn at random from all that recordings differ in."""
     g = np.random.default_rng(seed)
     rate = float(np.exp(g.uniform(np.log(20), np.log(5000))))

@@ -318,7 +318,7 @@ def read_quantity(text: str, option: str, example: str) -> NumberWithUnit:
 
     Args:
         text: As written.
-        option: Of which.
+        option: Name of the option.
         example: How it is written right.
 
     Raises:
@@ -336,7 +336,7 @@ def read_lengths(texts: Sequence[str], name: str) -> list[float | NumberWithUnit
 
     Args:
         texts: As written, a unit perhaps by itself.
-        name: Of the argument.
+        name: Name of the argument.
 
     Raises:
         UsageError: Something is no number.

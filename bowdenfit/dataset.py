@@ -42,8 +42,8 @@ class Dataset(Display):
     """A description with its measurements.
 
     Args:
-        description: What was said about the cable.
-        measurements: What was measured on it.
+        description: Parsed cable.toml.
+        measurements: Tables of readings.
         sha256: Checksum of every file that was read, by file name.
         accounts: Where the rows of each of its tables and recordings went; empty where it was not read from files.
     """
@@ -203,7 +203,7 @@ def read_dataset(
         folder: Where its files are.
         sha256: Checksums of what has been read so far.
         channels: Channels of recordings named on the command line.
-        faults: What is wrong with the description.
+        faults: Faults of the description; raised with those of the tables.
 
     Raises:
         DatasetError: Tables are missing or wrong, or do not fit the description; says all that is wrong with each. Whether

@@ -24,7 +24,7 @@ class Contact:
     """A stretch where the rope is bent and rubs; see [[contact]] in docs/formats.md.
 
     Args:
-        name: Of the contact, such as "free sheath".
+        name: Name of the contact, such as "free sheath".
         friction: Name of its coefficient, such as "mu1"; contacts may share one.
         wrap_angle: Its wrap angle where that is the same all along the route, with the unit, such as (45, "deg").
         curve: Name of the curve that its wrap angle follows along the route, such as "gaussian".
@@ -64,7 +64,7 @@ class Cable(Display):
     `read` puts readings beside it; `bf.fit`, `bf.model` and all other functions take what it returns.
 
     Args:
-        name: Of the cable.
+        name: Name of the cable.
         contacts: Its contacts, in any order.
         settings: Tables and keys of cable.toml as dictionaries, such as route={"variable": "cable_length", "unit": "mm",
             "range": (430, 530)} or friction_model="load-dependent"; see docs/formats.md.

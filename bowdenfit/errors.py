@@ -154,7 +154,7 @@ def disk_error(path: Path, error: OSError) -> StoreError:
 
     Args:
         path: The file or folder.
-        error: What the system says.
+        error: Error of the system.
     """
     why = error.strerror or type(error).__name__
     if error.errno in _FULL:

@@ -32,7 +32,7 @@ def write_frame(frame: Any, folder: Path, name: str = FILE) -> Path:
     Args:
         frame: See `Frame`.
         folder: Where the file goes.
-        name: Of the file.
+        name: Name of the file.
 
     Raises:
         UsageError: The columns have several levels of names, or the units are no dictionary.

@@ -39,7 +39,7 @@ def refuse_special(path: Path, error: Callable[[str], BowdenfitError] = DatasetE
 
     Args:
         path: To be opened; links are followed.
-        error: What is raised.
+        error: Makes the error that is raised from a sentence.
 
     Raises:
         BowdenfitError: Of that type.
@@ -65,7 +65,7 @@ def damage_as(error: BowdenfitError) -> Iterator[None]:
     """Whatever a library stumbles over in a damaged file is that error: it may be of any kind, and say anything.
 
     Args:
-        error: What is raised instead; errors of ours, of the system and for want of memory stay what they are.
+        error: Error raised instead; errors of ours, of the system and for want of memory stay what they are.
     """
     try:
         yield
@@ -130,7 +130,7 @@ def read_toml_file(path: Path, remedy: str = "") -> tuple[str, dict[str, Any]]:
 
     Args:
         path: The file.
-        remedy: What to do where there is none.
+        remedy: Fix if there is none.
 
     Raises:
         DescriptionError: It is missing, cannot be read, or is no TOML that a person would write.

@@ -143,7 +143,7 @@ def refuse_named(reading: Reading, why: str, remedy: str) -> None:
     Args:
         reading: The keywords.
         why: Why they would not.
-        remedy: What to do.
+        remedy: Fix, as the end of the sentence.
 
     Raises:
         UsageError: Something is named.

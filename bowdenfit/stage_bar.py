@@ -26,7 +26,7 @@ class Watch:
 
     Args:
         kept: File in the results folder that lets it go on later; empty where nothing does.
-        remark: What is kept; the folder follows.
+        remark: Clause on what is saved; the folder follows.
         bar: Options of the progress bar.
         show: Moves the bar by what the function reports.
     """
@@ -42,7 +42,7 @@ class StageLine(logging.Handler):
 
     Args:
         bar: Writes the line.
-        watch: What the bar shows of a verb's progress; None if it has none.
+        watch: Bar and interrupts of a verb; None if it has none.
     """
 
     def __init__(self, bar: Any, watch: Watch | None) -> None:
@@ -80,7 +80,7 @@ def follow_stages(bar: Any, watch: Watch | None) -> Iterator[StageLine]:
 
     Args:
         bar: Writes the line.
-        watch: What the bar shows of a verb's progress; None if it has none.
+        watch: Bar and interrupts of a verb; None if it has none.
     """
     line, done, before = StageLine(bar, watch), threading.Event(), (LOGGER.level, LOGGER.propagate)
     clock = threading.Thread(target=copy_context().run, args=(_refresh, bar, done), daemon=True)
@@ -121,8 +121,8 @@ def show_progress_bar(watch: Watch | None, report: Report | None) -> Iterator[Re
     shows nothing, and neither does work inside of other that is shown.
 
     Args:
-        watch: What the bar shows; None for stages alone.
-        report: What the caller wants called; None if nothing.
+        watch: Bar and interrupts of a verb; None for stages alone.
+        report: Function of the caller; None if there is none.
     """
     if report is not None or not is_notebook() or any(isinstance(handler, StageLine) for handler in LOGGER.handlers):
         yield report

@@ -35,12 +35,12 @@ class Verb:
     """One verb of the command line and of notebooks.
 
     Args:
-        function: What notebooks call.
-        reply: What the command line prints, from the answer and the keywords it was asked with.
+        function: Function that notebooks call.
+        reply: Makes what the command line prints from the answer and its keywords.
         text: The verb's help, in lines of at most 80 characters. The list of verbs shows the first, which stands apart.
         name: On the command line; the function's if omitted.
-        json: What `--json` prints, in words; empty without that option.
-        csv: What `--csv` prints, in words; empty without that option.
+        json: Contents of `--json`, in words; empty without that option.
+        csv: Contents of `--csv`, in words; empty without that option.
         results: Folder in which results go unless `output` names another.
         watch: How it is interrupted; None if it is quick.
         warns: Whether a fit that is not to be trusted is said beside the answer, which then ends with `NOT_TRUSTED`.

@@ -108,7 +108,7 @@ def filled(text: str, indent: str = "", hangs: bool = False) -> str:
 
     Args:
         text: The paragraph.
-        indent: What stands before each line.
+        indent: Text before each line.
         hangs: Whether all lines but the first stand further in, as those of a list do.
     """
     hanging = indent + ("  " if hangs or text.startswith("- ") else "")

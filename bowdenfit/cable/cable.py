@@ -28,7 +28,7 @@ class Cable:
     """Contacts in series along one route.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         nominal: Wrap angle used in predictions for contacts measured row by row [rad], by contact name.
         friction: How friction depends on load and speed.
     """
@@ -248,7 +248,7 @@ def make_cable(description: Description, own_angles: Mapping[str, float], condit
     """Return the cable of a description.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         own_angles: Mean of the wrap angles that were measured with each reading [rad], by column.
         conditions: At what loads and speeds it was measured.
 

@@ -74,7 +74,7 @@ def make_conditions(
     """Return the reference force and speed as stated, or from the middle of the measurements.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         forces: Forces of both ends, wherever they are positive [N].
         tensions: Tensions of the rope that tables without these show, wherever they are positive [N].
         speeds: Speeds while the rope slides [mm/s or rad/s].

@@ -34,7 +34,7 @@ class Elasticity:
     """Stretch and preload of one cable; every function takes the values of its parameters [internal units].
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         law: Law of the contact that the rope as a whole is while it is stretched.
     """
 

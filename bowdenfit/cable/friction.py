@@ -20,7 +20,7 @@ class FrictionModel:
 
     Args:
         options: Names in `FRICTION_OPTIONS`.
-        conditions: What the measurements were made at.
+        conditions: Loads and speeds of the measurements.
     """
 
     options: tuple[str, ...]

@@ -106,7 +106,7 @@ class Known:
     Args:
         value: The value.
         sd: Its standard deviation.
-        draws: Of a fit that tells it, in place of a Normal distribution.
+        draws: Draws of the fit that determines it, in place of a Normal distribution.
         beside: Key of what those draws hold too, which is then to be taken from them.
     """
 

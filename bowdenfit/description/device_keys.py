@@ -15,7 +15,7 @@ class Key:
         meaning: In words.
         is_measured: Whether it is known by measuring, so that an answer needs its sd; others are set.
         may_be_zero: Whether 0 is possible.
-        remedy: What else tells it, as the end of a sentence.
+        remedy: Other source of the quantity, as the end of a sentence.
     """
 
     dimension: str

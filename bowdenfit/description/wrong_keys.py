@@ -29,11 +29,11 @@ def explain_validation_error(
     """Return all that is wrong with the keys of a file.
 
     Args:
-        error: What the model says.
+        error: Error raised by the model.
         raw: The plain data.
-        model: Of the file.
+        model: Model of the file.
         file: Its name.
-        remedy: What to do about a key that is missing.
+        remedy: Fix for a missing key.
     """
     faults: list[BowdenfitError] = []
     for number, cause in enumerate(_causes(error, raw, model)):

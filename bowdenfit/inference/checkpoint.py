@@ -29,7 +29,7 @@ def checkpoint_header(fingerprint: Mapping[str, Any]) -> bytes:
     """Return the first bytes of a checkpoint.
 
     Args:
-        fingerprint: What the run was started for, as plain data.
+        fingerprint: Data, settings and seed that identify the run, as plain data.
     """
     return _MARK + json.dumps(fingerprint).encode() + b"\n"
 

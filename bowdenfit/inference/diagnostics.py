@@ -80,7 +80,7 @@ def quantile_error(draws: ChainDraws, n_ensembles: int, probability: float) -> f
     Args:
         draws: Draws, one row a walker, ordered by ensemble.
         n_ensembles: Number of independent ensembles.
-        probability: Of the quantile, such as 0.05.
+        probability: Probability of the quantile, such as 0.05.
 
     References:
         Vehtari et al. 2021, "Rank-normalization, folding, and localization" (Bayesian Analysis 16), section 4.4.

@@ -109,8 +109,8 @@ def imply_groups(model: Model, z: np.ndarray, implied: DrawFunction, seed: int) 
     Args:
         model: The model.
         z: Draws, (chain, draw, parameter).
-        implied: Of `compile_replicator`.
-        seed: Of the draws from the prior.
+        implied: Program made by `compile_replicator`.
+        seed: Seed of the draws from the prior.
     """
     chains, draws, size = z.shape
     prior_z = np.random.default_rng([seed, 2]).standard_normal((PRIOR_DRAWS, size))

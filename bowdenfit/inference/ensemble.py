@@ -95,7 +95,7 @@ def sample(request: SamplingRequest, programs: WalkerPrograms, data: Any = None)
     """Sample with ensembles of walkers.
 
     Args:
-        request: What to sample, and for how long.
+        request: Posterior, start, settings and seed.
         programs: Compiled programs of the walkers.
         data: Data of the density; those of the posterior if omitted.
     """

@@ -131,7 +131,7 @@ def sample(request: SamplingRequest, program: Callable[..., Any]) -> Chain:
     """Sample with several chains of NUTS.
 
     Args:
-        request: What to sample, and for how long.
+        request: Posterior, start, settings and seed.
         program: The program of `compile_nuts`.
     """
     posterior, settings, seed = request.posterior, request.settings, request.seed

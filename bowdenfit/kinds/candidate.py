@@ -29,7 +29,7 @@ class Candidate:
         angles: Wrap angles [rad]: of the contacts measured row by row, in the order of their columns, or the total one.
         load: Load of the rope, or input force of a loop or of all readings of a run [N]; NaN where the kind has none, or of
             a run with the loads of those made so far.
-        stroke: Of all readings of a run, +1 pulling and -1 returning; 0 as in those made so far.
+        stroke: Stroke of all readings of a run, +1 pulling and -1 returning; 0 as in those made so far.
     """
 
     kind: str
@@ -57,7 +57,7 @@ class Situation:
 
     Args:
         cable: The cable.
-        measurements: What was measured so far, whose angles hold outside the range of the curves.
+        measurements: Measurements so far, whose angles hold outside the range of the curves.
         parameters: Names of the model's parameters.
     """
 

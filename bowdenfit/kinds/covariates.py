@@ -42,7 +42,7 @@ def collect_covariates(description: Description, measurements: Measurements, ter
     """Collect the covariates of a term's readings; their order where nothing else is known.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         measurements: Everything measured on it.
         term: One table of its model.
     """

@@ -41,9 +41,9 @@ class HeadedColumn:
     """A column or channel of numbers: its heading and range.
 
     Args:
-        name: What it is called.
+        name: Heading.
         unit: Unit that the file gives; empty without one.
-        mean, low, high: Of its values.
+        mean, low, high: Mean and range of its values.
         are_whole: Whether they are whole numbers.
         is_index: Whether it only counts the rows.
     """
@@ -85,7 +85,7 @@ def name_force_columns(
     Args:
         columns: Columns or channels of numbers.
         option: "--column" or "--channel".
-        stated: What the user has named already, by quantity.
+        stated: Columns that the user has named, by quantity.
         always: Whether forces are named that say themselves what they are.
         in_order: Whether the first of two unnamed forces is taken for the input, rather than the larger: over both strokes the
             output is the larger one on average.
@@ -138,7 +138,7 @@ class FitCommand:
 
     Args:
         text: The command, as it can be pasted.
-        provided: What it takes for granted, each as a clause.
+        provided: Assumptions of the command, each as a clause.
         names_more: Whether it names columns that the user has not.
     """
 
@@ -154,9 +154,9 @@ def make_table_command(
 
     Args:
         path: Its file.
-        table: What was read of it.
+        table: Cells and headings of the file.
         kind: Name of the kind of measurement.
-        stated: What the user has named already, by quantity.
+        stated: Columns that the user has named, by quantity.
         always: Whether columns are named that say themselves what they are.
     """
     headings = list(zip(table.header, table.units, strict=True))
@@ -189,7 +189,7 @@ def make_recording_command(
         path: Its file.
         columns: Its channels, without clocks.
         has_clock: Whether the file gives the time of its samples.
-        stated: What the user has named already, by quantity.
+        stated: Channels that the user has named, by quantity.
         always: Whether channels are named that say themselves what they are.
         doubtful_clock: Name of a clock that says no unit and is unlikely to be in seconds; empty if there is none.
         angle: The wrap angle, and what says it; what the file states in a line or in its name if omitted.

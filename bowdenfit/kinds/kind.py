@@ -53,7 +53,7 @@ class Readings:
     Args:
         name: Name in results, which is the term's.
         table: The table they stand in, as in "the table of forces".
-        words: What they are, as in "the readings of force runs".
+        words: Name of the readings in sentences, as in "the readings of force runs".
         one: One of them, with its label in place of the braces.
         axis: Label of an axis that shows them.
         scatter_unit: Unit in which their residual standard deviation is said; empty where it is not.
@@ -89,7 +89,7 @@ class Kind(ABC, Generic[AnyTable]):
     """A kind of measurement; what a subclass must give is abstract here.
 
     Attributes:
-        settings: What may stand under its name in [tables].
+        settings: Model of the settings under its name in [tables].
         heading: Heading over the lines of `describe`, where they are a section of their own.
         methods_sentence: How its readings are modeled, in a sentence of a paper.
         takes_channels: Whether its files are recordings, whose channels can be named on the command line.
@@ -149,7 +149,7 @@ class Kind(ABC, Generic[AnyTable]):
         """Return what is contradictory in a description, in a sentence without its full stop; empty if nothing is.
 
         Args:
-            settings: What stands under [tables]; None where there is no such table.
+            settings: Settings under [tables]; None without such a table.
             description: The whole description.
         """
         return ""

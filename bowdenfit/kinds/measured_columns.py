@@ -40,10 +40,10 @@ class MeasuredColumn:
     """Readings of one quantity in a table.
 
     Args:
-        name: What its column is called.
+        name: Heading of the column.
         unit: Unit of the readings.
         values: The readings; NaN where nothing was measured.
-        along: What they change smoothly with, such as a length; None for forces.
+        along: Quantity that they change smoothly with, such as a length; None for forces.
         other_end: Forces at the other end of the rope, to which these are proportional within a group; None for others.
         group: Run and stroke of each reading, for forces.
     """

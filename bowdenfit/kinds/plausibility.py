@@ -58,7 +58,7 @@ def choose_unused_columns(unused: Mapping[str, np.ndarray], *readings: Vector) -
 
     Args:
         unused: Numbers or texts of columns that nothing reads, by heading.
-        readings: What was read in the rows, and what people calculate from it.
+        readings: Readings in the rows, and quantities that people calculate from them.
     """
     chosen = dict[str, UnusedColumn]()
     for heading, values in unused.items():
@@ -87,7 +87,7 @@ def explain_impossible_loss(loss: np.ndarray, what: str) -> str:
 
     Args:
         loss: Friction exponents [1].
-        what: What has them.
+        what: Subject of the sentence.
     """
     if np.any(loss > _LARGEST_LOSS):
         return f"{what} is below 20 %"
@@ -109,12 +109,12 @@ class ComparedReadings:
     """Readings of a table, prepared for comparison with each other.
 
     Args:
-        file: What the table is called.
+        file: Name of the table.
         part: Number of the run of each row.
         names: Every run in words, such as "run 3"; none where the table has no runs.
         settings: Under what each row was read, a column a quantity; NaN where one is not known.
-        read: What was read, a column a quantity; NaN where nothing was.
-        along: What the readings change smoothly with.
+        read: Readings, one column per quantity; NaN if missing.
+        along: Quantity that the readings change smoothly with.
         curve: Number of the curve on which a row lies: those of one run and stroke.
         origin: Where its rows were read; None where that is not known.
     """
@@ -311,8 +311,8 @@ class CoarseReadings:
     """Resolution of a table whose repeated readings are equal to the last digit.
 
     Args:
-        file: What the table is called.
-        last_digit: Of its readings, with their unit.
+        file: Name of the table.
+        last_digit: Last digit of its readings, with their unit.
         sd: Standard deviation that it gives a reading, in the same.
         different: Number of readings that do not repeat another.
         log_sd: Standard deviation that the last digit gives the logarithm of a reading, on average of these.
@@ -331,9 +331,9 @@ def find_coarse_readings(
     """Return the resolution of a table whose repeated readings are all alike; None for any other.
 
     Args:
-        file: What the table is called.
+        file: Name of the table.
         settings: Under what each row was read, but for the mounting; NaN where one is not known.
-        read: What was read; readings of 0 and below are not looked at, as their logarithms are not.
+        read: Readings; those of 0 and below are left out, as they have no logarithm.
         unit: Its unit.
     """
     if not np.all(read > 0):

@@ -212,7 +212,7 @@ def unify_labels(labels: Sequence[str], places: Sequence[str], column: str) -> l
     """Return labels with whole numbers that are written differently, such as 7, 7.0 and +7, as they are written first.
 
     Args:
-        labels: What stands in each place.
+        labels: Label in each place.
         places: Each in words.
         column: File and column that all of them are in.
 

@@ -49,7 +49,7 @@ def split_runs(term: Term, unit: LeaveOut) -> RunParts | None:
 
     Args:
         term: A term of the model.
-        unit: What a part is.
+        unit: Unit of a part.
 
     Raises:
         UsageError: There are too many parts.

@@ -273,7 +273,7 @@ def pad_cells(data: dict[str, Any], runs: int, cells_per_run: int) -> dict[str, 
     """Return the same sums with more cells for each run, which have no weight.
 
     Args:
-        data: What `sum_runs` gave.
+        data: Sums made by `sum_runs`.
         runs: Number of runs.
         cells_per_run: Number of cells for each.
     """

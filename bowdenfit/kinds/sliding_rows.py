@@ -84,7 +84,7 @@ class ExpectedForces:
 
     Args:
         input_force, output_force: Forces [N].
-        log_ratio_error: What noise adds to log(F_in/F_out) on average [1].
+        log_ratio_error: Mean error of log(F_in/F_out) due to noise [1].
     """
 
     input_force: Vector

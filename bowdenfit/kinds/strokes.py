@@ -46,7 +46,7 @@ def read_strokes(columns: Mapping[str, Column], n_rows: int, held: str = _HELD) 
     Args:
         columns: Columns of the table.
         n_rows: Number of its rows.
-        held: What a refusal says of held readings; empty where the table may have none.
+        held: Clause about held readings for a refusal; empty if the table may have none.
     """
     if "stroke" not in columns:
         return np.ones(n_rows, dtype=int)
@@ -114,7 +114,7 @@ def read_stroke(cell: Cell, held: str = _HELD, strokes: Mapping[str, int] = _STR
 
     Args:
         cell: The cell.
-        held: What a refusal says of held readings.
+        held: Clause about held readings for a refusal.
         strokes: Known words, and the stroke of each.
     """
     word = _plain_word(cell)

@@ -25,7 +25,7 @@ class Source:
 
     Args:
         kind: Name of its kind.
-        settings: What stands under that name in [tables].
+        settings: Settings under that name in [tables].
         description: The whole description.
         folder: Where the files are.
         channels: Channels named on the command line.
@@ -87,7 +87,7 @@ class Source:
 
         Args:
             path: The file.
-            wanted: What to look for.
+            wanted: Quantities to look for.
             unused: Names that the user may give a column although nothing reads it.
 
         Raises:
@@ -110,7 +110,7 @@ class TableFromFiles(Generic[AnyTable]):
     Args:
         table: The table.
         files: The files it was read from, by name.
-        remarks: What had to be assumed, in sentences.
+        remarks: Assumptions that were made, in sentences.
         accounts: How many rows of each file were read, and why the others were not.
     """
 
@@ -125,7 +125,7 @@ class WantedColumn:
     """A column of a table.
 
     Args:
-        quantity: What it holds.
+        quantity: Quantity in the column.
         words: The same for people, such as "the force at the motor".
         also: Quantities that do instead.
         optional: Whether a table can be without it.
@@ -166,7 +166,7 @@ class InitQuestions:
     """How files of a kind are recognized, and what is asked about them.
 
     Args:
-        holds: What such a file holds, for people.
+        holds: Contents of such a file, in words.
         columns: Its columns but for lengths and wrap angles of contacts.
         yes_no: Questions beside those for its columns.
         by_length: Whether its columns are the wrap angles of contacts at several lengths.

@@ -22,7 +22,7 @@ class Measurements(Display):
 
     Args:
         tables: At most one of a class.
-        remarks: What had to be assumed.
+        remarks: Assumptions that were made, in sentences.
     """
 
     tables: tuple[Any, ...] = ()

@@ -158,7 +158,7 @@ def draw_readings(
 
     Args:
         cable: The cable.
-        tables: What is measured again.
+        tables: Measurements to draw again.
         values: True values [internal units].
         key: Random key.
         scale: Factor on all noise.

@@ -23,7 +23,7 @@ class Scale:
 
     Args:
         value: Size in internal units, above 0.
-        name: What it is, such as "median load".
+        name: Name of the size, such as "median load".
         unit: Unit in which it is shown.
     """
 

@@ -114,7 +114,7 @@ def stiffness_with_springs(
     with the n = 2 ropes of a taut loop side by side, which both give; in torques, both sides times :math:`r^2`.
 
     Args:
-        stiffness: Of the cable, all ropes together [N/mm].
+        stiffness: Stiffness of the cable, all ropes together [N/mm].
         spring: k_spring, of each of the springs [N/mm].
         sides: n, ropes that are taut, 1 or 2.
 

@@ -168,7 +168,7 @@ def compute_along_route(model: Model, program: DrawFunction, z: np.ndarray, moun
 
     Args:
         model: The model.
-        program: Of `compile_along_route`.
+        program: Program made by `compile_along_route`.
         z: Draws, one a row.
         mounting: Effect of a new mounting on the friction exponent of each.
     """
@@ -191,7 +191,7 @@ def draw_new_mounting(description: Description, values: dict[str, np.ndarray], n
         description: How readings scatter.
         values: Draws by parameter.
         n: Their number.
-        seed: Of the fit.
+        seed: Seed of the fit.
     """
     scatter = values.get(RUN_SCATTER, np.zeros(1)).ravel()
     return scatter * noise_law(description).draw_with(np.random.default_rng([seed, 3]), n)
@@ -203,7 +203,7 @@ def summarize_optimum(
     """Return the best length with its uncertainty.
 
     Args:
-        route: What can be chosen.
+        route: Range of the route and the choices on it.
         lengths: Optimum of every draw.
         efficiencies: Efficiency there.
         along: The same draws along the route.

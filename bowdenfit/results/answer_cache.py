@@ -120,7 +120,7 @@ def write_captions(captions: Mapping[str, str], folder: Path, order: Iterable[st
     Args:
         captions: By figure.
         folder: Where the figures are.
-        order: Of figures; others follow.
+        order: Names of figures in the order of their captions; others follow.
     """
     path = folder / CAPTIONS
     existing = _read_captions(folder).split("\n\n")
@@ -142,7 +142,7 @@ def record_drawn_figures(folder: Path, captions: Mapping[str, str]) -> None:
 
     Args:
         folder: The results folder, whose figures have all been drawn.
-        captions: Of each figure, by its name.
+        captions: Caption of each figure, by its name.
     """
     files = {path.name: file_checksum(path) for path in (folder / FIGURES).iterdir() if path.stem in captions}
     add_answer(folder, _DRAWN, {"with": installed_version("matplotlib"), "captions": dict(captions), "files": files})
@@ -179,7 +179,7 @@ def captions_if_unchanged(folder: Path, names: Collection[str], endings: Collect
 
     Args:
         folder: The results folder.
-        names: Of those asked for; all if empty.
+        names: Names of the requested figures; all if empty.
         endings: In which formats.
     """
     page: dict[str, Any] = read_answers(folder).get(_DRAWN, {})

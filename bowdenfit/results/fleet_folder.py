@@ -32,16 +32,16 @@ class FleetDraws:
     """Draws of all inspections that were fitted, in the order of cables and cycles.
 
     Args:
-        label: Of each inspection; no two are alike.
+        label: Label of each inspection; no two are alike.
         cable: Name of its cable.
         cycles: That the cable had made; NaN where that is not known.
         temperature: [°C]; NaN where it is not known.
         lubricated: 1 if it was, 0 if not, NaN where that is not known.
         values: Draws of equal weight by parameter in shown units, (inspection, draw); NaN where an inspection has no such
             parameter.
-        stats: Of each inspection by name: the engine that drew, Pareto k, whether it may be trusted.
-        attributes: Of each parameter: unit, symbol, meaning, role and prior.
-        about: Of the fleet: its name, seed and versions.
+        stats: Statistics of each inspection by name: the engine that drew, Pareto k, whether it may be trusted.
+        attributes: Unit, symbol, meaning, role and prior of each parameter.
+        about: Name, seed and versions of the fleet.
     """
 
     label: tuple[str, ...]

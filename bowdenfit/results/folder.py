@@ -90,7 +90,7 @@ def holds_only_run_files(folder: Path, names: Collection[str]) -> bool:
 
     Args:
         folder: The folder, which may be missing.
-        names: Of the files and folders that such a run writes.
+        names: Names of the files and folders that such a run writes.
     """
     inside = _contents(folder) if folder.is_dir() else ()
     return all(path.name in names or path.suffix == ".md" or _is_partial(path) for path in inside)
@@ -101,8 +101,8 @@ def remove_run_files(folder: Path, files: Iterable[str], folders: Iterable[str])
 
     Args:
         folder: The folder, which nobody writes into meanwhile; it may be missing.
-        files: Of such a run by name, first the one that says that it has finished.
-        folders: Of such a run by name.
+        files: Names of the files of such a run, first the one that says that it has finished.
+        folders: Names of the folders of such a run.
     """
     for name in files:
         (folder / name).unlink(missing_ok=True)

@@ -167,7 +167,7 @@ def own_member(group: h5py.Group, name: str) -> Any:
     """Return a member of a group that lies in this very file and is not larger than it.
 
     Args:
-        group: Of an open file.
+        group: Group of an open file.
         name: The name.
 
     Raises:

@@ -110,7 +110,7 @@ class OptimalLength(Display):
         efficiency: Efficiency there.
         at_edge: Share of draws whose optimum lies at an end of the range.
         window: Route values that are good enough.
-        choices: What can be bought, in the order of the description.
+        choices: Available lengths, in the order of the description.
         at_input_force: Input force at which the efficiency holds [N]; None where it is the same at any.
     """
 

@@ -33,7 +33,7 @@ class PredictionAngles:
 
     Args:
         rows: Route values and own angles, as of rows of a table.
-        seed: Of the errors.
+        seed: Seed of the errors.
         notes: Stated angles at each route value, in words; empty without any.
         outside: That a route value lies outside the curves, and what serves there, in words; empty inside.
     """
@@ -90,7 +90,7 @@ def choose_angles(
         route: Route values.
         stated: Stated wrap angles [rad], by number of the contact: one that holds at all route values, or one for each, NaN
             where the contact keeps its own.
-        seed: Of the errors of measured angles.
+        seed: Seed of the errors of measured angles.
         bent: Number of a contact that takes other wrap angles than these, so that none is needed; None without one.
 
     Raises:

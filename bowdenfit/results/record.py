@@ -44,18 +44,18 @@ class Draws(Display):
         z: In the coordinates of the sampler, with parameters last.
         values: Parameters and derived curve coefficients, in shown units.
         optimum: Optimal length and efficiency; empty without a route.
-        log_likelihood: Of every reading, by table, readings last.
+        log_likelihood: Log likelihood of every reading, by table, readings last.
         expected: Expected readings.
         replicated: Readings drawn anew.
         prior: Draws of the parameters from the prior, one row.
-        diagnostics: Of parameters and optimum.
+        diagnostics: Diagnostics of parameters and optimum.
         n_ensembles: Number of independent ensembles.
         steps: Steps of every walker; of NUTS, without warm-up.
         acceptance: Mean fraction of accepted proposals; of NUTS, mean acceptance along trajectories.
         sampler: "emcee" or "nuts", whose chains are ensembles of one walker each.
         trajectories: How the trajectories of NUTS went.
         agreement: Whether a second sampler agrees, where one was asked.
-        units: Of values and optimum by name, where a fit gives them.
+        units: Units of values and optimum by name, where a fit gives them.
     """
 
     z: np.ndarray
@@ -108,7 +108,7 @@ class Provenance(Display):
 
     Args:
         seed: Random seed.
-        versions: Of bowdenfit, Python and the libraries that computed.
+        versions: Versions of bowdenfit, Python and the libraries that computed.
         stage_times: Seconds by stage.
         created: Date and time, UTC.
     """
@@ -132,7 +132,7 @@ class DrawPrograms:
 
     Args:
         values: Named values in shown units.
-        quantities: What z implies for every reading; see `compile_replicator`.
+        quantities: Program for the readings that z implies; see `compile_replicator`.
         along_route: See `compile_along_route`; None without a route.
     """
 
@@ -146,13 +146,13 @@ class Record(Display):
     """A finished fit of one data set; every question is a function of it.
 
     Args:
-        dataset: What was fitted.
+        dataset: Data set that was fitted.
         least_squares: Classical estimates.
         sampled: Draws, or None where only least squares was asked for.
         converged: Whether the sampler (or, without it, least squares) converged.
         reasons: Why not.
         provenance: Seed, versions, times.
-        programs: What sampling compiled; None of a fit that was read back, or made without MCMC.
+        programs: Programs compiled for sampling; None for a fit that was read back, or made without MCMC.
     """
 
     dataset: Dataset

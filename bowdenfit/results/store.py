@@ -60,7 +60,7 @@ def save(
         folder: Where to; made if missing.
         force: Whether a finished fit there may be replaced.
         answers: Plain data by question, from which they are answered again.
-        figures: What figures show, by their names; they are drawn again from it.
+        figures: Data of figures by name, from which they are drawn again.
 
     Raises:
         StoreError: The folder holds a finished fit already, or cannot be written.

@@ -65,8 +65,8 @@ def fit_classically(data: Dataset, seed: int) -> Fit:
     """Fit by least squares alone, without a posterior.
 
     Args:
-        data: What is fitted.
-        seed: Of everything random, for the record.
+        data: Data set to fit.
+        seed: Random seed, for the record.
     """
     watch, density = Stopwatch(), LogDensity(build_model(data))
     objective, start = find_maximum(density, watch)
@@ -88,8 +88,8 @@ def fit_posterior(
     Sampling needs only the start from least squares, which is worked out in a thread while XLA compiles what samples.
 
     Args:
-        data: What is fitted.
-        seed: Of everything random.
+        data: Data set to fit.
+        seed: Random seed.
         start_checkpoint: Called before the first draw; returns the checkpoint.
         resume: Whether the checkpoint holds draws to go on from.
         report: Called after every block of draws with where sampling stands.
@@ -160,7 +160,7 @@ class Programs:
     """Compiled programs for sampling and what follows it.
 
     Args:
-        samplers: What each sampler runs, by its name.
+        samplers: Compiled program of each sampler, by its name.
         optimum: Optimal length and efficiency of many z; None without a route.
         draw_programs: Programs that questions will need.
     """

@@ -63,7 +63,7 @@ def shape_dataset(dataset: Dataset, spare: bool = False) -> ShapedDataset:
     """Return a data set with the scales of its priors as data.
 
     Args:
-        dataset: What was measured.
+        dataset: Data set with its measurements.
         spare: Whether its data have room for more mountings, so that the program serves them too.
     """
     model = build_model(dataset)

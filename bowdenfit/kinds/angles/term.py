@@ -141,7 +141,7 @@ def draw_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> di
 
     Args:
         table: The table.
-        truth: What it is measured with.
+        truth: True values and random key.
         everywhere: Whether rows outside the range of the curves are drawn too; else they are kept.
     """
     cable, key, route = truth.cable, jax.random.split(truth.key, 3)[0], jnp.asarray(table.route)

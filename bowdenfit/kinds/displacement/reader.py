@@ -199,7 +199,7 @@ def _choose_rows(table: DisplacementTable, settings: Any, has_strokes: bool) -> 
 
     Args:
         table: All rows.
-        settings: What stands under the table in cable.toml.
+        settings: Settings of the table in cable.toml.
         has_strokes: Whether it has a column stroke.
 
     Raises:

@@ -69,7 +69,7 @@ def follow_motor(displacement: Vector, run: Labels) -> StrokeHistory:
     remembered, and forgotten in pairs once the displacement has passed the one before, as friction between solids has it.
 
     Args:
-        displacement: Of each reading [mm].
+        displacement: Displacement of each reading [mm].
         run: Number of its run.
     """
     n, memory = len(displacement), _Memory()

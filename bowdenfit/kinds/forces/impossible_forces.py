@@ -81,7 +81,7 @@ def flag_gains(excess: Vector, readings: LogGains, stated: float | None) -> tupl
     """Flag rows whose gain noise does not explain, and rows of cells, or of the table, whose mean gain it does not.
 
     Args:
-        excess: What each reading gains beyond what load cells explain [1].
+        excess: Gain of each reading beyond what load cells explain [1].
         readings: All sliding readings of a table.
         stated: Noise of a force reading as stated [N], 1 where the weights have it; None where scatter estimates it.
     """

@@ -45,7 +45,7 @@ def find_mountings(
     """Return the mounting of each row and the name of each mounting: a label at one length and one bend, in one group.
 
     Args:
-        labels: What the table calls the run of each row.
+        labels: Label of the run of each row, as the table has it.
         group: Group of each row; empty without groups.
         route: Route variable; NaN where the cable has no route.
         own: Wrap angles measured with the row.

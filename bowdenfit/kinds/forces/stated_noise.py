@@ -79,7 +79,7 @@ def remark_on_large_sds(file: str, sd: Matrix | None, forces: Matrix) -> list[st
 
     Args:
         file: Name of the file.
-        sd, forces: Of the input and the output, row by row [N].
+        sd, forces: Standard deviations and forces at input and output, row by row [N].
     """
     large = 0 if sd is None else int(np.sum(np.any(sd > _LARGE * forces, axis=1)))
     if not large:

@@ -158,7 +158,7 @@ def make_sliding_rows(
     """Return some rows of a table, with the forces that the readings of each run together estimate.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         table: The table.
         rows: Wrap angles of all its rows.
         used: Numbers of the rows.
@@ -190,10 +190,10 @@ def _expect_forces(
     weighed by what all such readings say, so that one whose output noise makes larger does not count for more.
 
     Args:
-        description: What was said about the cable.
+        description: Parsed cable.toml.
         table: The table.
         used: Numbers of its rows.
-        keys: Of each the run, then what else is the same for readings that are looked at together.
+        keys: Run of each reading, then whatever is the same for readings that are taken together.
     """
     sensors, runs = description.sensors, table.run[used]
     single = np.bincount(runs)[runs] == 1

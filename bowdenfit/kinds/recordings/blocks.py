@@ -210,7 +210,7 @@ class BlockGroups:
         """Return the arrays that every likelihood of blocks takes, without their weight.
 
         Args:
-            drive: What the recording is of.
+            drive: Class of the cable: a rope, or a loop.
             usable: Blocks that are readings.
             censored: Whether a saturated output counts as one beyond the end of the range.
             counts_turns: Whether each block of a standing phase counts, and not all of them together as one reading.

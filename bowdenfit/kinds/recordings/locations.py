@@ -67,7 +67,7 @@ def locate_by_channels(
     Args:
         description: The cable.
         file: The rows of the recording.
-        entry: What is said of it.
+        entry: Entry of the recording in cable.toml.
         sources: Channels that the user names.
 
     Raises:

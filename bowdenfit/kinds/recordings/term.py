@@ -282,7 +282,7 @@ def draw_recordings(recordings: Recordings, truth: Truth) -> dict[str, jax.Array
 
     Args:
         recordings: The recordings as measured.
-        truth: What they are measured with.
+        truth: True values and random key.
     """
     cable, values, scale = truth.cable, truth.values, truth.scale
     of_run, of_angles, of_input, of_output = jax.random.split(jax.random.fold_in(truth.key, 4), 4)
@@ -356,7 +356,7 @@ def replace_forces(description: Description, recordings: Recordings, readings: M
     Args:
         description: The cable.
         recordings: The recordings as measured.
-        readings: What was drawn.
+        readings: Arrays drawn by `draw_recordings`.
 
     Raises:
         DatasetError: Strokes cannot be found.

@@ -152,7 +152,7 @@ class BlocksTerm(ABC):
         Args:
             data: Arrays of the term.
             weights: Values of the parameters that make the weights.
-            deviation: Of the blocks, without mounting effects.
+            deviation: Deviations of the blocks, without mounting effects.
             loading: Change of the operator's output with the friction exponent.
             of_angles: Variance of each recording's friction exponent by its wrap angles.
         """

@@ -86,7 +86,7 @@ def load_folder_or_file(
         join: File of a second logger with the output force.
 
     Raises:
-        DescriptionError, DatasetError: What is wrong, in a sentence.
+        DescriptionError, DatasetError: The fault, in a sentence.
     """
     refuse_special(path)
     channel_sources, column_sources = parse_channels(channels), parse_sources(columns, "--column")

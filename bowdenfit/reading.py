@@ -90,7 +90,7 @@ def read(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **re
         reading: See `Reading`; `wrap_angle` is a number and its unit, needed where the rows of a lone file have none.
 
     Raises:
-        DescriptionError, DatasetError: What is wrong, in a sentence.
+        DescriptionError, DatasetError: The fault, in a sentence.
         UsageError: There is no such keyword, it comes too late for a data set that has been read, or there is no data set.
     """
     from bowdenfit.dataset import Dataset, load_folder_or_file  # here, because --help lists `Reading` without NumPy

@@ -17,7 +17,7 @@ def show_table_links(workbench: Workbench, name: str) -> None:
 
     Args:
         workbench: Where it lies.
-        name: Of the data set.
+        name: Name of the data set.
     """
     for table in list_tables(workbench.data_set(name)):
         link(f"Add rows to {table}", address("table", name, file=table), "button")
@@ -28,8 +28,8 @@ class AddRowsPage:
 
     Args:
         workbench: Where its data set lies.
-        name: Of the data set.
-        file: Of the table, as seen from the data set.
+        name: Name of the data set.
+        file: File of the table, as seen from the data set.
 
     Raises:
         UsageError, DatasetError, StoreError: See `open_table`.

@@ -121,7 +121,7 @@ def show_next(workbench: Workbench, fit: "Fit", name: str) -> None:
     Args:
         workbench: Which works it out.
         fit: The fit.
-        name: Of the fit.
+        name: Name of the fit.
     """
 
     async def rank() -> None:

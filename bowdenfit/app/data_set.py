@@ -30,7 +30,7 @@ class DataSetPage:
 
     Args:
         workbench: Where it lies.
-        name: Of the data set.
+        name: Name of the data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:

@@ -54,7 +54,7 @@ class UnderstoodColumn:
     """A column of a file as it is understood.
 
     Args:
-        heading: What stands over it.
+        heading: Heading of the column.
         unit: Its unit; empty where the file does not say it.
         meaning: The quantity that it is read as; empty where it is not read.
         first, last: What stands in its first and last row.

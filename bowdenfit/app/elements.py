@@ -79,7 +79,7 @@ def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
 
     Args:
         label: What is asked.
-        key: Of the control.
+        key: Key of the control.
         hint: Below it.
         fault: Why what it holds cannot be taken.
     """
@@ -109,7 +109,7 @@ def choice(
     """Return a menu.
 
     Args:
-        key: Of the control.
+        key: Key of the control.
         value: What is chosen.
         options: Values with their words.
         on_change: Called with what is chosen.

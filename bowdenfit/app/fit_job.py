@@ -21,7 +21,7 @@ class FitRequest:
     Args:
         dataset: The data set.
         output: Its results folder.
-        seed: Of everything random; None for one that is drawn, and recorded.
+        seed: Random seed; None for one that is drawn, and recorded.
         mcmc: Whether the posterior is sampled.
         resume: Whether an interrupted fit goes on.
         force: Whether an earlier fit in the folder is replaced.

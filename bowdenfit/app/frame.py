@@ -30,7 +30,7 @@ def frame(title: str, above: Sequence[tuple[str, str]] = ()) -> Iterator[None]:
     """Put what is inside below the navigation and the title of a page.
 
     Args:
-        title: Of the page.
+        title: Title of the page.
         above: Pages on the way to it, as (words, address).
     """
     ui.page_title(f"{title} - {NAME}" if title != NAME else NAME)

@@ -69,7 +69,7 @@ class LivePage:
 
     Args:
         workbench: Where it lies.
-        name: Of the data set.
+        name: Name of the data set.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:

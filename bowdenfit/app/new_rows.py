@@ -45,11 +45,11 @@ class OpenTable:
 
     Args:
         folder: The data set.
-        name: Of the file, as seen from the folder.
+        name: Name of the file, as seen from the folder.
         content: All its bytes.
-        encoding: Of its text.
+        encoding: Encoding of its text.
         separator: What stands between its columns.
-        headings: What stands over each column.
+        headings: Heading of each column.
         rows: Its rows of readings, as text.
         last_row: Number of the last of them in the file.
         insert_at: Where the next row goes [bytes].
@@ -168,7 +168,7 @@ def open_table(folder: Path, name: str) -> OpenTable:
 
     Args:
         folder: The data set.
-        name: Of the file, as seen from the folder.
+        name: Name of the file, as seen from the folder.
 
     Raises:
         UsageError: The data set has no such table in its folder, or it is not one whose rows are lines below one row of

@@ -32,7 +32,7 @@ class FitPage:
 
     Args:
         workbench: Where the fit is.
-        name: Of the fit.
+        name: Name of the fit.
     """
 
     def __init__(self, workbench: Workbench, name: str) -> None:

@@ -15,7 +15,7 @@ class TwoFitsPage:
 
     Args:
         workbench: Where the fits are.
-        names: Of the two; the first two that there are for those that are not.
+        names: Names of the two; the first two that there are for those that are not.
     """
 
     def __init__(self, workbench: Workbench, names: tuple[str, str]) -> None:

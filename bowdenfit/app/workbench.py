@@ -42,7 +42,7 @@ class KeptFit:
     """A fit in the folder.
 
     Args:
-        name: Of its folder.
+        name: Name of its folder.
         finished: Whether it has its answer; else it was interrupted.
     """
 
@@ -114,7 +114,7 @@ class Workbench:
 
         Args:
             fit: The fit.
-            name: Of the fit, which decides between data sets with the same description.
+            name: Name of the fit, which decides between data sets with the same description.
         """
         checksum = fit.dataset.sha256.get(DESCRIPTION_FILE)
         names = [one for one in self.data_sets() if _checksum(self.data_set(one) / DESCRIPTION_FILE) == checksum]
@@ -147,9 +147,9 @@ class Workbench:
         """Start a fit, or go on with one.
 
         Args:
-            name: Of the fit.
+            name: Name of the fit.
             data_set: Which.
-            seed: Of everything random.
+            seed: Random seed.
             resume: Whether an interrupted fit goes on.
             force: Whether an earlier one is replaced.
 

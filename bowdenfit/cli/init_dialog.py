@@ -95,7 +95,7 @@ def start_data_set(
         folder: The folder to write; asked for if None.
         files: Measured files.
         example: Name of an example, and its folder; all are listed if empty. None for no example.
-        reading: What the user says of a file by the options of `fit`; nothing is then asked.
+        reading: Options of `fit` that describe the file; nothing is then asked.
         notebook: Whether a notebook is written beside an example.
     """
     if notebook and not example:

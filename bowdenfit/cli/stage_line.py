@@ -17,7 +17,7 @@ def show_stages(watch: Watch | None) -> Iterator[Report]:
     """Yield what a verb calls with its progress; on a terminal, show that and the stages that are announced meanwhile.
 
     Args:
-        watch: What the bar shows of a verb's progress; None if it has none.
+        watch: Bar and interrupts of a verb; None if it has none.
     """
     if not sys.stderr.isatty() or LOGGER.isEnabledFor(logging.INFO):  # nobody looks, or --verbose prints them
         yield lambda *_: None

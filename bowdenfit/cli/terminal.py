@@ -14,7 +14,7 @@ def say(text: str, err: bool = False, nl: bool = True) -> None:
     """Print to standard output, or to standard error.
 
     Args:
-        text: What is said.
+        text: Text to print.
         err: Whether it goes to standard error.
         nl: Whether the line ends after it.
 
@@ -44,8 +44,8 @@ def can_show(text: str, encoding: str | None) -> bool:
     """Whether a terminal of an encoding can show a text; one of the locale C says that it has no more than ASCII.
 
     Args:
-        text: What is to be shown.
-        encoding: What the stream is written in.
+        text: Text to show.
+        encoding: Encoding of the stream.
     """
     if os.environ.get("LC_ALL") in {"C", "POSIX"}:
         return text.isascii()

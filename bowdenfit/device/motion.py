@@ -31,7 +31,7 @@ class Controller:
         active_zone: Speed below which the gains act, and F_cst does not [rad/s]; infinite for always, 0 for never.
         count: Angle of one count of the encoder [rad].
         filter_time: Time constant of the filter of the speed [s].
-        largest_torque: Of the motor [N m].
+        largest_torque: Largest torque of the motor [N m].
     """
 
     coulomb: Numbers
@@ -53,7 +53,7 @@ class ControllerMemory:
     Args:
         counted: Angle that the encoder showed [rad].
         speed: Filtered [rad/s].
-        integral: Of the torque at the joint [N m s].
+        integral: Integral of the torque at the joint [N m s].
         command: Torque for the motor, which acts a sample later [N m].
     """
 
@@ -76,8 +76,8 @@ def step_controller(
 
     Args:
         control: The controller.
-        memory: What it kept.
-        angle: Of the joint.
+        memory: State from the sample before.
+        angle: Angle of the joint.
         torque: T_j as its sensor shows it.
         sample: T_s [s].
     """
@@ -124,9 +124,9 @@ class DeviceRuns:
         motor_torque: T_m that the rope takes from the motor [N m].
         joint_torque: T_j that it gives the joint [N m].
         hand_torque: T_h [N m].
-        command: What the motor gave [N m].
-        speed: Of the joint [rad/s].
-        angle: Of the joint [rad].
+        command: Torque of the motor [N m].
+        speed: Speed of the joint [rad/s].
+        angle: Angle of the joint [rad].
     """
 
     time: np.ndarray
@@ -157,9 +157,9 @@ def simulate_device(
         path: Angle and speed of the hand's path at every sample [rad], [rad/s].
         start: Where it is at first; at rest if omitted.
         sample: T_s [s].
-        step: Of the plant, about; a sample is a whole number of them [s].
-        noise: Of the torque sensor, one standard deviation [N m].
-        seed: Of that noise.
+        step: Step of the plant, about; a sample is a whole number of them [s].
+        noise: Noise of the torque sensor, one standard deviation [N m].
+        seed: Seed of that noise.
     """
     with jax.enable_x64(True):
         first = start or Motion.at_rest(jnp.zeros(()))
@@ -235,7 +235,7 @@ class TransmittedTorque:
         mean: Torque at the joint against the motion, where it is faster than the dead zone [N m].
         peak: The largest, which is felt when the motion turns round [N m].
         correlation: Between the torques at the motor and at the joint [1]; 0 where one of them does not change.
-        jumps: Of the motor's command in a second [1/s], beyond the two at each turn.
+        jumps: Jumps of the motor's command in a second [1/s], beyond the two at each turn.
     """
 
     mean: np.ndarray

@@ -154,10 +154,10 @@ def advance(plant: Plant, motion: Motion, motor_torque: Numbers, joint_torque: N
     """Advance by one step of semi-implicit Euler; dry friction is a proximal step, so that it can hold the device still.
 
     Args:
-        plant: What moves.
+        plant: The moving parts.
         motion: Where it is; settled.
-        motor_torque: Of the motor [N m].
-        joint_torque: Of the hand [N m].
+        motor_torque: Torque of the motor [N m].
+        joint_torque: Torque of the hand [N m].
         step: h [s].
     """
     at_motor, at_joint = rope_torques(plant, motion)
@@ -196,7 +196,7 @@ def draw_device(known: Mapping[str, Known], n: int, seed: int) -> dict[str, np.n
     Args:
         known: Quantities by key.
         n: Number of draws.
-        seed: Of the fit.
+        seed: Seed of the fit.
     """
     draws = {
         key: _draw_truncated_normal(quantity, np.random.default_rng([seed, 41, *key.encode()]), n)

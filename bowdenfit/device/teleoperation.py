@@ -132,7 +132,7 @@ def spectral_radius_in_contact(system: MasterSlave, gains: CouplingGains, delay:
     """Return the spectral radius of the sampled loop with the wall, or in free motion without one.
 
     Args:
-        system: What moves.
+        system: The moving parts.
         gains: The coupling; its commands act a sample late.
         delay: Samples that all that is sent from side to side is late by.
     """
@@ -215,7 +215,7 @@ class Slave:
 
     Args:
         inertia, damping, friction: J_s [kg m^2], b_s [N m s/rad], F_s [N m].
-        largest_torque: Of its motor [N m].
+        largest_torque: Largest torque of its motor [N m].
         wall, wall_stiffness, wall_damping: Where the wall begins [rad], k_e [N m/rad], b_e [N m s/rad].
     """
 
@@ -235,8 +235,8 @@ class MasterController:
 
     Args:
         count: Angle of one count of the encoders [rad].
-        filter_time: Of the filter of speeds [s].
-        largest_torque: Of the master's motor [N m].
+        filter_time: Time constant of the filter of speeds [s].
+        largest_torque: Largest torque of the master's motor [N m].
     """
 
     count: Numbers
@@ -251,7 +251,7 @@ class TeleoperationRuns:
     Args:
         time: [s].
         joint, slave: Angles of the master's joint and of the slave [rad].
-        hand_torque: What the hand gives [N m].
+        hand_torque: Torque of the hand [N m].
         wall_torque: T_e [N m].
     """
 
@@ -289,7 +289,7 @@ def simulate_teleoperation(
         path: Angle and speed of the hand's path at every sample [rad], [rad/s].
         delay: Samples that all that is sent is late by.
         sample: T_s [s].
-        step: Of the plant, about; a sample is a whole number of them [s].
+        step: Step of the plant, about; a sample is a whole number of them [s].
     """
     coupling = {name: value for name, value in vars(gains).items() if name != "local_damping"}
     coupling["returned_damping"] = 0.0 if gains.local_damping else gains.master_damping

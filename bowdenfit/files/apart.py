@@ -59,7 +59,7 @@ class Limits:
 
     Args:
         memory: Bytes beside what the reader has already.
-        seconds: Of CPU.
+        seconds: Seconds of CPU.
     """
 
     memory: int

@@ -82,7 +82,7 @@ class Cell:
 
     Args:
         file, row, column: Where it stands.
-        text: What stands there.
+        text: Text of the cell.
         decimals: How its column writes decimals.
         measured: The number without its unit and error where these stand in the cell too; else None.
         unit: The unit that stands in the cell; empty without one.

@@ -66,7 +66,7 @@ class ChannelFile:
         path: The file.
         kind: What it is, for people: "CSV", "MATLAB", "TDMS", "MDF4", "ROS bag", "Parquet", "HDF5", "Excel workbook".
         channels: Its numeric channels, in the order of the file.
-        remarks: What was left out or assumed, in sentences.
+        remarks: Omissions and assumptions, in sentences.
         account: Where its rows went; None where it has none.
     """
 

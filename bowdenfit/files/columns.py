@@ -46,7 +46,7 @@ class Column:
     """The cells of one quantity and the factor to its internal unit.
 
     Args:
-        heading: What stands over it.
+        heading: Heading of the column.
         cells: From above.
         factor: From its unit to the internal one.
         unit: As written; None without one.
@@ -107,7 +107,7 @@ def find_columns(
 
     Args:
         table: The file.
-        wanted: What to look for.
+        wanted: Quantities to look for.
         sources: Columns the user has named explicitly; these are not searched for.
         unused: Names that the user may give a column although nothing reads it.
     """

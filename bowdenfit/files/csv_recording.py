@@ -328,7 +328,7 @@ def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[
 
     Args:
         path: The file.
-        sheet: What its first lines tell.
+        sheet: Layout found in its first lines.
         columns: What its last rows hold, which were read one by one.
         quick: Where the rows end that were read at once [bytes], and how many these are.
         stop: Where the last whole row ends [bytes].

@@ -148,7 +148,7 @@ def find_candidates(
 
     Args:
         headings: What stands over each column, and the unit that the file gives elsewhere; both may be empty.
-        wanted: What to look for.
+        wanted: Quantities to look for.
         stated: Quantities whose column the user has named; none is looked for.
     """
     by_quantity: dict[str, list[MatchedColumn]] = {quantity.name: [] for quantity in wanted}

@@ -22,7 +22,7 @@ class LongTable:
     """A table with a row for each reading.
 
     Args:
-        header: What stands over each column.
+        header: Heading of each column.
         units: The unit of each column; empty without one.
         rows: Cells, which keep their place in the file.
         remark: What was taken for what.
@@ -47,7 +47,7 @@ def unpivot(header: Sequence[str], units: Sequence[str], rows: Sequence[tuple[Ce
     and a column of wrap angles; and its cells must follow the input, as forces do and efficiencies do not.
 
     Args:
-        header: What stands over each column.
+        header: Heading of each column.
         units: The unit below each heading; empty without one.
         rows: The cells below.
     """

@@ -80,7 +80,7 @@ class SheetColumns:
 
     Args:
         values: The numbers of each column; None for a column of text.
-        remarks: What was left out, in sentences.
+        remarks: Omissions, in sentences.
         left_out: Why a row is not read, and what it says, by its number.
         beside: Row and text of remarks beside the columns.
         rows: How many rows there are from the first of data on.

@@ -28,7 +28,7 @@ class TableParts:
     Args:
         headings: The rows that hold headings and their units, from above.
         header: Of these the one that names the columns.
-        names: What stands over each column.
+        names: Heading of each column.
         units: The unit below each name; empty without one.
         body: The rows of readings.
         left_out: Why each of the other rows is not read, by its number, but for blank ones.

@@ -44,7 +44,7 @@ class RawTable:
 
     Args:
         file: Its name.
-        header: What stands over each column.
+        header: Heading of each column.
         header_row: The row of the headings, of which the last stands over the units or the data.
         rows: Rows of readings.
         units: The unit that stands below each heading, or behind its numbers; empty without one.
@@ -182,10 +182,10 @@ def make_table(name: str, lines: Sequence[Line], rows: Sequence[CsvRecord], sepa
     """Return the table that the rows of a file make.
 
     Args:
-        name: Of the file.
+        name: Name of the file.
         lines: All its lines.
         rows: The cells of those that are no comments.
-        separator: What stands between columns.
+        separator: Separator of columns.
 
     Raises:
         DatasetError: See `read_csv`.

@@ -236,7 +236,7 @@ class CsvRecord:
     Args:
         row: Number of its first line in the file, from 1.
         start: Where it starts [bytes].
-        cells: What stands in it.
+        cells: Cells of the row.
         closed: Whether every quotation mark that opens in it is closed.
     """
 

@@ -34,7 +34,7 @@ def render_page(
     """A page as HTML.
 
     Args:
-        page: What is on it.
+        page: Contents of the page.
         drawings: Its figures as PNG, by name; a figure without one is left out, and one for which there is no room is said to
             be.
         narrow: Drawings that are shown instead on a phone, by name, as far as there is room.
@@ -60,7 +60,7 @@ def render_section(section: PageSection, addresses: Mapping[str, str]) -> str:
     """One section as HTML, for a page that somebody else makes with `page_assets`.
 
     Args:
-        section: What is shown.
+        section: Section to render.
         addresses: Where its drawings are, by name; a figure without is left out, unless it is charts alone.
     """
     shown_section = section.with_pictures(addresses)

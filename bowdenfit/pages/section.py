@@ -69,8 +69,8 @@ class Chart:
         name: By which it is chosen among others.
         x_label: With unit.
         y_label: With unit.
-        groups: What is drawn.
-        spans: What is shaded behind.
+        groups: Series to draw.
+        spans: Shaded ranges.
         place_names: What the places 1, 2 and so on are; empty where they are numbers.
     """
 
@@ -104,9 +104,9 @@ class Picture:
     """A figure on a page.
 
     Args:
-        name: Of the figure, by which its drawing is found.
+        name: Name of the figure, by which its drawing is found.
         title: Its heading, which stands for it where it is not seen.
-        caption: What it shows, in plain words.
+        caption: Caption in plain words.
         charts: The same to zoom into, one after the other; none where that does not pay.
         chart_caption: What the charts show, which have no panels.
         folded: Whether only those who ask for it see it.
@@ -160,7 +160,7 @@ class HtmlPage:
     """A whole page.
 
     Args:
-        title: What it is of.
+        title: Subject of the page.
         subtitle: What kind of page, and when it was made.
         sections: In their order.
     """
@@ -180,7 +180,7 @@ class PageTable:
     """Rows under heads.
 
     Args:
-        heads: Of the columns.
+        heads: Headings of the columns.
         rows: Cells; the first names the row.
         caption: Above it.
         left: Columns of words, which are aligned left.

@@ -103,7 +103,7 @@ def move_legend(legend: Legend, axes: Axes, panels: Sequence[Axes]) -> None:
     """Show the legend of a page on axes, beside one that they may have.
 
     Args:
-        legend: Of the page.
+        legend: Legend of the page.
         axes: Where it goes.
         panels: With what it explains.
     """

@@ -68,7 +68,7 @@ def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any,
         axes: Panel to draw on.
         x: Of the line.
         quantiles: First axis from low to high, such as 5 %, 50 % and 95 %; or one row.
-        color: Of line and band.
+        color: Color of the line and the band.
         line: Label and looks of the line.
     """
     axes.plot(x, middle(quantiles), color=color, **line)
@@ -131,7 +131,7 @@ def density(draws: np.ndarray, grid: np.ndarray, lower: float = -np.inf, upper: 
     mirrored at it, so that a density that does not vanish there is not smoothed away.
 
     Args:
-        draws: Of any shape.
+        draws: Draws of any shape.
         grid: Equally spaced points.
         lower, upper: Bounds of the quantity.
 

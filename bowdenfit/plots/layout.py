@@ -46,7 +46,7 @@ def panels(
     """Return a figure with a grid of panels, and the panels row by row.
 
     Args:
-        heights: Of each row of panels.
+        heights: Heights of each row of panels.
         columns: Panels in a row.
         top: Room above the panels, for their titles.
         gaps: Between panels, across and down.
@@ -199,7 +199,7 @@ def title_above(figure: Figure, words: str, mark: str = "", height: float | None
         figure: The page.
         words: The title.
         mark: Why nobody should rely on the figure, which stands below the title.
-        height: Of the page with its title [in], to which panels are stretched; what suits the figure if omitted.
+        height: Height of the page with its title [in], to which panels are stretched; what suits the figure if omitted.
 
     Raises:
         UsageError: Panels would be too low to be read.
@@ -273,7 +273,7 @@ def _stretch_panels(figure: Figure, height: float, above: float) -> None:
 
     Args:
         figure: The page.
-        height: Of the page [in], with what is added above it.
+        height: Height of the page [in], with what is added above it.
         above: What is added above it [in].
 
     Raises:
@@ -310,8 +310,8 @@ def ticks_below(limits: tuple[float, float], width: float, whole: bool = False) 
     """Return the tick values of a lower axis, and their texts.
 
     Args:
-        limits: Of the axis.
-        width: Of the panel [in].
+        limits: Limits of the axis.
+        width: Width of the panel [in].
         whole: Whether only whole numbers make sense.
     """
     return ticks(limits, lambda texts: width / NUMBER_SPACE / max(map(len, texts)), whole, TICK / width)
@@ -321,8 +321,8 @@ def ticks_left(limits: tuple[float, float], height: float) -> tuple[np.ndarray, 
     """Return the tick values of a left axis, and their texts.
 
     Args:
-        limits: Of the axis.
-        height: Of the panel [in].
+        limits: Limits of the axis.
+        height: Height of the panel [in].
     """
     return ticks(limits, lambda _: height / NUMBER_ROW)
 
@@ -369,7 +369,7 @@ def ticks(
     """Return as many round tick values as there is room for, and their texts.
 
     Args:
-        limits: Of the axis.
+        limits: Limits of the axis.
         room: How many of the given texts fit next to each other along the axis.
         whole: Whether only whole numbers make sense.
         over: How far a number may stand beyond an end, as a share of the axis.

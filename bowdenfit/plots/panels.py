@@ -70,12 +70,12 @@ def recording_panels(
     """Return a figure with a titled panel for each recording, the panels, and the number of columns.
 
     Args:
-        names: Of the recordings.
+        names: Names of the recordings.
         most_columns: Panels in a row.
-        height: Of a panel [in]; None for square ones.
+        height: Height of a panel [in]; None for square ones.
         share_x, share_y: Whether all panels have the same axes.
         page: Width of the page for a single column [in].
-        width: Of the page, whatever is on it [in].
+        width: Width of the page, whatever is on it [in].
     """
     across, down = (0.16 if share_y else 0.42), TITLE + (0.08 if share_x else 0.2)
     rows = -(-len(names) // count_columns(width or WIDE, most_columns, LEAST_WIDTH, across))
@@ -102,13 +102,13 @@ def panels_with_limits(
     """Return `recording_panels` with limits: those of each panel, or common ones where ranges are similar.
 
     Args:
-        names: Of the panels.
+        names: Names of the panels.
         across: Limits of each x axis.
         up: Limits of each y axis.
         most_columns: Panels in a row.
-        height: Of a panel [in]; None for square ones.
+        height: Height of a panel [in]; None for square ones.
         page: Width of the page for a single column [in].
-        width: Of the page, whatever is on it [in].
+        width: Width of the page, whatever is on it [in].
     """
     share_x, share_y = share_limits(across), share_limits(up)
     figure, flat, columns = recording_panels(names, most_columns, height, share_x, share_y, page, width)
@@ -156,7 +156,7 @@ def make_logarithmic(axes: Axes, which: str, ratio: float) -> None:
     Args:
         axes: Panel; its limits may come later.
         which: "x" or "y".
-        ratio: Of its largest to its smallest value.
+        ratio: Ratio of its largest to its smallest value.
     """
     axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis

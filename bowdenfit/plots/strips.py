@@ -57,9 +57,9 @@ class Stripped:
         """Label the outer panels with names and units.
 
         Args:
-            x_label: Of all panels and strips.
-            y_label: Of the panels.
-            unit: Of the residuals.
+            x_label: Label of the horizontal axis of all panels and strips.
+            y_label: Label of the vertical axis of the panels.
+            unit: Unit of the residuals.
         """
         for i, (main, strip) in enumerate(zip(self.mains, self.strips, strict=True)):
             if i % self.columns == 0:
@@ -129,12 +129,12 @@ def panels_with_strips(
     """Return a figure with titled panels, each with a strip of residuals below it.
 
     Args:
-        names: Of the panels; empty ones have no title.
+        names: Names of the panels; empty ones have no title.
         across: Limits of each x axis, which are those of all where they are alike.
         up: Limits of each y axis, likewise.
         most_columns: Panels in a row.
-        height: Of a panel [in]; from its width if omitted.
-        width: Of the page, whatever is on it [in].
+        height: Height of a panel [in]; from its width if omitted.
+        width: Width of the page, whatever is on it [in].
         least: Width of a panel that can still be read [in].
         usual: Width of the page for a single column [in].
     """

@@ -50,7 +50,7 @@ def write_figure(figure: AnswerFigure, answer: Any, folder: Path, name: str, cab
     Args:
         figure, answer, cable: See `draw_answer_figure`.
         folder: Where to; made if it is missing.
-        name: Of the files.
+        name: Name of the files.
     """
     folder.mkdir(parents=True, exist_ok=True)
     paths = write_all(draw_answer_figure(figure, answer, cable), folder, name)

@@ -127,9 +127,9 @@ def draw_with_title(
         name: Which of `FIGURES`.
         data: What it shows.
         cable: Name of the cable, for the title.
-        width: Of the page [in], on which words stay as large as they are; what suits the figure if omitted.
+        width: Width of the page [in], on which words stay as large as they are; what suits the figure if omitted.
         mark: See `warning_mark`.
-        height: Of the page [in], to which panels are stretched; what suits the figure if omitted.
+        height: Height of the page [in], to which panels are stretched; what suits the figure if omitted.
 
     Raises:
         UsageError: The page is too low for the figure.

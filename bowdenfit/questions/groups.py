@@ -24,7 +24,7 @@ class Contrast(Display):
     Args:
         coefficient: Which coefficient.
         group, less: The groups.
-        difference: Of the draws, a new mounting of the cable not in it: what the groups do on average.
+        difference: Difference of the draws, a new mounting of the cable not in it: what the groups do on average.
         probability: That it has the sign of its median, whichever that is: 0.5 where nothing is known of it.
     """
 

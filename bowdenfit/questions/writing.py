@@ -35,7 +35,7 @@ def answer_files(folder: str | Path, name: str) -> list[Path]:
 
     Args:
         folder: Where they are.
-        name: Of the answer.
+        name: Name of the answer.
     """
     return [*(Path(folder) / f"{name}.{ending}" for ending in (PAGE, TEXT)), *answer_figures(folder, name)]
 
@@ -45,7 +45,7 @@ def answer_figures(folder: str | Path, name: str) -> list[Path]:
 
     Args:
         folder: Where they are.
-        name: Of the answer.
+        name: Name of the answer.
     """
     return [Path(folder) / f"{name}.{ending}" for ending in FORMATS]
 
@@ -55,7 +55,7 @@ def refuse_to_replace(folder: Path, name: str, what: str, force: bool) -> None:
 
     Args:
         folder: Where it would go.
-        name: Of the answer.
+        name: Name of the answer.
         what: What it is, in words without an article.
         force: Whether an earlier one there may be replaced.
 
@@ -83,7 +83,7 @@ def write_answer(
 
     Args:
         folder: Where to; made if missing. Earlier files of these names are replaced.
-        name: Of the files.
+        name: Name of the files.
         answer: The answer.
         text: For people.
         figures: Files of its figures, by their names.

@@ -53,7 +53,7 @@ class FlaggedSamples:
     Args:
         kind: "dropout", "spike", "saturated" or "quiet", one a sample.
         time: When [s].
-        input_force, output_force: What was read [N].
+        input_force, output_force: Readings [N].
     """
 
     kind: tuple[str, ...]
@@ -73,14 +73,14 @@ class Account(Part):
         rate: Samples a second of the common clock [1/s].
         bandwidth: Frequency up to which the forces move together, above which there is only noise [Hz].
         block: Length of a block [s]; 0 without averaging.
-        tare: What was subtracted from the input and the output force [N].
+        tare: Forces subtracted from the input and the output force [N].
         tare_sd: Standard errors of these [N].
         delay: How much later the output channel was [s]; the output was shifted back by it.
         delay_sd: Standard error of the delay [s]; NaN where the recording says nothing of it or it was given.
         noise: Standard deviation of a single sample about the smooth motion, input and output [N].
         limits: Lowest and highest force taken for the ends of the range [N]; infinite where no clipping was seen.
         flagged: Samples left out.
-        remarks: What a user should know, in sentences.
+        remarks: Remarks for the user, in sentences.
         clock_shift: Of two loggers, what brings the times of the output's to those of the input's, the delay included [s].
     """
 
@@ -142,7 +142,7 @@ class Strokes(Part):
             force [N].
         correlation: Integrated autocorrelation time of these deviations, in blocks, at least 1.
         by_hand: Whether the user set the phases.
-        remarks: What a user should know, in sentences.
+        remarks: Remarks for the user, in sentences.
     """
 
     stroke: Labels
@@ -213,7 +213,7 @@ class Recordings(Part):
         A delay by a share of it looks like a change of the friction by that share.
 
         Args:
-            least_share: Of the largest force, below which no logarithm is taken.
+            least_share: Least share of the largest force, below which no logarithm is taken.
         """
         losses, rates = [], []
         for blocks in (item.blocks for item in self.items):

@@ -139,8 +139,8 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
     whatever the forces do, even if they stay the same.
 
     Args:
-        loop: What the play operator finds.
-        velocity: Of the blocks; NaN where it is not known.
+        loop: Hysteresis loop fitted by the play operator.
+        velocity: Velocity of the blocks; NaN where it is not known.
     """
     ratio = np.log(loop.force_in / loop.force_out)
     if RETURN in loop.state or np.median(ratio) <= 0:

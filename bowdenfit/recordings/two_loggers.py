@@ -310,7 +310,7 @@ class _Reference:
 
     Args:
         is_x: Points of the input that are known.
-        size: Of the transforms.
+        size: Size of the transforms.
         of_output: Transforms of the output's weight, and of that times the output.
         count: Points in common at each lag.
         mean, variance: Of the output in these, in units of its standard deviation.

@@ -78,7 +78,7 @@ def joint_draws(
         names: Of the coefficients.
         about: Where population and cables are thought to be.
         draws: Of each of four chains.
-        seed: Of everything random.
+        seed: Random seed.
     """
     read = {case.inspection.label: case for case in read_cases(folder, read_inspections(folder), {})}
     cases = [read[label] for label in labels]

@@ -31,7 +31,7 @@ def fleet_draws(
     """Draws, and the truth of each cable: log coefficients when new and dry, and wear.
 
     Args:
-        seed: Of everything random.
+        seed: Random seed.
         cables, cycles: How many, and when each is inspected.
         truth: Of the population.
         shifts: Added to all log coefficients of some cables.

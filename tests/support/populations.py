@@ -21,7 +21,7 @@ def gibbs(
     Args:
         fleets: Of as many cables and inspections, whose effect is lubrication.
         without: Of each.
-        seed: Of everything random.
+        seed: Random seed.
         sweeps, before: That are kept, and that are not.
     """
     g, first, fleet = np.random.default_rng([seed, 99]), fleets[0], len(fleets)

@@ -62,7 +62,7 @@ def read_recordings(source: Source) -> TableFromFiles[Recordings]:
         source: Where they are; channels named on the command line come before those of the description.
 
     Raises:
-        DatasetError, DescriptionError: What is wrong, in a sentence.
+        DatasetError, DescriptionError: The fault, in a sentence.
     """
     description = source.description
     entries = _list_entries(source)

@@ -37,7 +37,7 @@ class EfficiencyLine:
 
     Args:
         label: The conditions in words, such as "preload 20 N".
-        efficiency: Of the cable.
+        efficiency: Efficiency of the cable.
         capstan: Of the capstan equation with the same coefficient.
     """
 
@@ -51,7 +51,7 @@ class BendingLoss:
     """Efficiency against the wrap angle.
 
     Args:
-        wrap_angle: Of the lines [deg].
+        wrap_angle: Wrap angle of the lines [deg].
         input_force: Force at which efficiency is meant [N].
         fitted: Quantiles of the cable as fitted, with its own preload [1].
         fitted_capstan: Median of the capstan equation with the fitted coefficients [1].

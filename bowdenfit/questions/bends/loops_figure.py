@@ -41,7 +41,7 @@ class LoopCurve:
 
     Args:
         label: Wrap angle in words, such as "180 deg".
-        input_force: Of the curves [N].
+        input_force: Input force of the curves [N].
         forward, back: Quantiles of the output force while moving forward and back [N].
         capstan: Median output force of a rope without preload, moving forward [N].
         slack_load: Quantiles of the input force at which the return side goes slack [N].

@@ -31,7 +31,7 @@ class PreloadCurve:
     """Preload against the wrap angle between fixed ends.
 
     Args:
-        wrap_angle: Of the curves [deg].
+        wrap_angle: Wrap angle of the curves [deg].
         preload: Quantiles of the preload [N].
         slack: Quantiles of the slack [mm].
         slack_probability: Share of the draws that are slack.

@@ -59,9 +59,9 @@ class CheckedQuantity:
         name: Its name.
         symbol: Its symbol in figures.
         ranks: Share of each posterior below the truth.
-        p_value: Of uniform ranks.
+        p_value: p-value of uniform ranks.
         corrected: The same, corrected for the number of quantities.
-        coverage: Of the central intervals.
+        coverage: Coverage of the central intervals.
         bias: Mean of (posterior mean less truth) in posterior standard deviations.
         bias_error: Its standard error.
         shrinkage: 1 less the mean posterior variance over the prior variance: 0 where the data say nothing; NaN where truths

@@ -96,7 +96,7 @@ def why_implausible(measured: Dataset, simulated: Dataset) -> str:
     """Return why no bench would hand in the simulated tables, in a few words; empty if one might.
 
     Args:
-        measured: What was measured.
+        measured: Measurements.
         simulated: What was simulated in its place.
     """
     reasons = (
@@ -111,11 +111,11 @@ class SimulatedTables:
     """Tables that are waiting to be fitted.
 
     Args:
-        number: Of the replication.
+        number: Number of the replication.
         z: The truth, where priors are standard normals.
-        posterior: Of the tables.
+        posterior: Posterior of the tables.
         redrawn: Why tables were drawn again, with how many were.
-        seed: Of the fit.
+        seed: Seed of the fit.
         tie: Share of the draws equal to the truth that count as below it.
     """
 

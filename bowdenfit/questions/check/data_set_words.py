@@ -44,7 +44,7 @@ def check_data_set(dataset: str | Path | Dataset | Frame, reading: Reading) -> R
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
-        DescriptionError, DatasetError: What is wrong, in a sentence.
+        DescriptionError, DatasetError: The fault, in a sentence.
     """
     data = read(dataset, **reading)
     description = data.description

@@ -26,7 +26,7 @@ def check(dataset: Annotated["str | Path | Dataset | Frame", DATASET, PATH], **r
         reading: Keywords of `bowdenfit.read`.
 
     Raises:
-        DescriptionError, DatasetError: What is wrong, in a sentence.
+        DescriptionError, DatasetError: The fault, in a sentence.
     """
     return room.check_data_set(dataset, reading)
 

@@ -57,13 +57,13 @@ class Comparison(Display):
 
     Args:
         differences: How well each predicts readings left out, the best first.
-        weights: Of each in the mixture of all that predicts best.
-        predictions: Of each, reading by reading.
+        weights: Weights of each in the mixture of all that predicts best.
+        predictions: Predictions of each, reading by reading.
         omitted: Readings that the fits do not share.
         descriptions: What each assumes, in words.
         parameters: Coefficients and the like, by parameter and fit.
-        optimal_length: Of each fit with a route, with its unit.
-        rate_effects: Of the fits in which friction may depend on speed.
+        optimal_length: Optimal length of each fit with a route, with its unit.
+        rate_effects: Rate effects of the fits in which friction may depend on speed.
         left_out: What was left out at a time: a whole run, its readings at one load, or one of them.
         few_runs: Number of runs, where so few are left out in parts unasked; 0 else.
         troubles: Why fits are not to be trusted, by fit; those that are to be have none.

@@ -26,7 +26,7 @@ class TwoCables(Display):
     """Two fits of different measurements beside each other.
 
     Args:
-        names: Of the two.
+        names: Names of the two.
         contrasts: First minus second, of each quantity that both have.
         charts: Both on one chart: efficiency along the route, or the densities of a coefficient.
     """
@@ -57,7 +57,7 @@ def contrast_cables(one: Record, other: Record, names: tuple[str, str]) -> TwoCa
 
     Args:
         one, other: Fits with draws, of different measurements.
-        names: What they are called.
+        names: Names.
 
     Raises:
         UsageError: They share measurements, one has no draws, or they have nothing in common.

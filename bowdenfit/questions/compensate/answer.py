@@ -116,7 +116,7 @@ class SimulatedLaw(Part):
         name: "none", "karnopp" or "active".
         mean_torque: Mean torque at the joint against the motion [N m].
         peak_torque: The largest, where the motion turns round [N m].
-        trace: Of one device.
+        trace: Trace of one device.
     """
 
     name: str
@@ -168,7 +168,7 @@ class Compensation(Display):
         scheduled: A value by bend; None where another law was asked for.
         share_without_scatter: The scheduled share that would seem safe from the coefficients alone.
         by_bend: Every bend looked at.
-        gain: Of the active law; None where it was not asked for, or cannot be told.
+        gain: Gain of the active law; None where it was not asked for, or cannot be told.
         missing: Keys of device.toml that a gain needs and that are not said.
         preloads: What other preloads would do.
         slack: Probability that the loop is slack at rest at some of the bends.

@@ -56,13 +56,13 @@ class SimulatedDevices:
         hand: That moves it.
         hand_inertia: Which then counts with the joint [kg m^2].
         sample: T_s [s].
-        noise: Of the torque sensor [N m].
+        noise: Noise of the torque sensor [N m].
         feed_forward: F_cst there [N m].
         gain: K_f.
         active_zone: Speed below which it acts; infinite for always [rad/s].
         control: What the controller is besides.
-        wrap_angle: Of the bend [deg].
-        seed: Of the noise.
+        wrap_angle: Wrap angle of the bend [deg].
+        seed: Seed of the noise.
     """
 
     plant: Plant

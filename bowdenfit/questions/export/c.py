@@ -130,7 +130,7 @@ def build_fmu(tables: TransmissionTables, name: str) -> bytes:
 
     Args:
         tables: The tables.
-        name: Of the cable.
+        name: Name of the cable.
 
     Raises:
         UsageError: There is no C compiler, it fails, or FMI 2.0 has no name for this kind of machine.

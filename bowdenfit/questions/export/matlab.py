@@ -26,7 +26,7 @@ def matlab_function(tables: TransmissionTables, name: str) -> str:
 
     Args:
         tables: The tables.
-        name: Of the function, as of the file.
+        name: Name of the function, as of the file.
     """
     levels, points = tables.levels, tables.points
     return fill_template(

@@ -53,8 +53,8 @@ class FitLabel:
 
     Args:
         cable: Name of the cable.
-        seed: Of the fit.
-        version: Of bowdenfit.
+        seed: Seed of the fit.
+        version: Version of bowdenfit.
         created: When it was fitted, UTC.
         measured: What it was measured at, in words.
         group: Group of readings that it is for; empty without groups.
@@ -126,12 +126,12 @@ class TransmissionTables:
         points: Where friction is tabled; between them it is on straight lines.
         levels: Quantiles, then draws.
         is_loop: Whether it is a pull-pull loop.
-        options: Of the friction model.
+        options: Options of the friction model.
         reference_force: At which the coefficients hold, and the quantiles where friction depends on the load [N].
         reference_speed: At which the coefficients hold, in `speed_unit`.
         speed_unit: "mm/s" or "rad/s"; empty where friction does not depend on speed.
         interpolation_error: Largest error of the median exponent between two places [1].
-        radii: Of the pulleys at the motor and at the load side [mm]; 0 where none is stated.
+        radii: Radii of the pulleys at the motor and at the load side [mm]; 0 where none is stated.
     """
 
     about: FitLabel

@@ -36,7 +36,7 @@ def fill_template(name: str, **values: object) -> str:
     """Return a template of this folder with its places filled.
 
     Args:
-        name: Of the file.
+        name: Name of the file.
         values: By the name of the place.
     """
     text = files("bowdenfit.questions.export").joinpath("templates", name).read_text(encoding="utf-8")

@@ -114,7 +114,7 @@ def compensation_parameters(answer: Compensation) -> dict[str, Any]:
     """Return the answer in plain data; what it does not hold is left out.
 
     Args:
-        answer: Of both laws.
+        answer: Answer of both laws.
     """
     bends = answer.by_bend
     page: dict[str, Any] = {

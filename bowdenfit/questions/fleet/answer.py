@@ -40,7 +40,7 @@ class FittedInspection:
         lubricated: Whether it was; None where nobody says.
         shape: Number of the model that it was fitted with, from 1.
         engine: What drew: "laplace" (weighted draws), "ensembles" or "nuts".
-        pareto_k: Of the importance weights.
+        pareto_k: Pareto k of the importance weights.
         n_effective: Effective number of the draws, of the worst parameter.
         reasons: Why the draws should not be trusted; empty if they may.
         quantities: Medians and intervals, by name in shown units.
@@ -64,13 +64,13 @@ class Fleet(Display):
     """Fits of all inspections of a fleet.
 
     Args:
-        name: Of the fleet.
+        name: Name of the fleet.
         fitted: Inspections that were fitted, in the order of cables and cycles.
         broken: Those that could not be.
-        units: Of the quantities.
+        units: Units of the quantities.
         shapes: For each model what is fitted with it, in words.
         seed: Random seed.
-        versions: Of what computed.
+        versions: Versions of what computed.
     """
 
     name: str

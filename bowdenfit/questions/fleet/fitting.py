@@ -51,7 +51,7 @@ def divide_into_pieces(
 
     Args:
         cases: What is to be fitted.
-        seed: Of the fleet.
+        seed: Seed of the fleet.
         settings: How carefully.
         workers: At a time.
         largest: Data sets of a piece.
@@ -78,7 +78,7 @@ def describe_quantities(model: Model) -> dict[str, dict[str, str]]:
     """Return unit, symbol, meaning, role and prior of every quantity that a fit draws, in order.
 
     Args:
-        model: What was fitted.
+        model: Model that was fitted.
     """
     quantities: dict[str, dict[str, str]] = {}
     for p in model.space.free:
@@ -108,11 +108,11 @@ def gather_results(
     """Gather the answer, and the draws of all fitted inspections; None where none could be fitted.
 
     Args:
-        name: Of the fleet.
+        name: Name of the fleet.
         cases: What was fitted, in the order of cables and cycles.
         fits: What came of each, by the hash of its input.
         broken: What could not be read.
-        seed: Of the fleet.
+        seed: Seed of the fleet.
     """
     shapes = _group_by_shape(cases)
     models = {key: build_model(members[0].dataset) for key, members in shapes.items()}
@@ -203,7 +203,7 @@ class FleetOptions:
         results: Results folder; None to write nothing.
         engine: Name of an engine, or an executor.
         workers: Number of processes or jobs; None for the default of the engine.
-        seed: Seed of everything random; None for that of the fleet to resume, or a new one.
+        seed: Random seed; None for that of the fleet to resume, or a new one.
         resume: Whether to continue an interrupted fleet.
         force: Whether to replace an earlier fleet.
     """

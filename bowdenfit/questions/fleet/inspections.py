@@ -219,9 +219,9 @@ class Case:
 
     Args:
         inspection: Which.
-        dataset: What was measured.
+        dataset: Data set with its measurements.
         shaped: The same as one of many that a program serves.
-        hash: Of the input.
+        hash: Hash of the input.
     """
 
     inspection: Inspection
@@ -243,8 +243,8 @@ def read_cases(folder: Path, inspections: Iterable[Inspection], reading: Reading
     """Read the data set of every inspection, or why it cannot be fitted.
 
     Args:
-        folder: Of the fleet.
-        inspections: Of it.
+        folder: Folder of the fleet.
+        inspections: Inspections of it.
         reading: Keywords of `bowdenfit.read`.
 
     Raises:

@@ -44,7 +44,7 @@ class Identifiability(Display):
         measured: Whether readings entered, or only the plan of what to measure.
         groups: Knowledge by group of `GROUPS`, as far as there are such parameters.
         profiles: How the sum of squares of the readings rises with each friction coefficient, the others fitted again.
-        units: Of the parameters.
+        units: Units of the parameters.
         meanings: What they are, in words.
     """
 

@@ -56,7 +56,7 @@ def identifiability_at_maximum(
         start: Maximum of the posterior, with the inverse of the information there.
         basis: Where that is, in words.
         measured: Whether readings entered.
-        profiles: Of the friction coefficients.
+        profiles: Profiles of the friction coefficients.
     """
     covariance = _adjust_for_student(model, np.asarray(start.covariance))
     with jax.enable_x64(True):
@@ -197,7 +197,7 @@ class ConfoundedPair:
         factor: The combination is first + factor x second, in shown units.
         mean, sd: Of the combination.
         first_sd, second_sd: Of the parameters by themselves.
-        correlation: Of their draws.
+        correlation: Correlation of their draws.
     """
 
     first: str

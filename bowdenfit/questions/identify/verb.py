@@ -42,7 +42,7 @@ def identify(
         reading: Keywords of `bowdenfit.read`, for a data set.
 
     Raises:
-        BowdenfitError: What is wrong, in a sentence.
+        BowdenfitError: The fault, in a sentence.
     """
     result = room.identify_source(source, reading)
     if output is not None:

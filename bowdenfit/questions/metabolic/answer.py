@@ -78,7 +78,7 @@ class Metabolic(Display):
 
     Args:
         name, source: Of the study.
-        comparisons: Of all pairs.
+        comparisons: Comparisons of all pairs.
         contradictions: Numbers that cannot all be right, a sentence each.
         order: Conditions in the order in which all persons walked; empty where each had its own.
         from_persons: Whether it follows from each person's numbers, not from what was printed.
@@ -104,7 +104,7 @@ def analyze_study(study: Study, costs: MetabolicCosts | None) -> Metabolic:
 
     Args:
         study: What it says of itself.
-        costs: Of each person, where they are known.
+        costs: Costs of each person, where they are known.
 
     Raises:
         DatasetError: Nothing can be compared.

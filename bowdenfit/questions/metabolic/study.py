@@ -240,7 +240,7 @@ def power(effect: float, persons: float, level: float = LEVEL) -> float:
     Args:
         effect: The difference over the standard deviation of persons' differences.
         persons: How many.
-        level: Of the two-sided test.
+        level: Level of the two-sided test.
     """
     limit, shift = t_from_p(level, persons), abs(effect) * math.sqrt(persons)
     other_way = float(stats.nct.cdf(-limit, persons - 1, shift))  # NaN where it is too small to be computed

@@ -25,7 +25,7 @@ def metabolic(
         dataset: Folder with metabolic.toml, and perhaps a table of persons.
 
     Raises:
-        BowdenfitError: What is wrong, in a sentence.
+        BowdenfitError: The fault, in a sentence.
     """
     return room.analyze_study(*room.read_study(Path(dataset)))
 

@@ -29,7 +29,7 @@ class Life(Part):
     """Cycles until the efficiency falls below the limit, dry and at the reference temperature.
 
     Args:
-        median: Of its cycles; infinite where it more likely lasts for ever.
+        median: Median of its cycles; infinite where it more likely lasts for ever.
         q05: One in twenty falls below before.
         fails: Probability of falling below before the cycles that were asked for; None where none were.
         lasts: Probability that it never does, because its friction does not grow.
@@ -107,7 +107,7 @@ class NextInspection(Part):
         target: What it tells about: "failing" (probability of failing before the cycles asked for) or "wear".
         before: Standard deviation of that now.
         after: What it would be, on average over what may be read.
-        probability: Of failing now; None where that is not the target.
+        probability: Probability of failing now; None where that is not the target.
     """
 
     cable: str
@@ -125,7 +125,7 @@ class Curves(Part):
     Args:
         cycles: At which.
         new: Of a new cable 5 %, 50 % and 95 % of its efficiency, or of its friction over that when new; (3, cycles).
-        cables: Of each cable the median of that, (cable, cycles).
+        cables: Median of that for each cable, (cable, cycles).
         new_fails: Probability that a new cable has fallen below the efficiency asked for; None where none is.
         fails: The same of each cable, (cable, cycles).
     """
@@ -155,16 +155,16 @@ class Pool(Display):
     """A hierarchical model of the cables of a fleet.
 
     Args:
-        name: Of the fleet.
+        name: Name of the fleet.
         cables: In the order of the fleet.
         inspections: How many are pooled.
         left_out: Those that are not.
         coefficients: Of a new cable of this population, dry and at the reference temperature; its scatter is in it. Cables that
             are outliers are not in the population.
-        typical: Of the middle of the population, by name.
+        typical: Values in the middle of the population, by name.
         spreads: Standard deviation of log coefficients between cables, by name, and of the wear under "wear".
         wear: In the reference cycles, of the middle of the population; None where it cannot be told.
-        effects: Of what else was told.
+        effects: Effects of what else was told.
         reference_cycles: Cycles that wear is stated for: the longest inspected.
         reference_temperature: Temperature that coefficients are stated for [°C].
         limit: What life is until; None where it is not asked for.
@@ -174,7 +174,7 @@ class Pool(Display):
         next_inspections: The inspections that tell most, the best first.
         notes: What is not estimated and why, and what was taken for granted, a sentence each.
         reasons: Why the answer should not be trusted; empty if it may.
-        seed: Of everything random.
+        seed: Random seed.
     """
 
     name: str

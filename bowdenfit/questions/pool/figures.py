@@ -54,7 +54,7 @@ def draw_figures(pool: Pool, width: float | None = None) -> dict[str, Figure]:
 
     Args:
         pool: The pooled fleet.
-        width: Of the page [in]; what suits each if omitted.
+        width: Width of the page [in]; what suits each if omitted.
     """
     figures = {"pooled-coefficients": draw_coefficients(pool, width)}
     if pool.curves is not None:
@@ -201,7 +201,7 @@ def write_pool(pool: Pool, folder: Path, name: str) -> None:
     Args:
         pool: The pooled fleet.
         folder: Where to.
-        name: Of the files.
+        name: Name of the files.
     """
     with fill_folder_atomically(folder, f"{name}.json") as place:
         for figure_name, figure in draw_figures(pool).items():

@@ -119,7 +119,7 @@ def compute_curves(data: PoolingData, draws: PopulationDraws, limit: ServiceLimi
 
     Args:
         data: What is pooled.
-        draws: Of the population and its cables.
+        draws: Draws of the population and its cables.
         limit: What life is until.
         new: Draws of new cables, (draw, number).
     """
@@ -171,9 +171,9 @@ def rank_next_inspections(
 
     Args:
         data: What is pooled.
-        draws: Of the population and its cables.
+        draws: Draws of the population and its cables.
         limit: What life is until.
-        seed: Of everything random.
+        seed: Random seed.
     """
     if data.inspected.cycles is None:
         return ()

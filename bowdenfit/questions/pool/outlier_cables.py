@@ -47,7 +47,7 @@ def find_distant_cables(inspected: Inspections, draws: PopulationDraws) -> tuple
 
     Args:
         inspected: What is known.
-        draws: Of the population.
+        draws: Draws of the population.
     """
     if inspected.cables < _FEWEST_TO_LEAVE_OUT:
         return ()
@@ -73,7 +73,7 @@ def separate_outliers(
         inspected: What is known.
         population: The population of all.
         draw: Draws the population without some cables.
-        seed: Of everything random.
+        seed: Random seed.
     """
     core, adjusted = population, adjust_p_values(outlier_p_values(inspected, population, seed))
     suspects = _select_suspects(adjusted, find_distant_cables(inspected, population))
@@ -113,8 +113,8 @@ def outlier_p_values(
 
     Args:
         inspected: What is known.
-        draws: Of the population.
-        seed: Of everything random.
+        draws: Draws of the population.
+        seed: Random seed.
         without: Cables that the population was drawn without.
     """
     generator, core = np.random.default_rng([seed, 7]), _thin(draws)
@@ -138,7 +138,7 @@ def find_departure(inspected: Inspections, core: PopulationDraws, cable: int, se
         inspected: What is known.
         core: The population without it.
         cable: Its number.
-        seed: Of everything random.
+        seed: Random seed.
     """
     generator = np.random.default_rng([seed, 17, cable])
     p_values, distances = _compare_with_population(inspected, cable, *_thin(core), generator=generator, is_in=False)
@@ -240,8 +240,8 @@ def find_mixtures(
 
     Args:
         inspected: What is known.
-        draws: Of the population.
-        names: Of the numbers of a cable.
+        draws: Draws of the population.
+        names: Names of the numbers of a cable.
         without: Cables that are outliers, of which the population has none.
     """
     pooled = ~np.isin(np.arange(inspected.cables), list(without))

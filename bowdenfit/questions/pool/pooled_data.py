@@ -34,15 +34,15 @@ class PoolingData:
     Args:
         cables: Names, in the order of their numbers.
         coefficients: Names.
-        symbols: Of the coefficients, for axes.
+        symbols: Symbols of the coefficients, for axes.
         inspected: What is known of all inspections.
         logs: Draws of their log coefficients, (inspection, draw, coefficient).
-        labels: Of the inspections.
-        cycles: Of the inspections; NaN where nobody says.
+        labels: Labels of the inspections.
+        cycles: Cycles of the inspections; NaN where nobody says.
         reference_cycles: That wear is stated for.
         left_out: Inspections that are not pooled.
         notes: What is not estimated and why, a sentence each.
-        inputs: Of the inspections, what they were fitted from.
+        inputs: Inputs of the inspections, what they were fitted from.
         own_names: What the coefficients are called in single fits.
     """
 
@@ -257,7 +257,7 @@ def load_readings(data: PoolingData, rows: Sequence[int], folder: Path) -> tuple
     Args:
         data: What is pooled.
         rows: Numbers of the inspections.
-        folder: Of the fleet's measurements.
+        folder: Folder of the fleet's measurements.
 
     Raises:
         StoreError: The folder does not hold what the inspections were fitted from.

@@ -45,10 +45,10 @@ class Samples:
 
     Args:
         name: Name of the recording.
-        efficiency: Of each block inside a sliding phase.
+        efficiency: Efficiency of each block inside a sliding phase.
         stroke: +1 pulling, -1 returning, of these.
-        expected: Of the run, 5 %, 50 % and 95 % quantiles; one number without draws.
-        mean: Of the run as measured.
+        expected: Expected efficiency of the run, 5 %, 50 % and 95 % quantiles; one number without draws.
+        mean: Mean of the run as measured.
         sd: Its standard error from the readings alone.
     """
 

@@ -22,7 +22,7 @@ def changes_section(fit: Record, earlier: Record, name: str) -> PageSection:
     Args:
         fit: This fit.
         earlier: The other.
-        name: Of the earlier one, such as its folder.
+        name: Name of the earlier one, such as its folder.
     """
     when = f", of {earlier.provenance.created[:10]}" if earlier.provenance.created else ""
     sentences = [

@@ -163,7 +163,7 @@ def resimulate(
     which stand for the true ones. Held readings are kept as they are.
 
     Args:
-        dataset: What was measured.
+        dataset: Data set with its measurements.
         values: True value of every parameter [internal units].
         key: Random key.
         noise: Whether readings scatter.
@@ -202,7 +202,7 @@ def draw_true_values(
 
     Args:
         description: The cable.
-        tables: Of the shape of what is measured.
+        tables: Tables of the shape of what is measured.
         truth: What is given.
         key: Random key.
         run_once: See `simulate`.

@@ -38,7 +38,7 @@ def simulate(
         fleet: Many cables that wear, inspected again and again; BENCH has [fleet]. Answers with the first inspection.
 
     Raises:
-        BowdenfitError: What is wrong, in a sentence.
+        BowdenfitError: The fault, in a sentence.
     """
     if fleet and recordings:
         raise UsageError("--fleet and --recordings both say what to make; leave one of them out.")

@@ -61,7 +61,7 @@ class ForcesAtBend:
         stroke: +1 pulling, -1 return, 0 held.
         off: Output over that of the law, less 1 [%]; NaN of held readings.
         apparent: Apparent friction coefficient s log(F_in/F_out) / theta; NaN of held readings.
-        load: Of the lines [N].
+        load: Load of the lines [N].
         law: Quantiles of the output force, pulling and returning: (quantile, stroke, load) [N].
         apparent_law: The same of the apparent coefficient.
         capstan: The apparent coefficient that describes its readings best, were it the same at all loads.
@@ -277,7 +277,7 @@ def draw_against_wrap_angle(axes: Axes, forces: ForcesData, value: str) -> None:
 
     Args:
         axes: Panel to draw on.
-        forces: What is shown.
+        forces: Forces to draw.
         value: "law" for output forces, "apparent_law" for coefficients.
     """
     bends = sorted(forces.places, key=lambda here: float(here.bend.mean()))

@@ -56,7 +56,7 @@ class SimulatedContact(Part):
         time: [s].
         master, slave: Angles of the master's joint and of the slave [rad].
         hand_torque, wall_torque: What the hand gives and the wall takes [N m].
-        wall_stiffness: Of the wall [N m/rad].
+        wall_stiffness: Stiffness of the wall [N m/rad].
         bounces: Whether the slave leaves the wall again 1.2 s after it came; None where it never came.
     """
 

@@ -109,7 +109,7 @@ class ContactSimulator:
         """Return the signals of a contact with each of some walls.
 
         Args:
-            gains: What is sent.
+            gains: Gains of the signals that are sent.
             walls: Their stiffnesses [N m/rad].
         """
         values = self._values

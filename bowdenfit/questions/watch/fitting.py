@@ -61,7 +61,7 @@ class GrowingFit:
     """Fits of one data set as it grows, with programs that are kept from one fit to the next of the same shape.
 
     Args:
-        seed: Of everything random.
+        seed: Random seed.
         samplers: What draws, by the last shape.
         programs: What draws imply, by the last shape and what of the measurements enters it.
         completed: Shapes of the data that were completed last; empty before.

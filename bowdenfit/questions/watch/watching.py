@@ -54,7 +54,7 @@ def watch_answers(
         target_name: What is to be known, as `next` takes it with `--for`; its default if omitted.
         until: Standard deviation to which it is to be known, in its unit or with a unit; then the iterator ends.
         reading: Keywords of `bowdenfit.read`.
-        seed: Of everything random.
+        seed: Random seed.
         is_stopped: Asked between two looks at the files; the iterator ends where it returns True.
         keep: Called in a thread of its own with the history so far, after every verdict.
 

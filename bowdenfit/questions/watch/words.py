@@ -13,8 +13,8 @@ def watch_lines(answers: Iterable[WatchedAnswer | UnreadableFiles], name: str) -
     """Yield what to print, in pieces: of each number of mountings the answer at once, and behind it the verdict.
 
     Args:
-        answers: Of `watch_answers`.
-        name: Of the folder or file.
+        answers: Answers of `watch_answers`.
+        name: Name of the folder or file.
     """
     yield f"Watching {name}; Ctrl-C ends it.\n"
     is_open, shown, open_readings, reasons, stop = False, (-1, -1), -1, tuple[str, ...](), ""

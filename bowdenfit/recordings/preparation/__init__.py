@@ -80,7 +80,7 @@ class Inspected:
     Args:
         raw: As it was read.
         settings: Which steps are done, and with what.
-        remarks: What was noticed.
+        remarks: Remarks, in sentences.
         cleaned: Both channels on their own clocks.
         together: Both on one clock, before any delay is taken off.
         delay: How much later the output channel is.

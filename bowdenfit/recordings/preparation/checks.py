@@ -142,7 +142,7 @@ def explain_backward_clock(name: str, time: Vector) -> str:
     """Return where the clock of a channel runs backwards and what to do, as a clause; empty where it never does.
 
     Args:
-        name: What the channel is called.
+        name: Name of the channel.
         time: Its times [s].
     """
     steps = ((p.start, np.diff(time[p.start : p.stop + 1]) < 0) for p in split_pieces(len(time)))

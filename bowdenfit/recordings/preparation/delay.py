@@ -225,7 +225,7 @@ def _linearized(
 
     Args:
         segments: The recording.
-        rests: Of the recording with the drag that was begun with.
+        rests: Rests of the recording with the drag that was begun with.
         weight: Roots of weights.
         point: The parameters.
         initial_drag: The drag that was begun with [N]; empty if it is not asked about.

@@ -48,7 +48,7 @@ class Hysteresis:
             input less output force [N].
         lost: Drag that makes the loop's width the same at all loads [N]; of a pull-pull loop the force lost while both
             sides are taut, 2 P Lambda [N].
-        deviation: Of log(F_out + drag) from `followed`, block by block [1]; of a pull-pull loop of F_out [N].
+        deviation: Deviation of log(F_out + drag) from `followed`, block by block [1]; of a pull-pull loop of F_out [N].
         followed: Output of the operator, in the same units; of a single rope on its limit wherever it slides.
         state: Contact of each block; see `play_between`.
         cost: Robust sum of squares of the deviations, in units of their noise, over twice their number.
@@ -179,7 +179,7 @@ def smooth_input(force: Vector) -> Vector:
     to the next it is the isotonic regression. Without noise it is the force itself.
 
     Args:
-        force: Of the blocks of a recording [N].
+        force: Force of the blocks of a recording [N].
     """
     noise = _noise(force)
     smooth = _smooth(force, noise)

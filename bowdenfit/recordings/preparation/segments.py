@@ -41,7 +41,7 @@ class Segments:
         y: log output force, smoothed alike [1].
         weight: Inverse relative variance of each point, 0 where it must not be used.
         jitter: Standard deviation of x by noise [1].
-        width: Of the Gaussian that both are smoothed with [s].
+        width: Width of the Gaussian that both are smoothed with [s].
     """
 
     step: float

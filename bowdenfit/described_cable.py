@@ -138,5 +138,5 @@ def _write_table(kind: str, table: Any, folder: Path) -> Path:
 def _plain(value: Any) -> Any:
     """Return settings with lists in the place of tuples, as TOML has them."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+        return {str(key): _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

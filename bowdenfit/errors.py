@@ -139,14 +139,14 @@ def combine_errors(errors: Sequence[BowdenfitError]) -> BowdenfitError:
 
 def _with_rows(faults: Sequence[BowdenfitError]) -> str:
     """Return the text of the first of several equal faults, with the rows of the others."""
-    others = sorted({fault.row for fault in faults} - {faults[0].row})
-    if not others:
+    remaining = sorted({fault.row for fault in faults} - {faults[0].row})
+    if not remaining:
         return str(faults[0])
-    named = [str(row) for row in others[:_MOST_ROWS]]
-    if len(others) > _MOST_ROWS:
-        named.append(f"{len(others) - _MOST_ROWS} more")
+    named = [str(row) for row in remaining[:_MOST_ROWS]]
+    if len(remaining) > _MOST_ROWS:
+        named.append(f"{len(remaining) - _MOST_ROWS} more")
     rows = ", ".join(named[:-1]) + " and " + named[-1] if len(named) > 1 else named[0]
-    return f"{faults[0]} The same in row{'s' if len(others) > 1 else ''} {rows}."
+    return f"{faults[0]} The same in row{'s' if len(remaining) > 1 else ''} {rows}."
 
 
 def disk_error(path: Path, error: OSError) -> StoreError:
@@ -156,10 +156,10 @@ def disk_error(path: Path, error: OSError) -> StoreError:
         path: The file or folder.
         error: Error of the system.
     """
-    why = error.strerror or type(error).__name__
+    reason = error.strerror or type(error).__name__
     if error.errno in _FULL:
-        return DiskError(f"{path} cannot be written ({why}); make room on that disk, or name another folder.")
-    return StoreError(f"{path} cannot be written ({why}); name another folder with --output.")
+        return DiskError(f"{path} cannot be written ({reason}); make room on that disk, or name another folder.")
+    return StoreError(f"{path} cannot be written ({reason}); name another folder with --output.")
 
 
 def describe_unforeseen(error: Exception, remedy: str = "This is our fault: please report it.") -> str:

@@ -92,9 +92,9 @@ class Elasticity:
             rows: Loads, their peaks, the different wrap angles, and the matrix that gives each row its own.
         """
         exponent, spread = self.friction_exponent(values, rows["wrap_angles"]), rows["spread"]
-        one = jnp.ones_like(exponent)
+        unit = jnp.ones_like(exponent)
         lengthened = values[LENGTHENING] * rows["wrap_angles"] - values[STRETCH_ZERO]
-        of_angle = jnp.stack([exponent, mean_tension(one, exponent), mean_tension(one, -exponent), lengthened])
+        of_angle = jnp.stack([exponent, mean_tension(unit, exponent), mean_tension(unit, -exponent), lengthened])
         exponents, loading, unloading, lengthened = of_angle @ spread
         mean = mean_tension_from_shares(rows["load"], rows["peak"], exponents, loading, unloading)
         return self.extension(values, mean) + lengthened

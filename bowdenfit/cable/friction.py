@@ -121,8 +121,8 @@ class FrictionModel:
         if not self.depends_on_rate:
             return jnp.ones_like(speed)
         reference = jnp.asarray(self.conditions.reference_speed)
-        known = jnp.where(jnp.isnan(speed), reference, speed)
-        factors = [option.factor(values, known) / option.factor(values, reference) for option in self._options]
+        speeds = jnp.where(jnp.isnan(speed), reference, speed)
+        factors = [option.factor(values, speeds) / option.factor(values, reference) for option in self._options]
         return jnp.prod(jnp.stack(factors), axis=0)
 
     def efficiency(self, values: Mapping[str, Array], exponent: Float[Array, "*batch"]) -> Float[Array, "*batch"]:

@@ -273,8 +273,8 @@ def friction_options(text: str) -> tuple[str, ...]:
     options = tuple(name for name in names if name != "capstan")
     for name in options:
         if name not in FRICTION_OPTIONS:
-            known = ["capstan", *FRICTION_OPTIONS]
-            raise DescriptionError(f"the friction model {name!r} is unknown{suggest_name(name, known)}")
+            known_names = ["capstan", *FRICTION_OPTIONS]
+            raise DescriptionError(f"the friction model {name!r} is unknown{suggest_name(name, known_names)}")
         if options.count(name) > 1:
             raise DescriptionError(f"the friction model {text!r} names {name!r} twice; once is enough.")
     of_turns = [name for name in options if FRICTION_OPTIONS[name].of_turns]

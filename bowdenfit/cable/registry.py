@@ -62,27 +62,27 @@ def _check_length(description: Description, contact: Contact) -> None:
     Raises:
         DescriptionError: It is such a contact.
     """
-    where, route = f"cable.toml, contact {contact.name!r}", description.route
+    place, route = f"cable.toml, contact {contact.name!r}", description.route
     if contact.law not in _OF_LENGTH:
         if contact.length is not None:
             raise DescriptionError(
-                f'{where}: length is that of the sheath, which only law = "wobble-per-length" depends on; add that, or leave '
+                f'{place}: length is that of the sheath, which only law = "wobble-per-length" depends on; add that, or leave '
                 "length out."
             )
         return
     if contact.length is None:
         raise DescriptionError(
-            f'{where}: the law {contact.law!r} needs the length of the sheath: length = {{ value = 1.2, unit = "m" }}, or '
+            f'{place}: the law {contact.law!r} needs the length of the sheath: length = {{ value = 1.2, unit = "m" }}, or '
             'length = "route" where the route variable is that length.'
         )
     if contact.friction == description.stretch.friction:
         raise DescriptionError(
-            f"{where}: stretch.friction {contact.friction!r} acts here, and friction per length does not act on the stretch as "
+            f"{place}: stretch.friction {contact.friction!r} acts here, and friction per length does not act on the stretch as "
             "friction per angle does; leave stretch.friction out, for a coefficient of its own."
         )
     if contact.length == "route" and (route is None or dimension_of(route.unit) != "length"):
         raise DescriptionError(
-            f'{where}: length = "route" needs a [route] whose variable is the length of the sheath, in a unit of length.'
+            f'{place}: length = "route" needs a [route] whose variable is the length of the sheath, in a unit of length.'
         )
 
 

@@ -170,11 +170,11 @@ def _refuse_flags_of_others(flags: str) -> None:
     Raises:
         UsageError: There is one.
     """
-    others = [word for word in flags.split() if word.startswith("-") and not word.startswith("--xla_")]
-    if others:
+    remaining = [word for word in flags.split() if word.startswith("-") and not word.startswith("--xla_")]
+    if remaining:
         raise UsageError(
-            f"XLA_FLAGS in the environment holds {few([shown(word) for word in others])}, and flags of XLA begin with --xla_; "
-            "unset XLA_FLAGS, or correct it."
+            f"XLA_FLAGS in the environment holds {few([shown(word) for word in remaining])}, and flags of XLA begin with --xla_"
+            "; unset XLA_FLAGS, or correct it."
         )
 
 

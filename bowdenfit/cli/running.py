@@ -127,10 +127,14 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
         KeyboardInterrupt: The user stopped it; with how to go on, where something is kept.
     """
     refuse_low_memory()
-    kept = folder / watch.kept if folder is not None and watch.kept else None
+    checkpoint = folder / watch.kept if folder is not None and watch.kept else None
 
     def how_to_go_on() -> str:
-        return f"{watch.remark} {folder}: run the same command with --resume" if kept is not None and kept.exists() else ""
+        return (
+            f"{watch.remark} {folder}: run the same command with --resume"
+            if checkpoint is not None and checkpoint.exists()
+            else ""
+        )
 
     try:
         with announce_continuation(how_to_go_on), show_stages(watch) as show:

@@ -193,8 +193,8 @@ def find_placeholders(raw: Mapping[str, Any], text: str, file: str) -> dict[Plac
     for place, value in _strings(raw):
         if value in PLACEHOLDERS:
             lines = [i for i, line in enumerate(text.splitlines(), start=1) if value in line.partition("#")[0]]
-            where = f"{file}, line {lines[0]}" if lines else f"{file}, {'.'.join(map(str, place))}"
-            what = f"{where}: {shown(value)} is left from the template; write {PLACEHOLDERS[value]}."
+            location = f"{file}, line {lines[0]}" if lines else f"{file}, {'.'.join(map(str, place))}"
+            what = f"{location}: {shown(value)} is left from the template; write {PLACEHOLDERS[value]}."
             faults[place] = DescriptionError(what)
             faults[place].key_path = place
     return faults

@@ -108,7 +108,7 @@ class UnreadNames:
 
     def remarks(self) -> tuple[str, ...]:
         """Return one sentence for each reason."""
-        return tuple(f"Left out because {why}: {quoted(tuple(names))}." for why, names in self.names.items())
+        return tuple(f"Left out because {reason}: {quoted(tuple(names))}." for reason, names in self.names.items())
 
 
 def make_channel_file(

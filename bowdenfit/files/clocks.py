@@ -197,12 +197,12 @@ def trim_tails(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     clocks = [is_clock(channel) for channel in channels]
     starts = [clock and not before for clock, before in zip(clocks, [True, *clocks], strict=False)]
     blocks = np.cumsum(starts) if sum(clocks) > 1 else np.zeros(len(channels), dtype=int)
-    kept: list[Channel] = []
+    retained: list[Channel] = []
     for _, group in groupby(zip(blocks.tolist(), channels, strict=True), key=lambda pair: pair[0]):
         block = [channel for _, channel in group]
         length = max(_filled_length(channel.values) for channel in block)
-        kept += [replace(channel, values=channel.values[:length]) for channel in block]
-    return tuple(kept)
+        retained += [replace(channel, values=channel.values[:length]) for channel in block]
+    return tuple(retained)
 
 
 def _filled_length(values: Vector) -> int:

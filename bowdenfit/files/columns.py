@@ -165,8 +165,8 @@ def remark_on_errors_in_cells(table: RawTable, columns: Mapping[str, Column]) ->
     """Return a remark on what stands behind ± in cells, where a column of standard deviations was read from it."""
     with_errors = [column for name, column in columns.items() if f"{name}_sd" in columns and column.heading in table.errors]
     read = [shown(column.heading) for column in with_errors]
-    where = f"{table.file}: what follows ± in {listed(read)} is taken for one standard deviation."
-    return [where] if read else []
+    place = f"{table.file}: what follows ± in {listed(read)} is taken for one standard deviation."
+    return [place] if read else []
 
 
 def _missing_column(table: RawTable, name: str) -> Column:
@@ -254,8 +254,8 @@ def require_column(table: RawTable, columns: Mapping[str, Column], name: str, ex
 
 
 def _missing_column_error(table: RawTable, name: str, example: str, read: Collection[str]) -> DatasetError:
-    others = [heading for heading in table.header if heading not in read]
-    if values := find_pivot_headings(others):
+    remaining = [heading for heading in table.header if heading not in read]
+    if values := find_pivot_headings(remaining):
         return DatasetError(
             f"{table.file}: {few([shown(value) for value in values])} are above columns, as in a pivot table with a column "
             "for each angle or load. Such a table is read where these headings have their unit, as in 45° or 20 N, the other "
@@ -265,7 +265,7 @@ def _missing_column_error(table: RawTable, name: str, example: str, read: Collec
     _, _, unit = example.partition(" or ")[0].removeprefix(name).partition("_")
     option = option_naming(name, "NAME", unit.replace("_", "*"))
     return DatasetError(
-        f"{table.file} has no column {name}{_suggest_heading(name, others)}; it has {quoted(table.header)}. Name the "
+        f"{table.file} has no column {name}{_suggest_heading(name, remaining)}; it has {quoted(table.header)}. Name the "
         f"column {example}, or say which it is: {option} (in cable.toml columns = {{ {name} = {{ name = ..., unit = ... }} }})."
     )
 
@@ -362,6 +362,6 @@ def _named_column(table: RawTable, quantity: Quantity, source: ColumnSource) -> 
     written = next((unit for _, unit in meanings(source.name, (quantity,)) if unit), None)
     written = written or split_brackets(source.name)[1] or table.units[table.header.index(source.name)]
     written = written or heading_of(source.name).unit or None
-    if why := contradiction(source.unit, written):
-        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(source.name)}: {why}.")
+    if reason := contradiction(source.unit, written):
+        raise DatasetError(f"{table.file}, row {table.header_row}, column {shown(source.name)}: {reason}.")
     return _column(table, source.name, quantity, source.unit or written)

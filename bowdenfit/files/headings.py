@@ -120,10 +120,10 @@ def refuse_two_units(place: str, headings: Sequence[str], units: Sequence[str]) 
     """
     for heading, below in zip(headings, map(strip_brackets, units), strict=False):
         unit = heading_of(heading).unit
-        if unit and below and is_unit(unit) and is_unit(below) and (why := differing_units(unit, below)):
+        if unit and below and is_unit(unit) and is_unit(below) and (reason := differing_units(unit, below)):
             raise DatasetError(
                 f"{place}: the heading {shown(' '.join(heading.split()))} is in {unit}, and the row of units says "
-                f"{below} below it, {why}; correct the one that is wrong, or delete the row of units."
+                f"{below} below it, {reason}; correct the one that is wrong, or delete the row of units."
             )
 
 

@@ -46,10 +46,10 @@ def read(path: Path) -> ChannelFile:
         expected = max((_n_records(file, group) for group, _ in places), default=0)
         kind = f"MDF{str(file.version)[:1]}"
     channels = [channel for channel in read_one if channel is not None]
-    kept = max((len(channel.values) for channel in channels), default=0)
-    if places and expected and not kept and not left_out.names:
+    longest = max((len(channel.values) for channel in channels), default=0)
+    if places and expected and not longest and not left_out.names:
         raise truncation_error(path, "it ends before the first whole record")
-    remarks = [describe_truncation(path, f"{kept} of its {expected} records")] if 0 < kept < expected else []
+    remarks = [describe_truncation(path, f"{longest} of its {expected} records")] if 0 < longest < expected else []
     return make_channel_file(path, kind, channels, left_out, remarks)
 
 

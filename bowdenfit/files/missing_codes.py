@@ -85,8 +85,8 @@ class MissingCodes:
         codes = listed([shown(code) for code in self.stated])
         if not counts:
             return f"{file}: no sample holds the stated missing-value code {codes}."
-        where = listed([f"{counted(count, 'sample')} of {shown(name)}" for name, count in counts.items()])
-        return f"{file}: {where} hold a stated missing-value code ({codes}), and count as missing."
+        place = listed([f"{counted(count, 'sample')} of {shown(name)}" for name, count in counts.items()])
+        return f"{file}: {place} hold a stated missing-value code ({codes}), and count as missing."
 
 
 def leave_out_coded_rows(
@@ -123,12 +123,12 @@ def leave_out_coded_rows(
             f"{table.file}: every row holds a stated missing-value code ({listed([shown(code) for code in codes.stated])}) "
             "in a number that it needs; state the code that the file has, or another column."
         )
-    kept = [row[0].row not in coded for row in table.rows]
+    retained = [row[0].row not in coded for row in table.rows]
 
     def keep(cells: Sequence[Cell]) -> tuple[Cell, ...]:
-        return tuple(cell for cell, keeps in zip(cells, kept, strict=True) if keeps)
+        return tuple(cell for cell, keeps in zip(cells, retained, strict=True) if keeps)
 
-    rows = tuple(row for row, keeps in zip(table.rows, kept, strict=True) if keeps)
+    rows = tuple(row for row, keeps in zip(table.rows, retained, strict=True) if keeps)
     stated = listed([shown(code) for code in codes.stated])
     note = f"{counted(blank, 'cell')} with a stated missing-value code ({stated}) count as blank" if blank else ""
     if not coded and not blank:

@@ -35,8 +35,8 @@ class Filled:
         if good.all():
             return some
         first, behind = max(last_set(self._good, start), 0), min(first_set(self._good, stop) + 1, len(self))
-        where = first + np.flatnonzero(self._good[first:behind])
-        return np.interp(np.arange(start, stop), where, np.asarray(self._values[where], dtype=float))
+        positions = first + np.flatnonzero(self._good[first:behind])
+        return np.interp(np.arange(start, stop), positions, np.asarray(self._values[positions], dtype=float))
 
 
 Series: TypeAlias = Float[np.ndarray, " all"] | Filled

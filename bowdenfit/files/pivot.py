@@ -56,22 +56,22 @@ def unpivot(header: Sequence[str], units: Sequence[str], rows: Sequence[tuple[Ce
     if len(values) < _FEWEST or len(dimensions) > 1 or len({value.unit for value in values.values()}) > 1:
         return None
     is_by_angle = dimensions == {"angle"}
-    others = [i for i, heading in enumerate(header) if heading and i not in values]
-    if any(map(is_number, (header[i] for i in others))) or not (is_by_angle or dimensions == {"force"}):
+    remaining = [i for i, heading in enumerate(header) if heading and i not in values]
+    if any(map(is_number, (header[i] for i in remaining))) or not (is_by_angle or dimensions == {"force"}):
         return None
     find_unit = _unit_of_input if is_by_angle else _unit_of_angle
-    beside = [unit for i in others if (unit := find_unit(header[i], units[i]))]
-    if len(beside) != 1 or any(_unit_of_output(header[i], units[i]) for i in others):
+    beside = [unit for i in remaining if (unit := find_unit(header[i], units[i]))]
+    if len(beside) != 1 or any(_unit_of_output(header[i], units[i]) for i in remaining):
         return None
     over = next(iter(values.values())).unit
     unit_of_force = beside[0] if is_by_angle else over
-    long = [_make_row(row, others, i, value) for i, value in values.items() for row in rows if not row[i].blank]
-    if not _follows_input(long, next(k for k, i in enumerate(others) if find_unit(header[i], units[i])), is_by_angle):
+    long = [_make_row(row, remaining, i, value) for i, value in values.items() for row in rows if not row[i].blank]
+    if not _follows_input(long, next(k for k, i in enumerate(remaining) if find_unit(header[i], units[i])), is_by_angle):
         return None
     name, meaning = ("wrap_angle", "wrap angles") if is_by_angle else ("input_force", "input forces")
     return LongTable(
-        (*(header[i] for i in others), name, "output_force"),
-        (*(units[i] for i in others), over, unit_of_force),
+        (*(header[i] for i in remaining), name, "output_force"),
+        (*(units[i] for i in remaining), over, unit_of_force),
         tuple(long),
         f"{few([shown(header[i]) for i in values])} over columns are taken as {meaning}, as in a pivot table, and what stands "
         f"below them as output forces in {unit_of_force}, a reading for each cell.",

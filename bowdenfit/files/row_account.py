@@ -34,9 +34,9 @@ class LeftOut:
     def words(self) -> str:
         """Which rows, why, and what the first of them say."""
         many = self.count > 1
-        where = few([f"{first} to {last}" if last > first else f"{first}" for first, last in self.ranges], _RANGES)
+        place = few([f"{first} to {last}" if last > first else f"{first}" for first, last in self.ranges], _RANGES)
         quotes = f" ({', '.join(shown(text) for text in self.texts)}{', ...' if self.count > len(self.texts) else ''})"
-        return f"row{'s' if many else ''} {where}: {self.why}{quotes if self.texts else ''}"
+        return f"row{'s' if many else ''} {place}: {self.why}{quotes if self.texts else ''}"
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class RowAccount:
         Args:
             reasons: Why each of them is, by its number.
         """
-        left_out = _group_by_reason({row: (why, "") for row, why in reasons.items()})
+        left_out = _group_by_reason({row: (reason, "") for row, reason in reasons.items()})
         return replace(self, read=self.read - len(reasons), left_out=(*self.left_out, *left_out))
 
 
@@ -110,12 +110,12 @@ def _group_by_reason(reasons: Mapping[int, tuple[str, str]]) -> tuple[LeftOut, .
     ranges: dict[str, list[tuple[int, int]]] = {}
     texts: dict[str, list[str]] = {}
     for row in sorted(reasons):
-        why, text = reasons[row]
-        of_reason, of_texts = ranges.setdefault(why, []), texts.setdefault(why, [])
+        cause, text = reasons[row]
+        of_reason, of_texts = ranges.setdefault(cause, []), texts.setdefault(cause, [])
         if of_reason and of_reason[-1][1] == row - 1:
             of_reason[-1] = (of_reason[-1][0], row)
         else:
             of_reason.append((row, row))
         if text and len(of_texts) < _TEXTS:
             of_texts.append(text)
-    return tuple(LeftOut(why, tuple(ranges[why]), tuple(texts[why])) for why in ranges)
+    return tuple(LeftOut(reason, tuple(ranges[reason]), tuple(texts[reason])) for reason in ranges)

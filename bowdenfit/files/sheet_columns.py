@@ -103,7 +103,7 @@ def make_channels(layout: Layout, sheet_columns: SheetColumns) -> tuple[tuple[Ch
         sheet_columns: Its columns.
     """
     columns = sheet_columns.values
-    kept: list[Channel] = []
+    retained: list[Channel] = []
     remarks: list[str] = []
     nameless = [not heading.name for heading in layout.headings]
     for i, (heading, values) in enumerate(zip(layout.headings, columns, strict=True)):
@@ -115,10 +115,10 @@ def make_channels(layout: Layout, sheet_columns: SheetColumns) -> tuple[tuple[Ch
         elif nameless[i] and layout.named and is_index(values):
             remarks.append(f"{place} has no heading, only counts the rows and was left out.")
         else:
-            kept.append(Channel(layout.name(i), heading.unit, values, start=sheet_columns.starts.get(i)))
+            retained.append(Channel(layout.name(i), heading.unit, values, start=sheet_columns.starts.get(i)))
     if not layout.named:
         remarks.append("There is no row of headings; the columns are called column1, column2, ... from the left.")
-    named = make_names_unique(kept)
+    named = make_names_unique(retained)
     return assign_clocks(trim_tails(named)) if named else (), remarks
 
 
@@ -144,14 +144,14 @@ def read_columns(sheet: SheetRows) -> SheetColumns:
             _refuse_other_headings(sheet, row, [cell_text(other) for at, _, other in cells.words if at == position])
             raise Cell(sheet.place, row, sheet.layout.name(column), text).no_sample(sheet.decimal)
     dropped = [REMARKED, SPACE, REMARK] if sheet.of_text else [REMARKED, REMARK]
-    kept = ~np.isin(np.array(cells.letters[:stop]), dropped)
+    retained = ~np.isin(np.array(cells.letters[:stop]), dropped)
     columns: list[Vector | None] = [None] * len(kinds)
     starts = dict[int, float]()
     before = sheet.before or {}
     for i, values in (cells.numbers | cells.dates).items():
         pieces = before.pop(i, [])
         kind = pieces[0].dtype if pieces else float
-        remaining = np.array(values[:stop], dtype=object if i in cells.dates else kind)[kept]
+        remaining = np.array(values[:stop], dtype=object if i in cells.dates else kind)[retained]
         whole = np.concatenate([*pieces, remaining])
         pieces.clear()
         if i in cells.dates:
@@ -195,9 +195,9 @@ def _explain_left_out(sheet: SheetRows, cells: SheetCells, stop: int) -> dict[in
         elif position >= stop:
             _refuse_samples(sheet, position, of_row.get(position, []))
             left_out[sheet.number(position)] = BELOW, text_of_row
-        elif letter == WORDS and (why := _explain_words(sheet, of_row.get(position, []))):
+        elif letter == WORDS and (reason := _explain_words(sheet, of_row.get(position, []))):
             _refuse_samples(sheet, position, of_row[position])
-            left_out[sheet.number(position)] = why, text_of_row
+            left_out[sheet.number(position)] = reason, text_of_row
             cells.letters[position] = REMARK
     return left_out
 
@@ -258,11 +258,11 @@ def _describe_left_out(
     below = [i for i in range(stop, len(letters)) if letters[i] not in b" ,#"]
     if below:
         top, bottom = sheet.number(below[0]), sheet.number(below[-1])
-        where = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
-        sentences.append(f"{where} left out: they are below the data, as statistics are.")
+        place = f"Row {top} was" if top == bottom else f"Rows {top} to {bottom} were"
+        sentences.append(f"{place} left out: they are below the data, as statistics are.")
     if sheet.of_text:
         return sentences  # the account of the file names the rest
-    between = [f"row {row} ({shown(text)})" for row, (why, text) in left_out.items() if why in (BETWEEN, AGAIN)]
+    between = [f"row {row} ({shown(text)})" for row, (reason, text) in left_out.items() if reason in (BETWEEN, AGAIN)]
     sentences += [f"Left out because they have no numbers: {few(between)}."] if between else []
     texts = [f"{shown(text)} in row {row}" for row, text in beside]
     return sentences + ([f"Notes next to the columns were left out: {few(texts)}."] if texts else [])

@@ -190,10 +190,10 @@ def select_readings(rows: Sequence[CsvRecord], header: CsvRecord, file: str) -> 
     for i, row in enumerate(rows):
         if row.blank:
             continue
-        why = _explain_row_inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
-        if why:
+        reason = _explain_row_inside(row, header, numeric) if i < end else (_STATISTICS if is_summary(row.cells) else BELOW)
+        if reason:
             _refuse_reading(row, header, numeric, file)
-            left_out[row.row] = why
+            left_out[row.row] = reason
         else:
             body.append(row)
     return body, left_out

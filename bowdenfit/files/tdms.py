@@ -51,8 +51,8 @@ def read(path: Path) -> ChannelFile:
             left_out.add(_name(channel), "they are empty")
     if incomplete and not channels:
         raise truncation_error(path, "it ends before the first whole sample")
-    kept = max((len(channel.values) for channel in channels), default=0)
-    remarks = [describe_truncation(path, f"the {kept} whole samples before the end")] if incomplete else []
+    longest = max((len(channel.values) for channel in channels), default=0)
+    remarks = [describe_truncation(path, f"the {longest} whole samples before the end")] if incomplete else []
     return make_channel_file(path, "TDMS", assign_only_clock(assign_group_clocks(channels)), left_out, remarks)
 
 

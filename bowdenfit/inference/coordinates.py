@@ -182,8 +182,8 @@ class Conditional:
         slopes = jax.jacfwd(residuals)(middle)
         root = jnp.linalg.cholesky(slopes.T @ slopes + jnp.diag(width**2))
         center = middle - cho_solve((root, True), slopes.T @ residuals(middle))
-        known = jnp.all(jnp.isfinite(root)) & jnp.all(jnp.isfinite(center))
-        return _Ridge(jnp.where(known, center, middle), jnp.where(known, root, jnp.diag(width)))
+        finite = jnp.all(jnp.isfinite(root)) & jnp.all(jnp.isfinite(center))
+        return _Ridge(jnp.where(finite, center, middle), jnp.where(finite, root, jnp.diag(width)))
 
 
 class _Ridge(NamedTuple):

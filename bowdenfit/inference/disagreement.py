@@ -96,8 +96,8 @@ def _weigh_by_scatter(term: Term, residuals: np.ndarray, jacobian: np.ndarray, t
     has_own_scatter = len(residuals) - own_leverage.sum() >= _MANY
     about, leverage = (residuals - u @ (u.T @ residuals), own_leverage) if has_own_scatter else (residuals, common_leverage)
     scale, spread = estimate_scatter([term], {term.name: about}, leverage)
-    scale, known = np.maximum(scale, _LEAST_SCATTER), np.isfinite(spread[term.name])
-    freedom = float(term.residual_blocks[0][1] - leverage.sum()) if known else np.inf
+    scale, finite = np.maximum(scale, _LEAST_SCATTER), np.isfinite(spread[term.name])
+    freedom = float(term.residual_blocks[0][1] - leverage.sum()) if finite else np.inf
     return _WeighedTable(residuals / scale, jacobian / scale[:, None], freedom)
 
 

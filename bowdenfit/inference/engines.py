@@ -126,21 +126,21 @@ class Engine(Generic[Work, Result]):
             return self.running.submit(run_piece, function, piece)
         except Exception as error:
             self.check()
-            why = f"{type(error).__name__}: {error}"
+            reason = f"{type(error).__name__}: {error}"
             raise EngineError(
-                f"{self.name} accepts no more work ({why}); start it again, and go on with --resume."
+                f"{self.name} accepts no more work ({reason}); start it again, and go on with --resume."
             ) from None
 
     def _count_attempt(self, attempts: int, error: Exception) -> int:
         """Return the number of attempts at a piece including the next; raise if it must not be tried again."""
-        why = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         if isinstance(error, ImportError | AttributeError):
             raise EngineError(
-                f"a worker of {self.name} cannot load what it is to do ({why}); install the same bowdenfit there as here."
+                f"a worker of {self.name} cannot load what it is to do ({reason}); install the same bowdenfit there as here."
             ) from None
         if attempts >= _MOST_ATTEMPTS:
             raise EngineError(
-                f"workers of {self.name} were lost {attempts} times at the same work ({why}); the usual cause is too little "
+                f"workers of {self.name} were lost {attempts} times at the same work ({reason}); the usual cause is too little "
                 "memory: give each worker more, or have fewer of them."
             ) from None
         return attempts + 1

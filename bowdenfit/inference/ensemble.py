@@ -178,9 +178,9 @@ def _summarize(request: SamplingRequest, backend: emcee.backends.Backend) -> Cha
     """Return draws from the second half of every walker's path, with their diagnostics."""
     stored = int(backend.iteration)
     n_kept = max(KEPT_PER_WALKER, 2 * request.settings.target_ess // backend.shape[0])
-    kept = np.unique(np.linspace(stored // 2, stored - 1, min(stored, n_kept)).round().astype(int))
+    retained = np.unique(np.linspace(stored // 2, stored - 1, min(stored, n_kept)).round().astype(int))
     # In this order in memory, as in a loaded fit: sums must agree to the last bit.
-    z = np.ascontiguousarray(np.asarray(backend.get_chain()[kept]).transpose(1, 0, 2))
+    z = np.ascontiguousarray(np.asarray(backend.get_chain()[retained]).transpose(1, 0, 2))
     acceptance = float(np.mean(backend.accepted)) / stored
     chain = request.make_chain(z, request.settings.n_ensembles, steps=stored * THIN, acceptance=acceptance)
     too_short = f"the sampling took {stored * THIN} steps, and convergence can only be judged after {_FIRST_CHECK * THIN}"

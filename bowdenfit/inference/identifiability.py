@@ -208,10 +208,10 @@ def _round_weights(vector: np.ndarray, prior_sd: np.ndarray) -> tuple[np.ndarray
     """Return an eigenvector's weights, small ones dropped, rounded to two digits; and the parameters kept, largest first."""
     lead = int(np.argmax(np.abs(vector)))
     weights = (vector / prior_sd) / (vector[lead] / prior_sd[lead])
-    kept = np.array(sorted(np.flatnonzero(np.abs(vector) >= _PART), key=lambda i: -abs(vector[i])), dtype=int)
+    retained = np.array(sorted(np.flatnonzero(np.abs(vector) >= _PART), key=lambda i: -abs(vector[i])), dtype=int)
     rounded = np.zeros(len(vector))
-    rounded[kept] = [float(f"{weights[i]:.2g}") for i in kept]
-    return rounded, kept
+    rounded[retained] = [float(f"{weights[i]:.2g}") for i in retained]
+    return rounded, retained
 
 
 def _find_sharpest(directions: Sequence[Combination], value: np.ndarray, covariance: np.ndarray) -> Combination | None:

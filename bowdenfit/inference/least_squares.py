@@ -225,14 +225,14 @@ def _make_estimates(
             continue
         value, limit = float(solution["values"][i] * p.shown_scale), profiled.get(p.name, UNKNOWN_LIMITS)
         sd = float(abs(solution["slope"][i] * error[i]) * p.shown_scale)
-        others = [float(r["values"][i]) * p.shown_scale for r in rivals]
+        remaining = [float(r["values"][i]) * p.shown_scale for r in rivals]
         if basin.at_end[i]:
             remark = _describe_bound(value, limit, solution["z"][i] > 0)
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit, at_bound=True)
         elif not determined[i] or (p.role == "elastic" and isinstance(p.prior, LogNormal) and sd > value):
             # A positive quantity that may as well be 0 or twice as large is none that was measured.
             estimates[p.name] = Estimate(np.nan, np.nan, False, UNDETERMINED)
-        elif (ends := range_of_minima(value, sd, others)) is not None:
+        elif (ends := range_of_minima(value, sd, remaining)) is not None:
             remark = f"values from {significant(ends[0])} to {significant(ends[1])} fit about as well"
             estimates[p.name] = Estimate(np.nan, np.nan, False, remark, *limit)
         else:

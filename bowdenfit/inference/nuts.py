@@ -227,8 +227,8 @@ def _summarize(request: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain
     steps, chains = samples["energy"].shape
     fine = _is_fine(steps)
     n_kept = max(KEPT_OF_CHAINS, 2 * request.settings.target_ess) // chains
-    kept = np.unique(np.linspace(0, steps - 1, min(steps, n_kept)).round().astype(int))
-    z = np.ascontiguousarray(samples["z"][kept].transpose(1, 0, 2))
+    retained = np.unique(np.linspace(0, steps - 1, min(steps, n_kept)).round().astype(int))
+    z = np.ascontiguousarray(samples["z"][retained].transpose(1, 0, 2))
     trajectories = Trajectories(
         WARM_UP * BLOCK,
         steps * chains,
@@ -239,7 +239,7 @@ def _summarize(request: SamplingRequest, blocks: Sequence[Block]) -> tuple[Chain
         compute_energy_mixing(samples["energy"].T),
         float(np.exp(blocks[-1]["tuning"][1, 0])),
         int(sum(b["n_steps"].sum() for b in blocks)),
-        {name: np.ascontiguousarray(samples[name][kept].T) for name in _STATISTICS},
+        {name: np.ascontiguousarray(samples[name][retained].T) for name in _STATISTICS},
     )
     details = {"acceptance": float(samples["acceptance_rate"].mean()), "sampler": "nuts", "trajectories": trajectories}
     chain = request.make_chain(z, chains, steps=steps, **details)

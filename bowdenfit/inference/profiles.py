@@ -107,13 +107,13 @@ class Basin:
 
     def _extrapolate(self, near: Solution, mask: np.ndarray, z: float) -> np.ndarray:
         """Return where the other parameters follow linearly; unchanged where that is far."""
-        others = ~(self.problem.noise | self.at_end | mask)
+        remaining = ~(self.problem.noise | self.at_end | mask)
         jacobian = np.concatenate([near["sensitivity"], np.diag(self.problem.weight)])
         residuals = near["stacked"] + jacobian @ np.where(mask, z - near["z"], 0.0)
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residuals))):
             return near["z"]
         step = np.zeros(len(mask))
-        step[others] = gauss_newton_step(jacobian[:, others], residuals)
+        step[remaining] = gauss_newton_step(jacobian[:, remaining], residuals)
         return near["z"] + step if np.all(np.abs(step) <= _FAR) else near["z"]
 
     def _solve(self, start: np.ndarray, pinned: np.ndarray | bool, pin: np.ndarray) -> Solution:

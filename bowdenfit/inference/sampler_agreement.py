@@ -132,8 +132,8 @@ class SamplerDraws:
             parts = [_summarize(part) for part in np.split(draws, self.n_ensembles)]
             between = np.var(parts, axis=0, ddof=1) / self.n_ensembles
             errors = np.array(_standard_errors(draws))
-            known = np.isfinite(errors) & (errors > 0)
-            ratios += list(between[known] / errors[known] ** 2)
+            finite = np.isfinite(errors) & (errors > 0)
+            ratios += list(between[finite] / errors[finite] ** 2)
         return float(np.sqrt(max(np.mean(ratios), 1.0))) if ratios else 1.0
 
 

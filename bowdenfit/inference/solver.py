@@ -91,8 +91,8 @@ def minimize(evaluate: Evaluate, start: np.ndarray, precision: Precision = PRECI
         return minimum
     # It has stopped short: at a kink of the residuals, or in a long bend. One that ran out of evaluations goes on.
     again = (minimum,) if precision != PRECISE and not minimum.succeeded else (first, minimum)
-    others = [_polish(evaluate, _descend(evaluate, at, precision, _BOLD_RADIUS), precision) for at in again]
-    return min([minimum, *others], key=lambda m: (not m.succeeded, m.sum_of_squares))
+    remaining = [_polish(evaluate, _descend(evaluate, at, precision, _BOLD_RADIUS), precision) for at in again]
+    return min([minimum, *remaining], key=lambda m: (not m.succeeded, m.sum_of_squares))
 
 
 def compile_solver(rows: int, columns: int) -> None:

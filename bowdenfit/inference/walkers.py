@@ -83,10 +83,10 @@ def make_walker_sweep(
             ways = [partial(_apply_map, frame, is_z) for frame, _ in frames]
             w, z, volume = jax.lax.switch(choices.frame, ways, points, data)
             value = jax.vmap(lambda one: log_density(one, data))(z)
-            value, known = jnp.where(jnp.isnan(value), -jnp.inf, value), jnp.isfinite(volume)
+            value, finite = jnp.where(jnp.isnan(value), -jnp.inf, value), jnp.isfinite(volume)
             # Where coordinates do not reach: nothing is proposed there, and a walker that is there already stays.
             beyond = jnp.where(is_z & (value > -jnp.inf), jnp.inf, -jnp.inf)
-            value_in_w = jnp.where(known, value + jnp.where(known, volume, 0.0), beyond)
+            value_in_w = jnp.where(finite, value + jnp.where(finite, volume, 0.0), beyond)
             return Walkers(w, z, value_in_w, value, jnp.zeros_like(value))
 
         def half_step(halves: tuple[Walkers, Walkers], turn: tuple[Array, Array, RandomNumbers]) -> Any:

@@ -58,7 +58,7 @@ def iterate_tables(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]
 
 def find_kind(readings: str) -> Kind[Any] | None:
     """Return the kind that has readings of this name; None if none has."""
-    return next((kind for kind in KINDS.values() if any(one.name == readings for one in kind.readings)), None)
+    return next((kind for kind in KINDS.values() if any(item.name == readings for item in kind.readings)), None)
 
 
 def find_readings(name: str) -> Readings:

@@ -98,11 +98,11 @@ class Situation:
     def rows(self, wanted: Sequence[Candidate]) -> tuple[np.ndarray, OwnAngles, RowOrigin]:
         """Return route values, wrap angles and row origins of a table with one row a candidate."""
         n, names = len(wanted), self.cable.description.angle_columns
-        own = OwnAngles.none(names, n)
+        own_angles = OwnAngles.none(names, n)
         for row, candidate in enumerate(wanted):
             for name, angle in zip(self.columns_without_curve, candidate.angles, strict=False):
-                own.angle[row, names.index(name)] = angle
-        return np.array([c.route for c in wanted]), own, RowOrigin.below_heading("next", n)
+                own_angles.angle[row, names.index(name)] = angle
+        return np.array([c.route for c in wanted]), own_angles, RowOrigin.below_heading("next", n)
 
 
 @dataclass(frozen=True)

@@ -80,11 +80,11 @@ def _mean_wrap_angles(term: Term) -> np.ndarray | None:
     at = term.data if rows is None else rows.angles
     if "is_own" not in at:
         return None
-    own, n = np.asarray(at["is_own"]), len(term.labels)
+    own_angles, n = np.asarray(at["is_own"]), len(term.labels)
     curved = [bool(contact.wrap_angle.curve) for contact in term.cable.description.contact]
-    if own.shape[1:] != (len(curved),) or not own.any() or not own[:, curved].all():
+    if own_angles.shape[1:] != (len(curved),) or not own_angles.any() or not own_angles[:, curved].all():
         return None
-    bends = np.rad2deg(np.sum(np.where(own, at["own"], 0.0), axis=1))
+    bends = np.rad2deg(np.sum(np.where(own_angles, at["own"], 0.0), axis=1))
     if rows is not None:
         angles_of_runs = [bends[rows.run == run] for run in np.unique(rows.run)]
         if any(np.ptp(of_run) > _ONE_PLACE * np.ptp(bends) for of_run in angles_of_runs):

@@ -85,8 +85,8 @@ def parse_description(raw: Mapping[str, Any], file: str = "cable.toml") -> Descr
     for kind in kinds:
         settings = description.tables.stated.get(kind.name)
         with faults.collect(key_path=("tables",)):
-            if why := kind.contradiction(settings, description):
-                raise DescriptionError(f"{file}: {why}.")
+            if reason := kind.contradiction(settings, description):
+                raise DescriptionError(f"{file}: {reason}.")
             if settings is not None:
                 check_quantities(kind.quantities(settings, description), file)
     faults.refuse()
@@ -168,8 +168,8 @@ def read_design(page: Mapping[str, Any], description: Description, file: str) ->
     """
     design = _parse_design(page, file)
     for kind in _planned_kinds():
-        if why := kind.design_contradiction(design, description):
-            raise DescriptionError(f"{file}, design.{why}")
+        if reason := kind.design_contradiction(design, description):
+            raise DescriptionError(f"{file}, design.{reason}")
     return design
 
 

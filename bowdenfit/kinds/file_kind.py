@@ -165,8 +165,8 @@ def _guess_by_columns(path: Path, table: RawTable) -> FileKind:
         return FileKind("recordings", f"the line {shown(rate[1])} states its sampling rate")
     if kind == "efficiencies" or len(table.rows) <= _LONG or not _is_smooth(table):
         return FileKind(kind, "it has no column of time")
-    why = "it has no column of time, but many rows in which the force changes little from one to the next"
-    return FileKind(kind, why, "recordings")
+    reason = "it has no column of time, but many rows in which the force changes little from one to the next"
+    return FileKind(kind, reason, "recordings")
 
 
 def is_angle_table(table: RawTable) -> bool:
@@ -199,10 +199,10 @@ def _guess_with_clock(table: RawTable, clock: int, kind: str, rows_alone: str) -
         )
     if rows_alone or kind == "efficiencies":
         beside = rows_alone or "of efficiencies"
-        why = (
+        reason = (
             f"it has a column of time, {heading}, whose steps are those of a sampled force, but also a column {beside}"
         )
-        return FileKind("recordings", why, kind)
+        return FileKind("recordings", reason, kind)
     has_dates = not steps and any(is_date(row[clock].text.strip()) for row in table.rows[:_FEW])
     even = bool(steps) and min(steps) > 0 and max(steps) < _UNEVEN * min(steps)
     sampled = bool(steps) and (float(np.median(steps)) < _SLOW or (many and (even or _is_smooth(table))))
@@ -247,13 +247,13 @@ def read_numbers(table: RawTable, column: int) -> list[float]:
 def _steps(table: RawTable, column: int) -> list[float]:
     """Return the seconds from each of the first rows to the next; empty where these are no numbers."""
     values = read_numbers(table, column)
-    known = [value for value in values if math.isfinite(value)]
+    finite = [value for value in values if math.isfinite(value)]
     unit = heading_of(table.header[column], table.units[column]).unit
     try:
         factor = conversion_factor(unit, "time") if unit else 1.0
     except DatasetError:
         factor = 1.0
-    return [factor * (after - before) for before, after in pairwise(known)] if len(known) > len(values) / 2 else []
+    return [factor * (after - before) for before, after in pairwise(finite)] if len(finite) > len(values) / 2 else []
 
 
 def _is_smooth(table: RawTable) -> bool:

@@ -61,15 +61,15 @@ def list_number_columns(table: RawTable) -> list[HeadedColumn]:
     """List the columns of numbers of a table, without clocks."""
     columns = []
     for i, (heading, unit) in enumerate(zip(table.header, table.units, strict=True)):
-        known = [value for value in read_numbers(table, i) if np.isfinite(value)]
+        finite = [value for value in read_numbers(table, i) if np.isfinite(value)]
         if (
             heading
-            and len(known) > len(table.rows) / 2
+            and len(finite) > len(table.rows) / 2
             and not (names_time(heading) and not parse_heading(heading, unit))
         ):
-            values = np.array(known)
-            whole, counts = bool(np.all(values == np.round(values))), len(known) > _FEW and is_index(values)
-            columns.append(HeadedColumn(heading, unit, float(values.mean()), min(known), max(known), whole, counts))
+            values = np.array(finite)
+            whole, counts = bool(np.all(values == np.round(values))), len(finite) > _FEW and is_index(values)
+            columns.append(HeadedColumn(heading, unit, float(values.mean()), min(finite), max(finite), whole, counts))
     return columns
 
 
@@ -97,10 +97,10 @@ def name_force_columns(
     provided = []
     unnamed = [quantity.name for quantity in FORCES if quantity.name not in stated]
     missing = [name for name in unnamed if name not in ends]
-    others = _forces_among([column for column in columns if column not in ends.values()])
-    if missing and len(others) == len(missing):
-        others = others if in_order else sorted(others, key=lambda column: -column.mean)  # a pulled cable loses force
-        ends |= dict(zip(missing, others, strict=True))
+    remaining = _forces_among([column for column in columns if column not in ends.values()])
+    if missing and len(remaining) == len(missing):
+        remaining = remaining if in_order else sorted(remaining, key=lambda column: -column.mean)  # a pulled cable loses force
+        ends |= dict(zip(missing, remaining, strict=True))
         provided += [f"{shown(ends[name].name)} is the {name}" for name in missing]
     elif missing:
         ends |= {name: HeadedColumn("NAME", "N") for name in missing}
@@ -337,8 +337,8 @@ def _wrap_angle_options(table: RawTable, path: Path) -> tuple[list[str], list[st
     if not likely:
         return _stated_angle_options(path)
     best = next((name for name in likely if "measured" in name.lower()), next(iter(likely)))
-    others = [shown(name) for name in likely if name != best]
-    rather = f" rather than {listed(others)}, and not one of several bends, whose angles add up" if others else ""
+    remaining = [shown(name) for name in likely if name != best]
+    rather = f" rather than {listed(remaining)}, and not one of several bends, whose angles add up" if remaining else ""
     unit, clause = likely[best], f"{shown(best)} is the wrap angle{rather}"
     if unit is None:
         return [], [f"the table has a column wrap_angle_deg, the number of bends in {shown(best)} times the angle of one"]

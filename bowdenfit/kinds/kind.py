@@ -285,29 +285,29 @@ class FrictionTableKind(FrictionKind[AnyRows]):
 
 def _check_contact(description: Description, angles: AngleTable | None, contact: Contact, table: Rows) -> None:
     column = contact.wrap_angle.column or ""
-    own, _ = table.own.column(column)
+    own_angles, _ = table.own.column(column)
     if not contact.wrap_angle.curve:
-        missing = np.flatnonzero(np.isnan(own))
-        if len(missing) == len(own):
+        missing = np.flatnonzero(np.isnan(own_angles))
+        if len(missing) == len(own_angles):
             raise DatasetError(
                 f"{table.origin.files[0]} has no column {column!r}, the wrap angle of the contact {contact.name!r}; "
                 f"add it (as {column}_deg), or give the contact a constant angle or a curve in cable.toml."
             )
-        why = (
+        reason = (
             f"the cell is blank, but the contact {contact.name!r} has no curve that could stand in for it; fill in the "
         )
-        Faults([_in_row(table, i, column, why + "measured angle.") for i in map(int, missing)]).refuse()
+        Faults([_in_row(table, i, column, reason + "measured angle.") for i in map(int, missing)]).refuse()
         return
     route = description.route
     assert route is not None and angles is not None  # the description guarantees both
-    outside = np.isnan(own) & ((table.route < route.range[0]) | (table.route > route.range[1]))
-    why = (
+    outside = np.isnan(own_angles) & ((table.route < route.range[0]) | (table.route > route.range[1]))
+    reason = (
         f"lies outside the range {route.range[0]:g} to {route.range[1]:g} {route.unit} where the angle curves hold, and the "
         f"angle table has no row there; measure the wrap angles at that {route.variable.replace('_', ' ')}, or write them "
         "into this row."
     )
     rows = [int(i) for i in np.flatnonzero(outside) if not np.any(angles.route == table.route[i])]
-    Faults([_in_row(table, i, route.variable, why, f"{table.route[i]:g} {route.unit} ") for i in rows]).refuse()
+    Faults([_in_row(table, i, route.variable, reason, f"{table.route[i]:g} {route.unit} ") for i in rows]).refuse()
 
 
 def _in_row(table: Rows, i: int, column: str, what: str, value: str = "") -> DatasetError:

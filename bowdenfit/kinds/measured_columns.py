@@ -86,9 +86,9 @@ def find_cut_off(column: MeasuredColumn) -> tuple[np.ndarray, np.ndarray]:
         values = sign * column.values
         there = np.isfinite(values if column.along is None else values + column.along)
         tied = there & np.isclose(values, np.max(values, where=there, initial=-np.inf), rtol=1e-9, atol=0.0)
-        others = column.values[there & ~tied & (values != 0)]
-        repeats = np.unique(others.round(12), return_counts=True)[1]
-        few_others = len(np.unique(others)) < _FEWEST or tied.sum() < max(_FEWEST, _RARER * (repeats.max(initial=1) - 1))
+        remaining = column.values[there & ~tied & (values != 0)]
+        repeats = np.unique(remaining.round(12), return_counts=True)[1]
+        few_others = len(np.unique(remaining)) < _FEWEST or tied.sum() < max(_FEWEST, _RARER * (repeats.max(initial=1) - 1))
         rows = np.zeros(0, dtype=int)
         if not few_others and column.values[tied][0] != 0:
             if column.along is not None:

@@ -171,12 +171,12 @@ def describe_copies(compared: ComparedReadings) -> list[str]:
                 f"{few(others)} of {compared.file} {hold} the same {len(one)} readings as {first}, to the last digit"
             )
     for times, those in repeated.items():
-        where = np.sort(np.concatenate([parts[k] for k in those]))
-        if (1 - 1 / times) * _log_agreement_probability(chances, compared.read[where]) < np.log(FALSE_ALARM):
+        positions = np.sort(np.concatenate([parts[k] for k in those]))
+        if (1 - 1 / times) * _log_agreement_probability(chances, compared.read[positions]) < np.log(FALSE_ALARM):
             whose = f" of {few(compared.names[k] for k in those)}" if len(those) < len(parts) else ""
             often = _MULTIPLES.get(times, f"{times} times")
             sentences.append(f"every reading{whose} in {compared.file} stands there {often}, to the last digit")
-            if pasted := _describe_block(compared, *_halves(rows, where, times)):
+            if pasted := _describe_block(compared, *_halves(rows, positions, times)):
                 sentences[-1] += f": {pasted}"
     if not sentences and block:
         original, again = block
@@ -255,14 +255,14 @@ def _agreement_probabilities(compared: ComparedReadings) -> Float[np.ndarray, " 
     """
     probabilities = np.ones(compared.read.shape[1])
     for c, read in enumerate(compared.read.T):
-        known = np.isfinite(read) & np.isfinite(compared.along)
+        finite = np.isfinite(read) & np.isfinite(compared.along)
         squares = freedom = 0.0
-        for curve in np.unique(compared.curve[known]):
-            here = known & (compared.curve == curve)
-            points = np.unique(np.column_stack([compared.along[here], read[here]]), axis=0)
+        for curve in np.unique(compared.curve[finite]):
+            mask = finite & (compared.curve == curve)
+            points = np.unique(np.column_stack([compared.along[mask], read[mask]]), axis=0)
             residual, left = _residuals_of_polynomial(*points.T)
             squares, freedom = squares + residual, freedom + left
-        values = np.unique(read[known])
+        values = np.unique(read[finite])
         if freedom < _LEAST_FREEDOM or len(values) < 2:
             continue
         scatter = np.sqrt(squares / freedom)

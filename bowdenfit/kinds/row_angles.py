@@ -97,12 +97,12 @@ def find_measured_angle(angles: AngleTable, column: str, at: float) -> tuple[flo
     The standard deviation is NaN, for that of the angle table's noise, unless the angle was too small to detect there.
     """
     measured, detection_limit = angles.column(column)
-    here = np.isclose(angles.route, at, rtol=ROUNDING, atol=0.0)
-    if not here.any():
+    mask = np.isclose(angles.route, at, rtol=ROUNDING, atol=0.0)
+    if not mask.any():
         return None
-    undetected = np.isnan(measured[here])
-    readings = np.where(undetected, detection_limit[here] / 2, measured[here])
-    sd = float(np.nanmax(detection_limit[here])) / np.sqrt(12) if undetected.any() else np.nan
+    undetected = np.isnan(measured[mask])
+    readings = np.where(undetected, detection_limit[mask] / 2, measured[mask])
+    sd = float(np.nanmax(detection_limit[mask])) / np.sqrt(12) if undetected.any() else np.nan
     return float(readings.mean()), sd
 
 

@@ -124,9 +124,9 @@ class RunsTerm:
             output_force = friction.output_force(values, input_force, exponent + more, stroke)
             return stroke * jnp.log(read / cells.shown_output(output_force, least))
 
-        zero, one = jnp.zeros_like(exponent), jnp.ones_like(exponent)
-        shown, slope = jax.jvp(ratio, (zero, zero), (one, zero))
-        _, by_load = jax.jvp(ratio, (zero, zero), (zero, one))
+        zero, unit = jnp.zeros_like(exponent), jnp.ones_like(exponent)
+        shown, slope = jax.jvp(ratio, (zero, zero), (unit, zero))
+        _, by_load = jax.jvp(ratio, (zero, zero), (zero, unit))
         return shown + from_delay, slope, by_load
 
     def _deviations(
@@ -320,9 +320,9 @@ def _bin_values(values: Vector, group: Labels, most: int) -> Labels:
     bins = np.zeros(len(values), dtype=int)
     for name in np.unique(group):
         rows = group == name
-        distinct, where = np.unique(values[rows], return_inverse=True)
+        distinct, positions = np.unique(values[rows], return_inverse=True)
         if len(distinct) > most:
             edges = np.quantile(values[rows], np.linspace(0, 1, most + 1)[1:-1])
-            where = np.searchsorted(edges, values[rows])
-        bins[rows] = where
+            positions = np.searchsorted(edges, values[rows])
+        bins[rows] = positions
     return bins

@@ -242,9 +242,9 @@ def list_readings_inside_runs(cell: Labels, run: Labels, rows: SlidingRows, nois
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], cell[order])
     together = (np.arange(len(cell)) - first) // max(1, -(-len(cell) // _MOST))
-    _, where = np.unique(np.column_stack([cell[order], together]), axis=0, return_inverse=True)
+    _, positions = np.unique(np.column_stack([cell[order], together]), axis=0, return_inverse=True)
     group = np.empty(len(cell), dtype=int)
-    group[order] = where.ravel()
+    group[order] = positions.ravel()
     total = np.bincount(group, weight)
 
     def mean(values: Vector) -> Float[np.ndarray, " readings"]:
@@ -269,7 +269,7 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
     first, last = np.full(int(run.max()) + 1, len(run)), np.zeros(int(run.max()) + 1, dtype=int)
     np.minimum.at(first, run, np.arange(len(run)))
     np.maximum.at(last, run, np.arange(len(run)))
-    own = np.where(rows.angles["is_own"], rows.angles["own"], 0.0)
+    own_angles = np.where(rows.angles["is_own"], rows.angles["own"], 0.0)
     order = (np.arange(len(run)) - first[run]).astype(float)
     later = 2 * order / np.maximum(last - first, 1)[run] - 1
     drifting = {ZERO: -rows.stroke * later / rows.output_force} if np.any(rows.drift) else {}
@@ -278,5 +278,5 @@ def _covariates(run: Labels, rows: SlidingRows) -> dict[str, Vector]:
         STROKE: rows.stroke.astype(float),
         SPEED: np.abs(rows.velocity),
         ORDER: order,
-        WRAP_ANGLE: np.rad2deg(own.sum(axis=1)),
+        WRAP_ANGLE: np.rad2deg(own_angles.sum(axis=1)),
     }

@@ -113,8 +113,8 @@ def moving_preload(
 
 def _mean_tensions(along: Array, mean: Array, friction_exponent: Array) -> tuple[Array, Array, Array]:
     """Return the mean tensions of the pulling and of the returning side [N], and the ratio of their changes with `mean`."""
-    one = jnp.ones_like(friction_exponent)
-    a, b = mean_tension(one, friction_exponent), mean_tension(one, -friction_exponent)
+    unit = jnp.ones_like(friction_exponent)
+    a, b = mean_tension(unit, friction_exponent), mean_tension(unit, -friction_exponent)
     pulling = a * (2 * mean + b * along) / (a + b)
     return pulling, 2 * mean - pulling, b / a
 

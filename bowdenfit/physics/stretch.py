@@ -171,8 +171,8 @@ def mean_tension_unloading(
     Returns:
         Mean tension [N].
     """
-    one = jnp.ones_like(friction_exponent)
-    shares = mean_tension(one, friction_exponent), mean_tension(one, -friction_exponent)
+    unit = jnp.ones_like(friction_exponent)
+    shares = mean_tension(unit, friction_exponent), mean_tension(unit, -friction_exponent)
     return mean_tension_from_shares(force, peak_force, friction_exponent, *shares)
 
 

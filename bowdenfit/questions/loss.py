@@ -65,9 +65,9 @@ class LossByContact:
         remaining = [f"{percent(c.share.median, 0)} at {c.name!r}" for c in others[:_FEW]]
         if len(others) > _FEW:
             remaining.append(f"the rest at {counted(len(others) - _FEW, 'other')}")
-        where = f"{self.position[0].upper()}{self.position[1:]}, " if self.position else ""
+        place = f"{self.position[0].upper()}{self.position[1:]}, " if self.position else ""
         return (
-            f"{where}{percent(largest.share.median, 0)} of the loss occurs at {largest.name!r} "
+            f"{place}{percent(largest.share.median, 0)} of the loss occurs at {largest.name!r} "
             f"(90 % interval {low.removesuffix(' %')} to {high}), {listed(remaining)}."
         )
 
@@ -140,8 +140,8 @@ def loss_section(fit: Record) -> PageSection | None:
     if loss is None:
         return None
     table_of_shares = PageTable(HEADS, tuple(loss_rows(loss)), loss_heading(loss))
-    where = f", {loss.position}" if loss.position else ""
-    caption = f"Share of each contact in the loss{where}: median, and the interval that holds it with 90 % probability."
+    place = f", {loss.position}" if loss.position else ""
+    caption = f"Share of each contact in the loss{place}: median, and the interval that holds it with 90 % probability."
     picture = Picture("loss", LOSS_TITLE, caption, (make_loss_chart(loss),), caption, alone=True)
     return prose_section(LOSS_TITLE, (), [table_of_shares], pictures=(picture,))
 

@@ -86,8 +86,8 @@ def refuse_other_angle(file: ChannelFile, sources: Mapping[str, ColumnSource], f
         DatasetError: There is such a channel, or its angle changes inside the recording.
     """
     for channel in find_angle_channels(file, sources, force) if stated is not None else ():
-        if why := channel.explain_change(file.path.name) or channel.explain_contradiction(file.path.name, stated or 0.0):
-            raise DatasetError(why)
+        if reason := channel.explain_change(file.path.name) or channel.explain_contradiction(file.path.name, stated or 0.0):
+            raise DatasetError(reason)
 
 
 def find_angle_channels(file: ChannelFile, sources: Mapping[str, ColumnSource], force: Vector) -> tuple[AngleChannel, ...]:

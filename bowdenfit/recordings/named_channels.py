@@ -113,8 +113,8 @@ def stated_unit(file: ChannelFile, channel: Channel, quantity: str, source: Colu
     # A heading such as input_torque_N_m was read as one in m, which only the name of the quantity can tell.
     read = [*named, channel.unit] if quantity.endswith("torque") else [channel.unit, *named]
     counts = isinstance(source, ChannelSource) and source.gain != 1  # whose unit is that of the gain
-    if source and not counts and (why := contradiction(source.unit, next(filter(None, read), None))):
-        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {why}.")
+    if source and not counts and (reason := contradiction(source.unit, next(filter(None, read), None))):
+        raise DatasetError(f"{file.path.name}, channel {shown(channel.name)}: {reason}.")
     stated = next((unit for unit in (source.unit if source else None, *read) if unit), "")
     if not stated:
         units = {"velocity": "mm/s", "time": "s", "input_torque": "N*m", "output_torque": "N*m"}

@@ -145,14 +145,14 @@ def sliding_one_way(loop: Hysteresis, velocity: Vector) -> Labels:
     ratio = np.log(loop.force_in / loop.force_out)
     if RETURN in loop.state or np.median(ratio) <= 0:
         return loop.state
-    known = np.isfinite(velocity)
-    highest = np.max(np.abs(velocity[known]), initial=0.0)
-    signs = set(np.sign(velocity[known & (np.abs(velocity) > _STILL * highest)]).tolist())
+    finite = np.isfinite(velocity)
+    highest = np.max(np.abs(velocity[finite]), initial=0.0)
+    signs = set(np.sign(velocity[finite & (np.abs(velocity) > _STILL * highest)]).tolist())
     if len(signs) > 1:
         return loop.state
-    moves = known & (np.abs(velocity) > _STILL * highest) if highest > 0 else np.zeros(len(known), dtype=bool)
+    moves = finite & (np.abs(velocity) > _STILL * highest) if highest > 0 else np.zeros(len(finite), dtype=bool)
     rises = _rises(loop.force_in) & _rises(loop.force_out)
-    return np.where(moves | (rises & ~known), PULL, loop.state)
+    return np.where(moves | (rises & ~finite), PULL, loop.state)
 
 
 def _rises(force: Vector) -> Flags:

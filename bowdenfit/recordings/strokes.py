@@ -87,13 +87,13 @@ def _moving_steadily(velocity: Vector, state: Labels) -> Flags:
     While the motor speeds up or slows down, a block is of several speeds, and at the slow end of a stroke the rope may stand
     already.
     """
-    known = np.isfinite(velocity)
-    if not known.any():
+    finite = np.isfinite(velocity)
+    if not finite.any():
         return np.ones(len(velocity), dtype=bool)
-    speeds = np.abs(velocity[known])
+    speeds = np.abs(velocity[finite])
     typical = float(np.median(speeds[speeds > speeds.max() * _STILL])) if speeds.max() > 0 else np.inf
-    steady = np.abs(np.gradient(velocity)) < _STEADY * np.abs(velocity) if len(velocity) > 1 else known
-    return ~known | ((velocity * state > _STILL * typical) & steady)
+    steady = np.abs(np.gradient(velocity)) < _STEADY * np.abs(velocity) if len(velocity) > 1 else finite
+    return ~finite | ((velocity * state > _STILL * typical) & steady)
 
 
 def _inside_sliding(state: Labels) -> Flags:

@@ -68,12 +68,12 @@ class ClockShift:
             delay: How much later the output is after the shift [s].
             sd: Standard error of the shift [s]; NaN where it is taken as it is.
         """
-        known = np.isfinite(sd)
+        finite = np.isfinite(sd)
         value = self.value - delay - (0.0 if self.source == "forces" else date_shift(raw))
-        total = f"the output's clock was shifted by {value:+.4f} s" + (f" ± {sd:.4f} s" if known else "")
+        total = f"the output's clock was shifted by {value:+.4f} s" + (f" ± {sd:.4f} s" if finite else "")
         origin = {
             "forces": f"{total}, found from the forces",
-            "dates": f"the clocks were paired by their dates{f', and {total}, found from the forces' if known else ''}",
+            "dates": f"the clocks were paired by their dates{f', and {total}, found from the forces' if finite else ''}",
             "stated": f"{total}, as stated{' and refined by the forces' if delay else ''}",
         }[self.source]
         ppm = 1e6 * self.rate

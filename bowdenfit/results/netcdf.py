@@ -144,8 +144,8 @@ def read_own_hdf5(path: Path, reader: str) -> Any:
     try:
         return call_isolated(path, "bowdenfit.results.netcdf:_read_or_refuse", reader, limits=limits)
     except DatasetError as error:
-        why, _, _ = str(error).partition(":")
-        raise StoreError(f"{path} is damaged ({why}); fit again, or restore the folder from a copy.") from None
+        reason, _, _ = str(error).partition(":")
+        raise StoreError(f"{path} is damaged ({reason}); fit again, or restore the folder from a copy.") from None
 
 
 def _read_or_refuse(path: Path, reader: str) -> Any:

@@ -105,7 +105,7 @@ def choose_angles(
         k for k, c in enumerate(contacts) if c.wrap_angle.curve and c.wrap_angle.column and k not in (*fully_stated, bent)
     ]
     names = tuple(contacts[k].wrap_angle.column or "" for k in curved)
-    own = OwnAngles.none(names, len(at))
+    own_angles = OwnAngles.none(names, len(at))
     for i in [i for i, words in enumerate(outside) if words and curved]:
         missing, own_curves = [], [j for j, k in enumerate(curved) if np.isnan(angle_at[k][i] if k in angle_at else np.nan)]
         for j in own_curves:
@@ -114,11 +114,11 @@ def choose_angles(
             if measured is None:
                 missing.append(contacts[curved[j]].name)
             else:
-                own.angle[i, j], own.sd[i, j] = measured
+                own_angles.angle[i, j], own_angles.sd[i, j] = measured
         if missing:
             _refuse_unmeasured(f"{at[i]:.6g} {limits.unit if limits else ''}", outside[i], missing)
         outside[i] += ": by the wrap angles measured there" if own_curves else ": by the wrap angles stated"
-    rows = collect_row_angles(description, RowConditions(at, own), None)
+    rows = collect_row_angles(description, RowConditions(at, own_angles), None)
     words: list[list[str]] = [[] for _ in at]
     for contact, angle in angle_at.items():
         here = ~np.isnan(angle)
@@ -140,10 +140,10 @@ def _measured_angles(dataset: Dataset, column: str, at: float) -> Iterator[tuple
         if isinstance(kind, FrictionKind):
             conditions = kind.conditions(rows)
             angle, sd = conditions.own.column(column)
-            here = np.isclose(conditions.route, at, rtol=ROUNDING, atol=0.0) & ~np.isnan(angle)
-            if here.any():
-                known = sd[here][~np.isnan(sd[here])]
-                yield float(angle[here].mean()), float(known.mean()) if len(known) else np.nan
+            mask = np.isclose(conditions.route, at, rtol=ROUNDING, atol=0.0) & ~np.isnan(angle)
+            if mask.any():
+                finite = sd[mask][~np.isnan(sd[mask])]
+                yield float(angle[mask].mean()), float(finite.mean()) if len(finite) else np.nan
 
 
 def _refuse_unmeasured(place: str, outside: str, contacts: Sequence[str]) -> None:

@@ -108,8 +108,8 @@ def load(folder: Path) -> Record:
     except StoreError:
         raise
     except (*_DAMAGE_ERRORS, OSError, BowdenfitError) as error:
-        why = f"{type(error).__name__}: {shorten(str(error), 200)}"
-        raise StoreError(f"{folder} is damaged ({why}); fit again, or restore the folder from a copy.") from error
+        reason = f"{type(error).__name__}: {shorten(str(error), 200)}"
+        raise StoreError(f"{folder} is damaged ({reason}); fit again, or restore the folder from a copy.") from error
     return fit
 
 

@@ -21,7 +21,7 @@ POINTING = {  # pronouns and adverbs: right in a sentence, and no name for a thi
     *("at", "before", "beside", "here", "kept", "known", "one", "others", "own", "since", "stated", "what", "where", "why"),
 }
 CEILINGS = {  # variables of each folder that still have such a name: lower them whenever there are fewer
-    "bowdenfit": {"retired": 4, "pointing": 1040},
+    "bowdenfit": {"retired": 4, "pointing": 848},
     "tests": {"retired": 0, "pointing": 0},
     "scripts": {"retired": 0, "pointing": 0},
 }

@@ -217,8 +217,8 @@ def _summarize_walkers(programs: BatchPrograms, late: np.ndarray, short_before: 
     sampler = programs.settings.sampler
     strict = bool(np.isfinite(programs.settings.target_sd_error))
     per_walker = _KEPT_PER_WALKER_FOR_SDS if strict else _KEPT_PER_WALKER
-    kept = np.unique(np.linspace(0, len(late) - 1, per_walker).round().astype(int))
-    z = late[kept].transpose(1, 2, 0, 3).reshape(-1, len(kept), len(programs.names))
+    retained = np.unique(np.linspace(0, len(late) - 1, per_walker).round().astype(int))
+    z = late[retained].transpose(1, 2, 0, 3).reshape(-1, len(retained), len(programs.names))
     draws = {name: z[..., i] for i, name in enumerate(programs.names)}
     diagnostics, reasons = dict[str, Diagnostics](), describe_stuck_walkers(z)
     for name in dict.fromkeys((*short_before, *programs.names)):

@@ -229,17 +229,17 @@ def _differentiate(gradients: Gradients, z: np.ndarray) -> tuple[np.ndarray, np.
     value, slope = value.reshape(cables, climbs, -1), slope.reshape(cables, climbs, -1, size)
     curvature = (slope[:, :, size + 1 :] - slope[:, :, 1 : size + 1]) / (2 * _DIFFERENCE)
     curvature = (curvature + curvature.swapaxes(-1, -2)) / 2
-    known = (
+    finite = (
         np.isfinite(value[..., 0]) & np.isfinite(slope).all(axis=(-1, -2)) & np.isfinite(curvature).all(axis=(-1, -2))
     )
-    known_slope = np.where(known[..., None], slope[:, :, 0], 0.0)
-    return np.where(known, value[..., 0], -np.inf), known_slope, np.where(known[..., None, None], curvature, 0.0)
+    known_slope = np.where(finite[..., None], slope[:, :, 0], 0.0)
+    return np.where(finite, value[..., 0], -np.inf), known_slope, np.where(finite[..., None, None], curvature, 0.0)
 
 
 def draw_starting_points(size: int, seeds: np.ndarray) -> np.ndarray:
     """Return starts of the climbs, (cable, climb, parameter)."""
-    others = [np.random.default_rng([int(seed), 0]).standard_normal((N_STARTS - 1, size)) for seed in seeds]
-    return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(others)], axis=1)
+    remaining = [np.random.default_rng([int(seed), 0]).standard_normal((N_STARTS - 1, size)) for seed in seeds]
+    return np.concatenate([np.zeros((len(seeds), 1, size)), np.stack(remaining)], axis=1)
 
 
 def fit_mixtures(

@@ -164,9 +164,9 @@ class BatchPrograms:
         def evaluate(point: Array, is_z: Array, data: Any) -> ProposedPoints:
             w, z, log_volume = coordinate_map(point, is_z, data)
             log_density, has_z = posterior.log_density(z, data), jnp.isfinite(z).all()
-            has_w, known = jnp.isfinite(w).all() & jnp.isfinite(log_volume), has_z & jnp.isfinite(log_density)
+            has_w, finite = jnp.isfinite(w).all() & jnp.isfinite(log_volume), has_z & jnp.isfinite(log_density)
             z, w = jnp.where(has_z, z, 0.0), jnp.where(has_w, w, 0.0)
-            return ProposedPoints(w, z, jnp.where(has_w, log_volume, jnp.inf), jnp.where(known, log_density, -jnp.inf))
+            return ProposedPoints(w, z, jnp.where(has_w, log_volume, jnp.inf), jnp.where(finite, log_density, -jnp.inf))
 
         rows = jax.ShapeDtypeStruct((BLOCK, posterior.model.space.size), np.dtype(float))
         is_z = jax.ShapeDtypeStruct((BLOCK,), np.dtype(bool))

@@ -248,8 +248,8 @@ class ImportanceSampler:
         for _ in range(blocks):
             at = self.evaluate(*proposal.draw(generator, BLOCK))
             log_proposed = proposal.log_density(at)
-            known = np.isfinite(at.log_density) & np.isfinite(log_proposed)
-            parts.append((at.w, at.z, np.where(known, at.log_density, -np.inf), np.where(known, log_proposed, 0.0)))
+            finite = np.isfinite(at.log_density) & np.isfinite(log_proposed)
+            parts.append((at.w, at.z, np.where(finite, at.log_density, -np.inf), np.where(finite, log_proposed, 0.0)))
         return WeightedDraws(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 

@@ -149,12 +149,12 @@ def draw_angles(table: AngleTable, truth: Truth, everywhere: bool = False) -> di
     reading = theta + truth.scale * truth.values[ANGLE_NOISE] * truth.scatter(key, theta.shape)
     limit = detection_limit(cable.description, table)
     low, high = cable.description.route.range if cable.description.route else (-np.inf, np.inf)
-    kept = np.zeros(len(table.route), dtype=bool) if everywhere else (table.route < low) | (table.route > high)
+    retained = np.zeros(len(table.route), dtype=bool) if everywhere else (table.route < low) | (table.route > high)
     undetected = reading < limit
     angle = jnp.where(undetected, jnp.nan, jnp.maximum(reading, 0.0))
     return {
-        "angle": jnp.where(kept[:, None], table.angle, angle),
-        "limit": jnp.where(kept[:, None], table.limit, jnp.where(undetected, limit, jnp.nan)),
+        "angle": jnp.where(retained[:, None], table.angle, angle),
+        "limit": jnp.where(retained[:, None], table.limit, jnp.where(undetected, limit, jnp.nan)),
     }
 
 

@@ -91,14 +91,14 @@ class DisplacementKind(
         """Return the readings of each stroke, what is at the far end, and where the loop closes."""
         pulling = int(table.pulls.sum())
         low, high = table.shared
-        where = f"from {low:.4g} to {high:.4g} mm" if high > low else "at no common displacement"
+        place = f"from {low:.4g} to {high:.4g} mm" if high > low else "at no common displacement"
         unused = int(np.sum(~table.used))
         left = f"; {unused} of {len(table.used)} rows are not used" if unused else ""
         count, returning = self.count_readings(table), int(table.used.sum()) - pulling
         return [
             f"{table.origin.files[0]}: {count} ({pulling} pulling, {returning} returning), "
             f"{describe_range(table.force, 'N')} over {describe_range(table.displacement, 'mm')}, "
-            f"pull and return {where}; far end: {_far_end(description)}{left}"
+            f"pull and return {place}; far end: {_far_end(description)}{left}"
         ]
 
     @override
@@ -191,14 +191,14 @@ class DisplacementKind(
         path = np.append(np.tile(np.concatenate([up, up[-2:0:-1]]), moved.cycles), up[:1])
         runs, names = max(len(angles), 1), description.angle_columns
         x, run = np.tile(path, runs), np.repeat(np.arange(runs), len(path))
-        own = OwnAngles.none(names, len(x))
+        own_angles = OwnAngles.none(names, len(x))
         column = next((c.wrap_angle.column for c in description.contact if c.wrap_angle.column), None)
         if column is not None and len(angles):
-            own.angle[:, names.index(column)] = angles[run]
+            own_angles.angle[:, names.index(column)] = angles[run]
         labels = tuple(f"{angle:.4g} deg" for angle in np.rad2deg(angles)) or ("all",)
         every, nowhere = np.ones(len(x), dtype=bool), np.full(len(x), np.nan)
         origin = RowOrigin.below_heading(file, len(x))
-        table = DisplacementTable(nowhere, 1.0 + x, x, follow_motor(x, run), run, labels, every, own, origin, False)
+        table = DisplacementTable(nowhere, 1.0 + x, x, follow_motor(x, run), run, labels, every, own_angles, origin, False)
         return replace(table, used=~find_early_rows(table))
 
 

@@ -60,10 +60,10 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
     ends = [
         Quantity(name, what) for names, what in zip(_NAMES.values(), ("force", "length"), strict=True) for name in names
     ]
-    others = (Quantity("run", "text"), Quantity("stroke", "text"))
-    wanted = (*ends, Quantity("output_force", "force"), *others, *shared_columns(source.description))
+    optional_columns = (Quantity("run", "text"), Quantity("stroke", "text"))
+    wanted = (*ends, Quantity("output_force", "force"), *optional_columns, *shared_columns(source.description))
     table, columns = source.read_table(path, wanted, _UNUSED)
-    check_spelling(table, columns, others)
+    check_spelling(table, columns, optional_columns)
     force_column, x_column = (
         _require_either_name(table, columns, name, unit) for name, unit in (("force", "N"), ("displacement", "mm"))
     )
@@ -73,7 +73,7 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
             "or leave one of the two columns out."
         )
     force, displacement = np.array(force_column.numbers()), np.array(x_column.numbers())
-    own, at = read_own_angles(table, columns, contacts), read_route(table, columns, route)
+    own_angles, at = read_own_angles(table, columns, contacts), read_route(table, columns, route)
     strokes = read_strokes(columns, len(force), held="")
     table.faults.refuse()
     _check_tensions(force, force_column)
@@ -85,14 +85,14 @@ def read_displacement(source: Source) -> TableFromFiles[DisplacementTable]:
             "return), "
             'or write rows = "in order" for readings in the order in which they were taken.'
         )
-    run, names = _assign_runs(columns.get("run"), at, own)
+    run, names = _assign_runs(columns.get("run"), at, own_angles)
     motion = (
         history_of_sliding_rope(stroke, displacement, run)
         if how == "sliding" and stroke is not None
         else follow_motor(displacement, run)
     )
     every, origin = np.ones(len(force), dtype=bool), origin_of_rows(table)
-    rows = DisplacementTable(at, force, displacement, motion, run, names, every, own, origin, how == "sliding")
+    rows = DisplacementTable(at, force, displacement, motion, run, names, every, own_angles, origin, how == "sliding")
     if not any(name.startswith(ZERO) for name in source.description.prior):
         _check_runs(rows)
     rows, remarks = _choose_rows(rows, settings, "stroke" in columns)
@@ -125,8 +125,8 @@ def _check_strokes(strokes: Labels, columns: Mapping[str, Column]) -> Labels | N
     if "stroke" not in columns:
         return None
     if not strokes.all():
-        why = "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
-        raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(strokes == 0)])
+        reason = "a held reading lies anywhere between pull and return; write pull or return, or leave the row out."
+        raise combine_errors([columns["stroke"].cells[i].refuse(reason) for i in np.flatnonzero(strokes == 0)])
     return strokes
 
 

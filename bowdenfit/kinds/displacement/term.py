@@ -64,8 +64,8 @@ def split_turns_by_depth(turns: Turns) -> tuple[dict[str, np.ndarray], ...]:
 def angles_of_runs(cable: Cable, table: DisplacementTable, angles: AngleTable | None) -> dict[str, np.ndarray]:
     """Return the wrap angles of every run, which are those of its first row."""
     first = np.array([np.flatnonzero(table.run == run)[0] for run in range(len(table.run_names))])
-    own = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
-    return collect_row_angles(cable.description, RowConditions(table.route[first], own), angles).data
+    own_angles = OwnAngles(table.own.names, table.own.angle[first], table.own.sd[first])
+    return collect_row_angles(cable.description, RowConditions(table.route[first], own_angles), angles).data
 
 
 def rank_by_depth(turns: Turns) -> np.ndarray:
@@ -378,8 +378,8 @@ class DisplacementTerms(TermKind[DisplacementTable]):
         exponent, angle_variance = term.exponents(values, data)
         mounting = jnp.sqrt(values[RUN_SCATTER] ** 2 + angle_variance) * truth.scatter(of_run, exponent.shape)
         shape = table.force.shape
-        beside = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
-        force = term.load_cell_force(values, data, exponent + scale * mounting, beside)
+        noise = scale * values.get(DISPLACEMENT_NOISE, 0.0) * jax.random.normal(of_x, shape)
+        force = term.load_cell_force(values, data, exponent + scale * mounting, noise)
         return {"force": force + scale * values[FORCE_NOISE] * truth.scatter(of_force, shape)}
 
     @override

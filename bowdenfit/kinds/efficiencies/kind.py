@@ -110,8 +110,10 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
         column = require_column(table, columns, name, "efficiency (0 to 1) or efficiency_percent")
         sd, spread = [0.0] * len(table.rows), columns.get(f"{name}_sd")
         if spread is not None:
-            beside = {cell.row: cell for cell in column.cells}
-            sd = spread.read_cells(lambda c: 0.0 if c.blank else _read_efficiency_sd(c, spread, beside[c.row], column), 0.0)
+            cells_by_row = {cell.row: cell for cell in column.cells}
+            sd = spread.read_cells(
+                lambda c: 0.0 if c.blank else _read_efficiency_sd(c, spread, cells_by_row[c.row], column), 0.0
+            )
         errors = dict(zip((cell.row for cell in column.cells), sd, strict=True))
         efficiency = column.read_cells(
             lambda cell: _read_loss(cell, column) if is_loss else _read_efficiency(cell, column, errors[cell.row]), np.nan
@@ -181,8 +183,8 @@ class EfficiencyKind(FrictionTableKind[EfficiencyTable], PlannedKind[EfficiencyT
     @override
     def empty_table(self, design: EfficiencyDesign, description: Description, file: str) -> EfficiencyTable:
         n = len(design.efficiencies)
-        own, origin = OwnAngles.none(description.angle_columns, n), RowOrigin.below_heading(file, n)
-        return EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own, origin)
+        own_angles, origin = OwnAngles.none(description.angle_columns, n), RowOrigin.below_heading(file, n)
+        return EfficiencyTable(np.array(design.efficiencies), np.full(n, 0.8), np.zeros(n), own_angles, origin)
 
 
 def _remark_fractions(column: Column, table: EfficiencyTable) -> tuple[str, ...]:

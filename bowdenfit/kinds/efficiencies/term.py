@@ -131,8 +131,8 @@ class EfficiencyCandidates(CandidateKind):
 
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
-        route, own, origin = at.rows(candidates)
-        table = EfficiencyTable(route, np.full(len(candidates), 0.8), np.zeros(len(candidates)), own, origin)
+        route, own_angles, origin = at.rows(candidates)
+        table = EfficiencyTable(route, np.full(len(candidates), 0.8), np.zeros(len(candidates)), own_angles, origin)
         return simulate_rows(make_efficiencies_term(at.cable, table, at.angles))
 
 

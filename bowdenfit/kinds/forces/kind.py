@@ -146,8 +146,8 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     @override
     def typical_speeds(self, table: ForceTable) -> list[float]:
         """Return the lowest and the highest speed."""
-        known = np.abs(table.velocity[np.isfinite(table.velocity)])
-        return [float(known.min()), float(known.max())] if len(known) else []
+        finite = np.abs(table.velocity[np.isfinite(table.velocity)])
+        return [float(finite.min()), float(finite.max())] if len(finite) else []
 
     @override
     def velocity_unit(self, table: ForceTable) -> str:
@@ -252,10 +252,12 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
     @override
     def design_contradiction(self, design: ForceDesign, description: Description) -> str:
         """Return that wrap angles are of a column that no contact has."""
-        known = description.angle_columns
-        unknown = next((name for name in design.own_angles if name not in known), None)
+        known_names = description.angle_columns
+        unknown = next((name for name in design.own_angles if name not in known_names), None)
         return (
-            f"own_angles.{unknown}: no contact has that column{suggest_name(unknown, known or ['none'])}" if unknown else ""
+            f"own_angles.{unknown}: no contact has that column{suggest_name(unknown, known_names or ['none'])}"
+            if unknown
+            else ""
         )
 
     @override
@@ -264,13 +266,13 @@ class ForceKind(FrictionTableKind[ForceTable], PlannedKind[ForceTable]):
         run = np.repeat(np.arange(n_runs), len(design.strokes) * n_forces)
         stroke = np.tile(np.repeat(stroke_signs(design.strokes), n_forces), n_runs)
         force = np.tile(design.input_forces, n_runs * len(design.strokes))
-        own = OwnAngles.none(names, len(run))
+        own_angles = OwnAngles.none(names, len(run))
         for name in set(design.own_angles).intersection(names):
-            own.angle[:, names.index(name)] = convert_to_radians(design.own_angles[name])[run]
+            own_angles.angle[:, names.index(name)] = convert_to_radians(design.own_angles[name])[run]
         route = np.asarray(design.runs, dtype=float)[run]
         labels = tuple(str(i + 1) for i in range(n_runs))
         origin, velocity = RowOrigin.below_heading(file, len(run)), np.full(len(run), np.nan)
-        return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own, origin, velocity)
+        return ForceTable(route, force, 0.8 * force, run, labels, stroke.astype(int), own_angles, origin, velocity)
 
 
 def _warn_of_gains(table: ForceTable, description: Description) -> list[str]:

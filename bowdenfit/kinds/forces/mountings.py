@@ -81,15 +81,15 @@ def remark_on_reused_labels(
     distinct = list(dict.fromkeys(labels))
     if n_mountings == len(distinct):
         return ""
-    what = "length" if route else "bend"
-    where = f"at another {what}"
+    noun = "length" if route else "bend"
+    place = f"at another {noun}"
     if group and (in_groups := len(set(zip(labels, group, strict=True)))) > len(distinct):
-        where = f"{where} or in another group" if n_mountings > in_groups else "in another group"
-        what = what if n_mountings > in_groups else "group"
+        place = f"{place} or in another group" if n_mountings > in_groups else "in another group"
+        noun = noun if n_mountings > in_groups else "group"
     return (
-        f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back {where}, which is "
+        f"{file}: the {len(distinct)} labels of its runs ({few(distinct, _NAMED)}) come back {place}, which is "
         f"taken as another mounting of the cable each time: {n_mountings} mountings in all. If the cable stayed mounted while "
-        f'its {what} changed, write run = "across {what}s" next to the file in cable.toml.'
+        f'its {noun} changed, write run = "across {noun}s" next to the file in cable.toml.'
     )
 
 
@@ -150,11 +150,11 @@ def read_groups(
         raise DatasetError(f"{file}: {wrong}")
     if wrong:
         return (), [f"{file}: {wrong} It is not used."]
-    why = (
+    reason = (
         "the cell is blank, so this row is of no group; write the name of its group "
         f"({few([shown(name) for name in distinct if name], _NAMED)}), or leave the row out."
     )
-    if blank := [cell.refuse(why) for cell, name in zip(column.cells, names, strict=True) if by_group and not name]:
+    if blank := [cell.refuse(reason) for cell, name in zip(column.cells, names, strict=True) if by_group and not name]:
         raise combine_errors(blank)
     names = tuple(name or NO_GROUP for name in names)
     if by_group or len(distinct) == 1:

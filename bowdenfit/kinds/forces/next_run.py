@@ -194,8 +194,10 @@ class ForceRunCandidates(CandidateKind):
         forces, recordings = at.measurements.table(ForceTable), at.measurements.table(Recordings)
         if typical_run(at.measurements) is None:
             return []
-        own = forces.own if forces is not None else angles_of_recordings(recordings).own if recordings is not None else None
-        return at.along_cable(self.name, own)
+        own_angles = (
+            forces.own if forces is not None else angles_of_recordings(recordings).own if recordings is not None else None
+        )
+        return at.along_cable(self.name, own_angles)
 
     @override
     def designs(self, at: Situation) -> list[tuple[float, int]]:
@@ -231,15 +233,17 @@ class ForceRunCandidates(CandidateKind):
         start = 0
         for members in groups.values():
             alike = [candidates[i] for i in members]
-            route, own, _ = at.rows(alike)
+            route, own_angles, _ = at.rows(alike)
             simulate, width = make_run_simulator(at.cable, set_load_and_stroke(typical, alike[0].load, alike[0].stroke))
-            parts.append((simulate, collect_row_angles(at.cable.description, RowConditions(route, own), at.angles).data))
+            parts.append((simulate, collect_row_angles(at.cable.description, RowConditions(route, own_angles), at.angles).data))
             for i in members:
                 columns[i] = tuple(range(start, start + width))
                 start += width
 
         def readings(values: Mapping[str, Array], data: Sequence[Any], key: Array) -> Array:
             keys = jax.random.split(key, len(parts)) if len(parts) > 1 else [key]
-            return jnp.concatenate([part[0](values, own, k) for part, own, k in zip(parts, data, keys, strict=True)])
+            return jnp.concatenate(
+                [part[0](values, own_angles, k) for part, own_angles, k in zip(parts, data, keys, strict=True)]
+            )
 
         return Simulation(readings, [data for _, data in parts], columns)

@@ -63,8 +63,8 @@ def read_force_sds(
     for i, end in enumerate(_ENDS):
         if end in stated:
             column, of = columns[stated[end]], columns[stated[end].removesuffix("_sd")]
-            beside = {cell.row: cell for cell in of.cells}
-            read = np.array(column.read_cells(partial(_read_sd, column, of, beside), np.nan))
+            cells_by_row = {cell.row: cell for cell in of.cells}
+            read = np.array(column.read_cells(partial(_read_sd, column, of, cells_by_row), np.nan))
             with table.faults.collect():
                 sd[:, i] = convert_to_forces(read, table, columns, end, description)
     remarks = [

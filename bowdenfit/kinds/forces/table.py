@@ -126,7 +126,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         runs.append(part.run + len(names))
         names += [f"{path.stem}:{name}" if len(paths) > 1 else name for name in part.run_names]
     tables = [part for part, *_ in parts]
-    own = OwnAngles(
+    own_angles = OwnAngles(
         tuple(contacts),
         np.concatenate([t.own.angle for t in tables]),
         np.concatenate([t.own.sd for t in tables]),
@@ -138,7 +138,7 @@ def read_forces(source: Source) -> TableFromFiles[ForceTable]:
         np.concatenate(runs),
         tuple(names),
         np.concatenate([t.stroke for t in tables]),
-        own,
+        own_angles,
         RowOrigin(
             tuple(path.name for path in paths),
             np.concatenate([np.full(len(t.run), i) for i, t in enumerate(tables)]),
@@ -215,13 +215,20 @@ def _common_velocity_unit(tables: Sequence[ForceTable]) -> str:
 
 def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str], RowAccount]:
     route, contacts = source.description.route, source.description.angle_columns
-    others = (Quantity("run", "text"), Quantity("stroke", "text"), Quantity("velocity", "speed", optional=True), GROUP)
-    table, columns = source.read_table(path, (*ENDS, *FORCE_SDS, *others, *shared_columns(source.description)), _UNUSED)
+    optional_columns = (
+        Quantity("run", "text"),
+        Quantity("stroke", "text"),
+        Quantity("velocity", "speed", optional=True),
+        GROUP,
+    )
+    table, columns = source.read_table(
+        path, (*ENDS, *FORCE_SDS, *optional_columns, *shared_columns(source.description)), _UNUSED
+    )
     nothing = np.full(len(table.rows), np.nan)
     read = partial(_read_tensions, table, columns, source.description)
     sd, sd_remarks = read_force_sds(table, columns, source.description)
     input_force, output_force = table.faults.read_all(read, ("input", "output"), nothing)
-    own = read_own_angles(table, columns, contacts)
+    own_angles = read_own_angles(table, columns, contacts)
     route_values = read_route(table, columns, route)
     groups = source.settings.groups == "called by numbers", source.description.by_group
     group, remarks = tuple[str, ...](), list[str]()
@@ -236,14 +243,14 @@ def _read_force_file(path: Path, source: Source) -> tuple[ForceTable, list[str],
     velocity, unit = _read_velocities(columns.get("velocity"), len(table.rows))
     table.faults.refuse()
     remarks += remark_on_large_sds(table.file, sd, np.column_stack([input_force, output_force]))
-    run, run_names, run_remarks = _assign_runs(columns.get("run"), source, route_values, own, origin, group)
+    run, run_names, run_remarks = _assign_runs(columns.get("run"), source, route_values, own_angles, origin, group)
     remarks += run_remarks
     if held := int(np.sum(strokes == 0)):
         remarks.append(
             f"{table.file}: {held} readings are held. A held reading says only that friction is at least as large as it takes "
             "to hold it; a coefficient that rests on such readings alone has a lower bound, and above it nothing but its prior."
         )
-    parts = (route_values, input_force, output_force, run, run_names, strokes, own, origin, velocity, unit, group)
+    parts = (route_values, input_force, output_force, run, run_names, strokes, own_angles, origin, velocity, unit, group)
     unused = read_unused_columns(table, columns)
     return ForceTable(*parts, unused, sd), remarks, table.account
 
@@ -282,8 +289,8 @@ def _assign_runs(
 def _describe_conditions(route: Vector, own: OwnAngles, unit: str) -> list[str]:
     """Return length and wrap angles of each row in words, such as "440 mm" or "45 deg"."""
     rows, units = np.column_stack([route, np.rad2deg(own.angle)]), [unit, *["deg"] * len(own.names)]
-    known = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
-    return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in known]
+    finite = [[(value, unit) for value, unit in zip(row, units, strict=True) if np.isfinite(value)] for row in rows]
+    return [", ".join(f"{value:g} {unit}".rstrip() for value, unit in row) or "all" for row in finite]
 
 
 def _read_tensions(table: RawTable, columns: Mapping[str, Column], description: Description, end: str) -> Vector:

@@ -235,8 +235,8 @@ def _run_label(cable: Cable, table: ForceTable, run: int) -> str:
     if route is None:
         return table.run_names[run]
     at = np.unique(table.route[table.run == run])
-    name, where = table.run_names[run], f"{at[0]:g} {route.unit}" if len(at) == 1 else ""
-    return name if name.startswith(where) or name.endswith(f"({where})") else f"{name} ({where})"
+    name, place = table.run_names[run], f"{at[0]:g} {route.unit}" if len(at) == 1 else ""
+    return name if name.startswith(place) or name.endswith(f"({place})") else f"{name} ({place})"
 
 
 class ForceTerms(TermKind[ForceTable]):

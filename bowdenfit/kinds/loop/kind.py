@@ -105,9 +105,9 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 is larger than the input while moving forward.
         """
         path, route, contacts = source.file, source.description.route, source.description.angle_columns
-        others = (Quantity("stroke", "text"), Quantity("preload", "force", optional=True))
-        table, columns = source.read_table(path, (*ENDS, *others, *shared_columns(source.description)), _UNUSED)
-        check_spelling(table, columns, others)
+        optional_columns = (Quantity("stroke", "text"), Quantity("preload", "force", optional=True))
+        table, columns = source.read_table(path, (*ENDS, *optional_columns, *shared_columns(source.description)), _UNUSED)
+        check_spelling(table, columns, optional_columns)
         nothing = np.full(len(table.rows), np.nan)
         input_force, output_force = table.faults.read_all(
             lambda end: _read_end_forces(table, columns, end, source.description), ("input", "output"), nothing
@@ -118,15 +118,15 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
             preload = np.array(
                 column.read_cells(lambda c: np.nan if c.blank else read_tension(c, column, "a preload"), np.nan)
             )
-        at, own = read_route(table, columns, route), read_own_angles(table, columns, contacts)
+        at, own_angles = read_route(table, columns, route), read_own_angles(table, columns, contacts)
         table.faults.refuse()
         if not stroke.all():
-            why = (
+            reason = (
                 "a loop that is held still gives only bounds; write pull (moving forward) or return, or leave the row "
                 "out."
             )
-            raise combine_errors([columns["stroke"].cells[i].refuse(why) for i in np.flatnonzero(stroke == 0)])
-        made = LoopTable(at, input_force, output_force, stroke, preload, own, origin_of_rows(table))
+            raise combine_errors([columns["stroke"].cells[i].refuse(reason) for i in np.flatnonzero(stroke == 0)])
+        made = LoopTable(at, input_force, output_force, stroke, preload, own_angles, origin_of_rows(table))
         _check_loss(table, made)
         remarks = []
         if "stroke" not in columns:
@@ -186,8 +186,8 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
                 "with the wrap angle will rest on the priors."
             )
         stated = description.preload.value is not None or PRELOAD in description.prior or has_preload
-        known = stated or np.isfinite(table.preload).any()
-        if not known and np.median(np.abs(table.output_force)) < _FREE * np.median(np.abs(table.input_force)):
+        is_known = stated or np.isfinite(table.preload).any()
+        if not is_known and np.median(np.abs(table.output_force)) < _FREE * np.median(np.abs(table.input_force)):
             warnings.append(
                 f"nearly all of {table.origin.files[0]} was read in free motion, with almost no output force; that determines "
                 "only the product of friction and preload: load the loop until its return side is slack, or measure the "
@@ -250,13 +250,13 @@ class LoopKind(FrictionTableKind[LoopTable], RopeKind[LoopTable], PlannedKind[Lo
         free = [(a, np.nan, s) for a in convert_to_radians(loop.free_motion) for s in strokes]
         rows = np.array([*loaded, *free], dtype=float).reshape(-1, 3)
         names, n = description.angle_columns, len(rows)
-        own = OwnAngles.none(names, n)
+        own_angles = OwnAngles.none(names, n)
         column = next((c.wrap_angle.column for c in description.contact if c.wrap_angle.column), None)
         if column is not None:
-            own.angle[:, names.index(column)] = rows[:, 0]
+            own_angles.angle[:, names.index(column)] = rows[:, 0]
         nothing = np.full(n, np.nan)
         origin = RowOrigin.below_heading(file, n)
-        return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own, origin)
+        return LoopTable(nothing, rows[:, 1], 0.8 * rows[:, 1], rows[:, 2].astype(int), nothing, own_angles, origin)
 
 
 def _read_end_forces(table: RawTable, columns: Mapping[str, Column], end: str, description: Description) -> Vector:

@@ -168,9 +168,9 @@ class LoopCandidates(CandidateKind):
 
     @override
     def simulation(self, at: Situation, candidates: Sequence[Candidate]) -> Simulation:
-        (route, own, origin), load = at.rows(candidates), np.array([c.load for c in candidates])
+        (route, own_angles, origin), load = at.rows(candidates), np.array([c.load for c in candidates])
         forward, nothing = np.ones(len(candidates), dtype=int), np.full(len(candidates), np.nan)
-        table = LoopTable(route, load, 0.8 * load, forward, nothing, own, origin)
+        table = LoopTable(route, load, 0.8 * load, forward, nothing, own_angles, origin)
         return simulate_rows(make_loop_term(at.cable, table, at.angles))
 
 

@@ -218,7 +218,7 @@ class RecordingKind(FrictionKind[Recordings]):
             )
         pages = [settings.prepare] if settings is not None else []
         pages += [entry.prepare for entry in description.recording if entry.prepare is not None]
-        return next((why for page in pages if (why := _why_impossible(page))), "")
+        return next((reason for page in pages if (reason := _why_impossible(page))), "")
 
     @override
     def quantities(self, settings: RecordingsTable, description: Description) -> list[Stated]:
@@ -226,23 +226,23 @@ class RecordingKind(FrictionKind[Recordings]):
         pages = [("tables, recordings, prepare", settings.prepare)]
         quantities: list[Stated] = []
         for entry in description.recording:
-            where = f"recording {entry.file!r}"
+            place = f"recording {entry.file!r}"
             quantities += [
-                (f"{where}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()
+                (f"{place}, wrap_angles, {name}", angle, "angle") for name, angle in entry.wrap_angles.items()
             ]
             if entry.velocity is not None:
-                quantities.append((f"{where}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
+                quantities.append((f"{place}, velocity", entry.velocity, speed_dimension(entry.velocity.unit)))
             if isinstance(entry.clock_shift, QuantityValue):
-                quantities.append((f"{where}, clock_shift", entry.clock_shift, "time"))
+                quantities.append((f"{place}, clock_shift", entry.clock_shift, "time"))
             if entry.prepare is not None:
-                pages.append((f"{where}, prepare", entry.prepare))
-        for where, page in pages:
+                pages.append((f"{place}, prepare", entry.prepare))
+        for place, page in pages:
             for name, value in (("delay", page.delay), ("block", page.block)):
                 if isinstance(value, QuantityValue):
-                    quantities.append((f"{where}, {name}", value, "time"))
+                    quantities.append((f"{place}, {name}", value, "time"))
             if page.limits is not None:
                 lowest = QuantityValue(value=page.limits.low, unit=page.limits.unit)
-                quantities.append((f"{where}, limits", lowest, "force"))
+                quantities.append((f"{place}, limits", lowest, "force"))
         return quantities
 
     @override

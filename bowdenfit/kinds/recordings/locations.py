@@ -39,11 +39,11 @@ def parse_file_name(description: Description, pattern: str | None, path: Path, f
 
 def _check_pattern(description: Description, pattern: str) -> None:
     """Refuse a pattern that names what a recording does not have, or a unit of the wrong kind."""
-    known = ["at", "run", "velocity", *description.angle_columns]
+    known_names = ["at", "run", "velocity", *description.angle_columns]
     key = "cable.toml, tables.recordings.pattern"
     for name, unit in pattern_fields(pattern):
-        if name not in known:
-            raise DescriptionError(f"{key}: {name!r} is unknown{suggest_name(name, known)}")
+        if name not in known_names:
+            raise DescriptionError(f"{key}: {name!r} is unknown{suggest_name(name, known_names)}")
         if unit and name != "at" and name != "run":
             dimension = speed_dimension(unit) if name == "velocity" else "angle"
             try:

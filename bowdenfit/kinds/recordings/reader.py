@@ -144,12 +144,12 @@ def _state_shift(file: _File, account: Account, sd: float) -> Account:
 def _keep_first_loop_remark(prepared: Sequence[tuple[Blocks, Account]]) -> list[tuple[Blocks, Account]]:
     """Keep the remark that delays of loops are not estimated in the first account only."""
     is_stated = False
-    kept = []
+    retained = []
     for blocks, account in prepared:
         remarks = tuple(r for r in account.remarks if r != NO_DELAY_OF_LOOPS or not is_stated)
         is_stated = is_stated or NO_DELAY_OF_LOOPS in account.remarks
-        kept.append((blocks, replace(account, remarks=remarks)))
-    return kept
+        retained.append((blocks, replace(account, remarks=remarks)))
+    return retained
 
 
 def _pool_delays(delays: Vector, sds: Vector) -> tuple[float, float]:

@@ -187,8 +187,8 @@ def _is_censored(settings: RecordingsTable, recordings: Recordings) -> bool:
 def _run_label(cable: Cable, recordings: Recordings, run: str) -> str:
     """Return the name of a run, with its route value where it has just one and does not state it itself."""
     route, at = cable.description.route, {r.route for r in recordings.items if r.run == run}
-    where = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
-    return f"{run} ({where})" if where and where not in run else run
+    place = f"{min(at):g} {route.unit}" if route is not None and len(at) == 1 else ""
+    return f"{run} ({place})" if place and place not in run else run
 
 
 def _require_blocks(recordings: Recordings, parts: list[SelectedBlocks]) -> None:
@@ -197,9 +197,9 @@ def _require_blocks(recordings: Recordings, parts: list[SelectedBlocks]) -> None
         members = [r for r in recordings.items if r.run == run]
         if not any(len(p.used) for r, p in zip(recordings.items, parts, strict=True) if r.run == run):
             under_tension = np.concatenate([is_under_tension(r) for r in members]).mean() > _MOSTLY
-            why = _NO_SLIDING if under_tension else _NO_TENSION
+            reason = _NO_SLIDING if under_tension else _NO_TENSION
             raise DatasetError(
-                f"{members[0].file}: nothing of the run {run!r} can be used, because {why}; or leave the recording out."
+                f"{members[0].file}: nothing of the run {run!r} can be used, because {reason}; or leave the recording out."
             )
 
 
@@ -226,13 +226,15 @@ def _select_all_blocks(recording: Recording, noise_ratio: float) -> SelectedBloc
     followed, (state, last) = _follow_in_parts(recording, kept_at, moved, y)
     followed += np.where(state != 0, x - moved, 0.0)
     inside = is_inside_phase(state)
-    kept = (last != 0) & inside
-    used, stroke = np.flatnonzero(kept_at)[kept], last[kept]
-    ratio = strokes.exponent - stroke * (y - followed)[kept]
-    slides = state[kept] != 0
+    retained = (last != 0) & inside
+    used, stroke = np.flatnonzero(kept_at)[retained], last[retained]
+    ratio = strokes.exponent - stroke * (y - followed)[retained]
+    slides = state[retained] != 0
     likely_in, likely_out = likely_in[used], likely_out[used]
     of_output_alone = np.where(slides, 1.0, 1 + (noise_ratio * likely_out / likely_in) ** 2)
-    n_effective = effective_counts(recording, used) * of_output_alone * standing_share(state, blocks.input_force[kept_at])[kept]
+    n_effective = (
+        effective_counts(recording, used) * of_output_alone * standing_share(state, blocks.input_force[kept_at])[retained]
+    )
     information = 1 / ((noise_ratio / likely_in) ** 2 + 1 / likely_out**2)
     return SelectedBlocks(used, stroke, blocks.input_force[used], blocks.output_force[used], ratio, n_effective, information)
 

@@ -87,8 +87,8 @@ def read_ring_down(source: Source) -> TableFromFiles[RingDownTable]:
     """
     path = source.file
     ends = Quantity("angle", "angle"), Quantity("torque", "torque")
-    others = Quantity("run", "text"), Quantity("added_inertia", "inertia")
-    table, columns = source.read_table(path, (Quantity("time", "time"), *ends, *others), _UNUSED)
+    optional_columns = Quantity("run", "text"), Quantity("added_inertia", "inertia")
+    table, columns = source.read_table(path, (Quantity("time", "time"), *ends, *optional_columns), _UNUSED)
     if ("angle" in columns) == ("torque" in columns):
         raise DatasetError(
             f"{table.file} needs the angle of the joint (angle_deg), or the torque in the rope (torque_N_m), and has "
@@ -195,13 +195,13 @@ class RingDownKind(Kind[RingDownTable]):
     @override
     def describe(self, table: RingDownTable, description: Description) -> list[str]:
         """Return the runs with their half swings."""
-        what, file = "torque" if table.is_torque else "angle", table.origin.files[0]
+        noun, file = "torque" if table.is_torque else "angle", table.origin.files[0]
         lines = []
         for run in range(len(table.added)):
             n, half = table.measure_half_swings(run)
             more = f", {table.added[run]:.4g} kg m^2 added" if table.added[run] else ""
             rows = counted(int(np.sum(table.run == run)), "reading")
-            lines.append(f"{file}: {rows} of the {what} after a release, {n} half swings of {1000 * half:.3g} ms{more}")
+            lines.append(f"{file}: {rows} of the {noun} after a release, {n} half swings of {1000 * half:.3g} ms{more}")
         return lines
 
     @override

@@ -145,9 +145,9 @@ class BentCable:
             share = mean_tension(jnp.ones_like(exponent), exponent)
             return 1 / (share * self.elastic.compliance(values, share * force))
         exponent, at_rest = self.exponent(values), self.preload(values, preload)[0]
-        one = jnp.ones_like(exponent)
-        a, b = mean_tension(one, exponent), mean_tension(one, -exponent)
-        pulling, returning = side_tensions(force, at_rest, exponent, one, self.rope(values))
+        unit = jnp.ones_like(exponent)
+        a, b = mean_tension(unit, exponent), mean_tension(unit, -exponent)
+        pulling, returning = side_tensions(force, at_rest, exponent, unit, self.rope(values))
         second = jnp.where(returning > 0, 1 / (b * self.elastic.compliance(values, returning)), 0.0)
         return 1 / (a * self.elastic.compliance(values, pulling)) + second
 

@@ -62,10 +62,10 @@ def collect_stretch(fit: Record) -> tuple[StretchCurve, ...] | None:
     both = {way: quantiles_of_draws(draws) for way, draws in evaluate_curves(fit, curves).items()}
     curves_by_angle = []
     for i, angle in enumerate(angles):
-        here = table.wrap_angle == angle
-        down = table.unloading[here]
+        mask = table.wrap_angle == angle
+        down = table.unloading[mask]
         back = both["unloading"][:, i] if down.any() else None
-        points = table.load[here], table.stretch[here], down
+        points = table.load[mask], table.stretch[mask], down
         curves_by_angle.append(StretchCurve(float(np.rad2deg(angle)), loads[i], both["loading"][:, i], back, *points))
     return tuple(curves_by_angle)
 

@@ -47,8 +47,8 @@ def collect_loops(fit: Record) -> tuple[LoopCurve, ...] | None:
     draws, loops = evaluate_curves(fit, curves), []
     for i, bend in enumerate(angles):
         forward, back, slack = (quantiles_of_draws(draws[name][:, i]) for name in ("forward", "back", "slack"))
-        here = np.isclose(angle, bend)
-        points = force_in[here], force_out[here], stroke[here]
+        mask = np.isclose(angle, bend)
+        points = force_in[mask], force_out[mask], stroke[mask]
         capstan = np.median(draws["capstan"][:, i], axis=0)
         loops.append(LoopCurve(f"{np.rad2deg(bend):.4g} deg", forces[i], forward, back, capstan, slack, *points))
     return tuple(loops)
@@ -176,8 +176,8 @@ def efficiency_between_readings(points: np.ndarray, force: float) -> tuple[np.nd
     angle, force_in, force_out = points[:3, points[3] > 0]
     angles, efficiency = [], []
     for bend in np.unique(angle.round(9)):
-        here = np.isclose(angle, bend)
-        sides = [_mean_near(force_in[here], force_out[here], force, way) for way in (-1, 1)]
+        mask = np.isclose(angle, bend)
+        sides = [_mean_near(force_in[mask], force_out[mask], force, way) for way in (-1, 1)]
         if all(side is not None for side in sides):
             (low, out_low), (high, out_high) = sides  # type: ignore[misc]
             part = (force - low) / (high - low) if high > low else 0.0

@@ -113,12 +113,12 @@ def _draw_curves(axes: Axes, loop: LoopCurve) -> None:
 def _draw_readings(axes: Axes, loop: LoopCurve) -> None:
     """Draw forces by stroke; those of recordings are many and small."""
     for stroke, name, marker, size, color in STROKES:
-        here = loop.points_stroke == stroke
-        if here.any():
+        mask = loop.points_stroke == stroke
+        if mask.any():
             many = abs(stroke) != 1
             edge = {"markeredgewidth": 0.0} if many else {"markeredgewidth": 0.5, "markeredgecolor": "white"}
             axes.plot(
-                loop.points_input[here], loop.points_output[here], marker, color=color, markersize=size, **edge,
+                loop.points_input[mask], loop.points_output[mask], marker, color=color, markersize=size, **edge,
                 zorder=2.2 if many else 3, label=name, rasterized=many,
             )  # fmt: skip
 
@@ -126,9 +126,9 @@ def _draw_readings(axes: Axes, loop: LoopCurve) -> None:
 def _draw_residuals(strip: Axes, loop: LoopCurve) -> None:
     """Draw the output less that of the branch on which it was read; less the nearer branch where that is not known."""
     for stroke, _, marker, size, color in STROKES:
-        here = loop.points_stroke == stroke
-        if here.any():
-            x, output = loop.points_input[here], loop.points_output[here]
+        mask = loop.points_stroke == stroke
+        if mask.any():
+            x, output = loop.points_input[mask], loop.points_output[mask]
             forward, back = (np.interp(x, loop.input_force, middle(line)) for line in (loop.forward, loop.back))
             between = np.clip(output, np.minimum(forward, back), np.maximum(forward, back))
             off = output - (forward if stroke > 0 else back if stroke < 0 else between)

@@ -37,10 +37,10 @@ def collect_motor_forces(fit: Record) -> tuple[MotorForce, ...] | None:
     draws, runs = evaluate_curves(fit, curves), []
     along, fitted = draws["along"], np.median(draws["read"], axis=0)
     for run, name in enumerate(table.run_names):
-        here, rows = path.run == run, table.run == run
+        mask, rows = path.run == run, table.run == run
         label = "" if len(table.run_names) == 1 else name
         points = table.displacement[rows], table.force[rows], table.motion.stroke[rows], table.used[rows], fitted[rows]
-        curve = path.displacement[here], quantiles_of_draws(along[:, here]), path.motion.stroke[here]
+        curve = path.displacement[mask], quantiles_of_draws(along[:, mask]), path.motion.stroke[mask]
         runs.append(MotorForce(label, *curve, *points))
     return tuple(runs)
 

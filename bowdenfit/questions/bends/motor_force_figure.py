@@ -108,10 +108,10 @@ def _draw_readings(axes: Axes, shown: np.ndarray, run: MotorForce) -> None:
     """Draw forces or residuals of the readings by stroke; those that are not used are open."""
     for stroke, name, marker, size, color in _STROKES:
         for used, words in ((True, name), (False, "Not used")):
-            here = (run.points_stroke == stroke) & (run.points_used.astype(bool) == used)
-            if here.any():
+            mask = (run.points_stroke == stroke) & (run.points_used.astype(bool) == used)
+            if mask.any():
                 axes.plot(
-                    run.points_displacement[here], shown[here], marker, color=color, markersize=size,
+                    run.points_displacement[mask], shown[mask], marker, color=color, markersize=size,
                     markerfacecolor=color if used else "white", markeredgewidth=0.5,
                     markeredgecolor="white" if used else color, zorder=3, label=words,
                 )  # fmt: skip

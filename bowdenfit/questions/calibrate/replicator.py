@@ -225,7 +225,7 @@ class Replicator:
             if not why:
                 return z, Dataset(self.plan.stated.description, Measurements(tables), {}), redrawn
             redrawn[why] = redrawn.get(why, 0) + 1
-        commonest = max(redrawn, key=lambda why: redrawn[why])
+        commonest = max(redrawn, key=lambda reason: redrawn[reason])
         cause = "a prior far wider than what a cable can be: narrow it under [friction] or [prior] in cable.toml"
         if self.plan.truths:
             cause = "a true value that no cable on this bench can have: state others in the file of --truth"
@@ -242,9 +242,9 @@ class Replicator:
         stated, tables = self.plan.stated, list[Any]()
         try:
             for table in iterate_replaced_tables(stated.description, stated.measurements, readings):
-                why = self.why_implausible(stated, Dataset(stated.description, Measurements((table,)), {}))
-                if why:
-                    return (), why
+                reason = self.why_implausible(stated, Dataset(stated.description, Measurements((table,)), {}))
+                if reason:
+                    return (), reason
                 tables.append(table)
         except DatasetError:
             return (), "a recording has no strokes"

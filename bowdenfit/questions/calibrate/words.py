@@ -218,12 +218,12 @@ def omission_sentences(calibration: Calibration) -> list[str]:
         )
     if calibration.redrawn:
         n = sum(calibration.redrawn.values())
-        why = listed(
+        cause = listed(
             [f"{reason} ({count})" for reason, count in sorted(calibration.redrawn.items(), key=lambda item: -item[1])]
         )
         lines.append(
             f"{counted(n, 'simulated data set was', 'simulated data sets were')} drawn again, truth and tables together, "
-            f"because no bench would produce {'it' if n == 1 else 'them'}: {why}. "
+            f"because no bench would produce {'it' if n == 1 else 'them'}: {cause}. "
             "The rule looks at the simulated readings alone"
             f"{', whatever the truth is' if calibration.truths else ', so it leaves the ranks uniform'}."
         )

@@ -174,12 +174,12 @@ def _draw_deviations(axes: Axes, table: CheckedTable, label: str, numbers: np.nd
         color, marker = (SERIES_COLORS[i % 8], SERIES_MARKERS[i % 8]) if len(groups) > 1 else (BLACK, "o")
         name = group.replace("_", " ") if group else "Reading"
         for back in (False, True):
-            here = in_group & (table.back == back)
-            if here.any():
+            mask = in_group & (table.back == back)
+            if mask.any():
                 words = BACK if back else name
                 fill = "white" if back else color
                 axes.plot(
-                    numbers[here], z[here], marker, color=color, markerfacecolor=fill, markersize=3.6, label=words
+                    numbers[mask], z[mask], marker, color=color, markerfacecolor=fill, markersize=3.6, label=words
                 )
     influential = table.decisive & np.isfinite(z)
     if influential.any():

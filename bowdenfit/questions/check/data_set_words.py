@@ -197,12 +197,12 @@ def _describe_angle_source(contact: Contact, description: Description) -> str:
         sd = f" ± {source.sd:g}" if source.sd else ""
         return f"constant wrap angle {source.value:g}{sd} {source.unit}"
     if source.curve:
-        where = (
+        place = (
             f", published range {source.published_range[0]:g} to {source.published_range[1]:g}"
             if source.published_range
             else ""
         )
-        return f"{source.curve} curve through the column {source.column!r}{where} ({description.geometry} geometry)"
+        return f"{source.curve} curve through the column {source.column!r}{place} ({description.geometry} geometry)"
     nominal = f"{source.nominal.value:g} {source.nominal.unit}" if source.nominal else "the rows' mean"
     return f"wrap angle measured in every row, column {source.column!r}; predictions use {nominal}"
 

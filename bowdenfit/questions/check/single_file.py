@@ -113,12 +113,12 @@ def _describe_file(path: Path, reading: Reading) -> tuple[str, bool]:
 
 def _describe_angle_table(raw: RawTable) -> str:
     """Describe a table of wrap angles by length, and where it belongs."""
-    where = (
+    place = (
         "It is fitted together with readings of forces or efficiencies, or recordings, at some of these lengths: name it in "
         f'cable.toml, [tables] angles = {{ file = "{raw.file}" }}; bowdenfit init writes that file.'
     )
     lines = [f"{raw.file}: a table of wrap angles at {counted(len(raw.rows), 'length')}.", "", _column_table(raw, (), {})]
-    return "\n".join([*lines, "", *describe_row_account(raw.lines), "", filled(where)]) + "\n"
+    return "\n".join([*lines, "", *describe_row_account(raw.lines), "", filled(place)]) + "\n"
 
 
 def _try_as_data_set(path: Path, reading: Reading, strict: bool) -> tuple[Dataset | None, str]:

@@ -87,10 +87,10 @@ def _describe_outliers(checks: Checks) -> str:
     if not far:
         return "The reading is not an outlier." if len(checks.readings) == 1 else "No reading is an outlier."
     more = f", and {len(far) - _MAX_NAMED} more" if len(far) > _MAX_NAMED else ""
-    what = "Outlier" if len(far) == 1 else f"{len(far)} outliers"
+    noun = "Outlier" if len(far) == 1 else f"{len(far)} outliers"
     names = "; ".join(_describe_reading(reading) for reading in far[:_MAX_NAMED])
     measured = "it was" if len(far) == 1 else "they were"
-    return f"{what}: {names}{more}. Check how {measured} measured and written down."
+    return f"{noun}: {names}{more}. Check how {measured} measured and written down."
 
 
 def _describe_reading(reading: CheckedReading) -> str:
@@ -218,16 +218,16 @@ def _describe_widths(checks: Checks) -> list[str]:
 def _width_sentence(parameter: str, affected: list[tuple[str, WidthSensitivity]], checks: Checks) -> str:
     """Return such as 'The prior of tau sets widths: the 90 % interval of mu1 would be 1.4 times as wide with ...'."""
     name, width = max(affected, key=lambda entry: entry[1].size)
-    others = [other for other, _ in affected if other != name]
-    more = f"; less so {listed(others)}" if others else ""
-    why = (
+    remaining = [other for other, _ in affected if other != name]
+    more = f"; less so {listed(remaining)}" if remaining else ""
+    reason = (
         ", because {} must also determine {}".format(*_readings_and_coefficients(checks, parameter))
         if parameter in checks.weakly_identified_noise
         else ""
     )
     ratios = (("twice the scale of that prior", width.doubled), ("half of it", width.halved))
     changes = listed([f"{ratio:.2f} times as wide with {what}" for what, ratio in ratios if isfinite(ratio)])
-    return f"Interval widths depend on the prior of {parameter}{why}: the 90 % interval of {name} would be {changes}{more}."
+    return f"Interval widths depend on the prior of {parameter}{reason}: the 90 % interval of {name} would be {changes}{more}."
 
 
 def _quantity_name(quantity: str) -> str:
@@ -243,10 +243,10 @@ def _quantity_and_prior(s: Sensitivity) -> str:
 
 def _with_wider_prior(sensitivities: Sequence[Sensitivity]) -> str:
     """Describe how far the quantity that moves most would move with a wider prior."""
-    known = [s for s in sensitivities if isfinite(s.wider) and s.sd]
-    if not known:
+    finite = [s for s in sensitivities if isfinite(s.wider) and s.sd]
+    if not finite:
         return ""
-    s = max(known, key=lambda s: abs(s.wider - s.median) / s.sd)
+    s = max(finite, key=lambda s: abs(s.wider - s.median) / s.sd)
     digits = decimals(s.sd) + 1
     return (
         f"; were the prior of {s.parameter} twice as wide, {_quantity_name(s.quantity)} would be "

@@ -184,9 +184,9 @@ def basis_sentences(comparison: Comparison) -> list[str]:
     if comparison.left_out != "run":
         what = "the readings at one load" if comparison.left_out == "load" else "one reading"
         runs = "is one run" if comparison.few_runs == 1 else f"are only {comparison.few_runs} runs"
-        why = f", because there {runs}" if comparison.few_runs else ""
+        reason = f", because there {runs}" if comparison.few_runs else ""
         lines.append(
-            f"Left out at a time: {what} of a run{why}; the effect of its mounting is known from the rest of the run. This "
+            f"Left out at a time: {what} of a run{reason}; the effect of its mounting is known from the rest of the run. This "
             "compares how the models describe these mountings, not how they predict another mounting (--leave-out run does)."
         )
     if comparison.counts_runs:

@@ -71,8 +71,8 @@ def choose_target(fit: Record, name: str | None) -> TargetQuantity:
         return TargetQuantity(
             name, f"the efficiency at the best {variable}", "points", 100 * draws.optimum[OPTIMAL_EFFICIENCY].ravel()
         )
-    known = ["optimal-length", "optimal-efficiency", "efficiency@..."] if route else ["efficiency"]
-    raise UsageError(f"--for {name!r} is not an answer of this fit{suggest_name(name, [*known, *draws.values])}")
+    known_names = ["optimal-length", "optimal-efficiency", "efficiency@..."] if route else ["efficiency"]
+    raise UsageError(f"--for {name!r} is not an answer of this fit{suggest_name(name, [*known_names, *draws.values])}")
 
 
 def _make_parameter_target(fit: Record, name: str) -> TargetQuantity:

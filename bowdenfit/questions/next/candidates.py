@@ -99,14 +99,14 @@ def why_unsuitable(fit: Record, candidate: Candidate) -> str:
     )
     if low <= candidate.route <= high or stands_in:
         return ""
-    why = (
+    cause = (
         "an angle there says nothing about the curves"
         if kind.measures_curves
         else "no angles were measured there that could stand in"
     )
     return (
-        f"{candidate.route:g} {route.unit} lies outside the range of the curves, {low:g} to {high:g} {route.unit}, and {why}; "
-        f"name a {route_variable(fit)} inside."
+        f"{candidate.route:g} {route.unit} lies outside the range of the curves, {low:g} to {high:g} {route.unit}, and {cause}"
+        f"; name a {route_variable(fit)} inside."
     )
 
 

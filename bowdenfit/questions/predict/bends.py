@@ -127,9 +127,9 @@ def _refuse_irrelevant_options(quantity: str, query: BendQuery) -> None:
     }  # fmt: skip
     for option, is_stated in stated.items():
         if is_stated and option not in QUANTITIES[quantity].depends_on:
-            others = [name for name, predicted in QUANTITIES.items() if option in predicted.depends_on]
+            remaining = [name for name, predicted in QUANTITIES.items() if option in predicted.depends_on]
             raise UsageError(
-                f"--quantity {quantity} does not depend on {option}, which is asked of {listed(others)}; leave it out."
+                f"--quantity {quantity} does not depend on {option}, which is asked of {listed(remaining)}; leave it out."
             )
 
 

@@ -81,8 +81,8 @@ def clip_to_tension(
 def _finite_range(parts: list[np.ndarray]) -> Range:
     """Return the lowest and highest finite value; None without any."""
     values = np.concatenate([np.asarray(part, dtype=float) for part in parts]) if parts else np.zeros(0)
-    known = values[np.isfinite(values)]
-    return (float(np.min(known)), float(np.max(known))) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return (float(np.min(finite)), float(np.max(finite))) if len(finite) else None
 
 
 def _note_outside(value: float | None, span: Range, what: str, unit: str) -> str:

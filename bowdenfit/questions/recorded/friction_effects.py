@@ -59,9 +59,9 @@ class RateEffect:
             if sure > _CLEAR
             else f"a hint that efficiency {way} with speed, and no more than that"
         )
-        where = f" {self.place}" if self.place else ""
+        place = f" {self.place}" if self.place else ""
         return (
-            f"Efficiency{where} at {significant(self.fast)} {self.unit} minus that at {significant(self.slow)} {self.unit}: "
+            f"Efficiency{place} at {significant(self.fast)} {self.unit} minus that at {significant(self.slow)} {self.unit}: "
             f"{100 * self.difference.median:+.2f} points (90 % interval {low:+.2f} to {high:+.2f}), {verdict}."
         )
 
@@ -192,10 +192,10 @@ class LostForce:
 
     def sentence(self) -> str:
         """Return both numbers in a sentence."""
-        where = f" {self.place}" if self.place else ""
+        place = f" {self.place}" if self.place else ""
         load = "at any load" if self.at_any_load else "even at the smallest load"
         return (
-            f"Drag: while pulling{where}, {_format_interval(self.lost)} of the force is lost {load}, as if "
+            f"Drag: while pulling{place}, {_format_interval(self.lost)} of the force is lost {load}, as if "
             f"{_format_interval(self.hidden_tension)} of tension did not show at the cells."
         )
 

@@ -107,10 +107,10 @@ def draw(recordings: tuple[LoopPanel, ...], width: float | None = None) -> Figur
 def _draw_blocks(axes: Axes, recording: LoopPanel) -> None:
     """Draw the blocks by stroke."""
     for stroke, name, marker, size, color in STROKES:
-        here = recording.stroke == stroke
-        if here.any():
+        mask = recording.stroke == stroke
+        if mask.any():
             axes.plot(
-                recording.input_force[here], recording.output_force[here], marker, color=color, markersize=size,
+                recording.input_force[mask], recording.output_force[mask], marker, color=color, markersize=size,
                 markeredgewidth=0, label=name, rasterized=True,
             )  # fmt: skip
 

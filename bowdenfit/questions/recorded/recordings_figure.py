@@ -193,8 +193,8 @@ def find_phases(recording: OverTime, stroke: int) -> list[tuple[float, float]]:
     middle, recorded = 0.5 * (before + after), ~np.isin(change, gap)
     starts = np.append(time[:1], np.where(recorded, middle, after))
     stops = np.append(np.where(recorded, middle, before), time[-1:])
-    here = recording.stroke[np.append(0, change)] == stroke
-    return list(zip(starts[here].tolist(), stops[here].tolist(), strict=True))
+    mask = recording.stroke[np.append(0, change)] == stroke
+    return list(zip(starts[mask].tolist(), stops[mask].tolist(), strict=True))
 
 
 def find_gaps(time: np.ndarray) -> np.ndarray:
@@ -236,9 +236,9 @@ def _mark_left_out(axes: Axes, recording: OverTime) -> None:
     """Mark samples left out, by kind, those beyond the axes or without a reading on their edge; and blocks at a range's end."""
     kinds, start = np.array(recording.flagged_kind, dtype=str), find_start(recording)
     for kind in dict.fromkeys(recording.flagged_kind):
-        here = kinds == kind
-        x = np.tile(recording.flagged_time[here] - start, 2)
-        y = np.concatenate([recording.flagged_input[here], recording.flagged_output[here]])
+        mask = kinds == kind
+        x = np.tile(recording.flagged_time[mask] - start, 2)
+        y = np.concatenate([recording.flagged_input[mask], recording.flagged_output[mask]])
         draw_marks(axes, x, y, FLAGS.get(kind, OTHER_FLAG), f"Left out: {kind}")
     at = recording.saturated.astype(bool)
     if at.any():

@@ -122,10 +122,10 @@ def _draw_samples(axes: Axes, recording: Samples) -> None:
     values, stroke = recording.efficiency, recording.stroke
     number = 1 + np.arange(len(values))
     for sign, label, marker, color in ((1, "Pulling", "o", BLUE), (-1, "Returning", "s", VERMILLION)):
-        here = stroke == sign
-        if here.any():
+        mask = stroke == sign
+        if mask.any():
             axes.plot(
-                number[here], 100 * values[here], marker, color=color, markersize=1.8 if len(values) > 100 else 2.6,
+                number[mask], 100 * values[mask], marker, color=color, markersize=1.8 if len(values) > 100 else 2.6,
                 markerfacecolor=color if sign > 0 else "white", markeredgewidth=0.4, label=label, rasterized=True,
             )  # fmt: skip
 

@@ -290,5 +290,7 @@ def _recording_points(angle: float, recording: Recording) -> np.ndarray:
     """Return the blocks of a recording that are readings, moving and at rest."""
     blocks, stroke = recording.blocks, recording.strokes.stroke * recording.strokes.used_sliding
     shown = choose_blocks(len(blocks.time))
-    kept = shown[~blocks.saturated[shown]]
-    return np.stack([np.full(len(kept), angle), blocks.input_force[kept], blocks.output_force[kept], stroke[kept]])
+    retained = shown[~blocks.saturated[shown]]
+    return np.stack(
+        [np.full(len(retained), angle), blocks.input_force[retained], blocks.output_force[retained], stroke[retained]]
+    )

@@ -170,15 +170,15 @@ def _read_measured_angles(page: RecordingsPage, description: Description, file: 
     columns = [c.wrap_angle.column or "" for c in description.curved]
     angles: dict[float, dict[str, float]] = {}
     for i, row in enumerate(page.measured_angles):
-        where = f"{file}, recordings.measured_angles.{i}"
+        place = f"{file}, recordings.measured_angles.{i}"
         for name in row:
             if name not in ["at", *columns]:
-                raise DescriptionError(f"{where}: unknown key {name!r}{suggest_name(name, ['at', *columns])}")
+                raise DescriptionError(f"{place}: unknown key {name!r}{suggest_name(name, ['at', *columns])}")
         for name in ["at", *columns]:
             if name not in row:
-                raise DescriptionError(f"{where}: the key {name!r} is missing; angles are in deg.")
+                raise DescriptionError(f"{place}: the key {name!r} is missing; angles are in deg.")
         if _is_inside_range(description, row["at"]):
-            raise DescriptionError(f"{where}: {row['at']:g} lies inside the range of the route, where the curves hold.")
+            raise DescriptionError(f"{place}: {row['at']:g} lies inside the range of the route, where the curves hold.")
         angles[row["at"]] = {name: row[name] for name in columns}
     return angles
 

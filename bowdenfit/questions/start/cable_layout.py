@@ -109,9 +109,9 @@ def _add_route(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
         raise DatasetError(
             f"{file.name} has no column of lengths next to the wrap angles; add one, such as cable_length_mm."
         )
-    why = f"{file.name} does not say which of its columns is the length; name that column cable_length_mm."
+    reason = f"{file.name} does not say which of its columns is the length; name that column cable_length_mm."
     sure = len(lengths) == 1 and bool(lengths[0].dimension)
-    column = ask_unit(file, "length", lengths[0] if sure else _ask_length_column(file, lengths, why, asker), asker)
+    column = ask_unit(file, "length", lengths[0] if sure else _ask_length_column(file, lengths, reason, asker), asker)
     ends = asker.ask(_range_question(column))
     named = column.plain_name if column.plain_name.isascii() and column.plain_name.endswith("length") else _LENGTH
     layout.route = {"variable": named, "unit": column.unit, "range": list(ends)}
@@ -178,14 +178,14 @@ def _add_curved_contacts(file: MeasuredFile, layout: CableLayout, asker: Asker) 
         layout.add_contact(name, {"curve": curve, "column": column.plain_name})
         blanks = blanks or column.blanks > 0
     if blanks:
-        why = (
+        reason = (
             f"{file.name} has blank cells, and does not say below which angle nothing could be read; write <10 in them."
         )
         words = (
             f"{file.name} has blank cells, which are read as angles too small to be measured; where nothing was measured at "
             "all, delete the row instead. Below which angle could nothing be measured?"
         )
-        value, unit = asker.ask(quantity_question(words, "angle", "10 deg", why))
+        value, unit = asker.ask(quantity_question(words, "angle", "10 deg", reason))
         file.settings["detection_limit"] = {"value": value, "unit": unit}
 
 
@@ -200,9 +200,9 @@ def _several_columns_question(words: str, columns: Sequence[FileColumn], file: s
             raise UsageError(f"{shown(typed)} are not among them; write their numbers separated by spaces, such as 1 2.")
         return [columns[i - 1] for i in sorted({int(number) for number in numbers_typed})]
 
-    why = f"{file} does not say which of its columns are wrap angles; write their unit into their headings."
+    reason = f"{file} does not say which of its columns are wrap angles; write their unit into their headings."
     options = tuple(column.words for column in columns)
-    return Question(f"{words} Write their numbers separated by spaces.", read, None, why, "1", options)
+    return Question(f"{words} Write their numbers separated by spaces.", read, None, reason, "1", options)
 
 
 def _assign_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> None:
@@ -213,14 +213,14 @@ def _assign_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> Non
             f"{file.name} has no column of lengths, and the wrap angles depend on the length; add one, named as in the table "
             f"of wrap angles, {layout.route['variable']}_{layout.route['unit']}."
         )
-    why = f"{file.name} does not say which of its columns is the length; name it as in the table of wrap angles."
+    reason = f"{file.name} does not say which of its columns is the length; name it as in the table of wrap angles."
     matching = file.columns_for(layout.length_quantity) or [
         column for column in options if _LENGTH_WORDS.search(without_accents(column.name).lower())
     ]
     assign_column(
         file,
         layout.length_quantity,
-        matching[0] if len(matching) == 1 else _ask_length_column(file, options, why, asker),
+        matching[0] if len(matching) == 1 else _ask_length_column(file, options, reason, asker),
         asker,
     )
 
@@ -269,9 +269,9 @@ def _is_wrap_angle(file: MeasuredFile, column: FileColumn, asker: Asker) -> bool
     """Return whether a column holds the wrap angle of the bench, asked where its heading does not say so."""
     if [column.name for column in file.columns_for(Quantity(_WRAP_ANGLE, "angle"))] == [column.name]:
         return True
-    why = f"{file.name} does not say whether its column {shown(column.name)} is the wrap angle; name it {_WRAP_ANGLE}_deg."
+    reason = f"{file.name} does not say whether its column {shown(column.name)} is the wrap angle; name it {_WRAP_ANGLE}_deg."
     return asker.ask(
-        yes_no_question(f"Is {column.words} in {file.name} the angle by which the cable was wrapped?", True, why)
+        yes_no_question(f"Is {column.words} in {file.name} the angle by which the cable was wrapped?", True, reason)
     )
 
 
@@ -290,9 +290,9 @@ def _add_single_contact(measured_files: Sequence[MeasuredFile], layout: CableLay
     known = {stated[0] for file in measured_files if (stated := find_stated_angle(file.path))}
     default = next(iter(known)) if len(known) == 1 else None
     files = listed([file.name for file in measured_files])
-    why = f"no column of {files} is a wrap angle; add one, such as wrap_angle_deg."
+    reason = f"no column of {files} is a wrap angle; add one, such as wrap_angle_deg."
     words = "By which angle was the cable wrapped on the bench, all bends together, with its unit?"
-    value, unit = asker.ask(quantity_question(words, "angle", "180 deg", why, default))
+    value, unit = asker.ask(quantity_question(words, "angle", "180 deg", reason, default))
     layout.add_contact("cable", {"value": value, "unit": unit})
 
 

@@ -154,12 +154,12 @@ def _ask_kind(file: MeasuredFile, asker: Asker) -> MeasuredFile:
     ]
     default = [kind for _, kind in options].index(file.likely) + 1 if file.likely else None
     columns = listed([column.words for column in file.columns])
-    why = (
+    reason = (
         f"{file.name} does not say what it holds; name its columns for it, such as input_force_N and output_force_N, "
         "efficiency_percent, or cable_length_mm next to wrap angles in deg; or run this in a terminal, which asks."
     )
     kind = asker.ask(
-        choice_question(f"{file.name} has the columns {columns}. What does it hold?", options, default, why)
+        choice_question(f"{file.name} has the columns {columns}. What does it hold?", options, default, reason)
     )
     if kind.takes_channels:
         return inspect_recording(file.path, "its user says so")
@@ -207,11 +207,11 @@ def _recording_entries(
             entry["at"] = _ask_length(file, layout, asker)
         for name in [] if layout.route else angles:
             stated = find_stated_angle(file.path)
-            why = (
+            reason = (
                 f"{file.name} does not say its wrap angle; write it into the name of the file, such as run1_90deg.csv."
             )
             words = f"What was the wrap angle of {file.name}, with its unit?"
-            value, unit = asker.ask(quantity_question(words, "angle", "90 deg", why, stated[0] if stated else None))
+            value, unit = asker.ask(quantity_question(words, "angle", "90 deg", reason, stated[0] if stated else None))
             entry.setdefault("wrap_angles", {})[name] = {"value": value, "unit": unit}
         channels = _named_sources(file)
         entries.append(entry | ({"channels": channels} if channels else {}))
@@ -222,13 +222,13 @@ def _ask_length(file: MeasuredFile, layout: CableLayout, asker: Asker) -> float:
     """Ask for the length at which a recording was made; proposed where the name of its file has it."""
     unit = layout.route["unit"]
     named = re.findall(rf"(?<![\d.])(\d+(?:[.,]\d+)?)[\s_-]?{re.escape(unit)}(?![a-z])", file.path.stem)
-    why = (
+    reason = (
         f"{file.name} does not say at which length it was recorded; write it into the name of the file, such as "
         f"run1_470{unit}.csv."
     )
     words = f"At which length, in {unit}, was {file.name} recorded?"
     proposed = named[0].replace(",", ".") if len(named) == 1 else None
-    return asker.ask(number_question(words, proposed, "" if proposed else why, "470"))
+    return asker.ask(number_question(words, proposed, "" if proposed else reason, "470"))
 
 
 def format_toml(page: Mapping[str, Any], remarks: Mapping[str, str]) -> str:

@@ -204,8 +204,8 @@ def inspect_recording(path: Path, why: str) -> MeasuredFile:
 
 def _measure_range(values: np.ndarray) -> tuple[float, float]:
     """Return the lowest and highest finite value; zeros where there is none."""
-    known = values[np.isfinite(values)]
-    return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
 
 
 def _inspect_table(path: Path, detected: FileKind) -> MeasuredFile:
@@ -319,12 +319,12 @@ def ask_unit(file: MeasuredFile, dimension: str, column: FileColumn, asker: Aske
         return column
     what = f"the column {shown(column.name)} of {file.name}, which holds {column.low:.5g} to {column.high:.5g}"
     example = "%" if dimension == "ratio" else "N" if dimension == "force" else "deg" if dimension == "angle" else "mm"
-    why = (
+    reason = (
         f"{file.name} does not say the unit of its column {shown(column.name)}; write it into the heading, such as "
         + (f"{shown(f'{column.name} ({example})')}.")
     )
     dimension_in_file = "length" if dimension == "route" else dimension
-    return file.set_unit(column, asker.ask(unit_question(f"In which unit is {what}?", dimension_in_file, why)))
+    return file.set_unit(column, asker.ask(unit_question(f"In which unit is {what}?", dimension_in_file, reason)))
 
 
 def _ask_required_column(
@@ -339,13 +339,13 @@ def _ask_required_column(
             "Add that column, or leave the file out."
         )
     options_in_words = [(column.words, column) for column in options]
-    why = (
+    reason = (
         f"{file.name} does not say which of its columns is {wanted.words}; name that column {wanted.quantity.name}, with its "
         "unit."
     )
     proposed = 1 if len(options) == 1 else None
     return asker.ask(
-        choice_question(f"Which column of {file.name} is {wanted.words}?", options_in_words, proposed, why)
+        choice_question(f"Which column of {file.name} is {wanted.words}?", options_in_words, proposed, reason)
     )
 
 
@@ -382,6 +382,6 @@ def name_channels(file: MeasuredFile, asker: Asker) -> None:
     """Name the channels that a recording needs, and its sample rate where it has no clock."""
     name_columns(file, asker)
     if not file.has_clock:
-        why = f"{file.name} does not say when its samples were taken; add a column of time."
-        rate = asker.ask(number_question(f"How many samples per second has {file.name}?", None, why, "1000"))
+        reason = f"{file.name} does not say when its samples were taken; add a column of time."
+        rate = asker.ask(number_question(f"How many samples per second has {file.name}?", None, reason, "1000"))
         file.sources["time"] = ColumnSource(name=f"{rate:g} Hz")

@@ -295,8 +295,8 @@ def parameters_text(fit: Record) -> str:
     notes.append(f"Condition number of the least-squares problem: {number}.")
     kinked = [] if intervals else [name for name, estimate in estimates.items() if estimate.remark == KINKED]
     if kinked:
-        why = f"{'have' if kinked[1:] else 'has'} {KINKED}. Sampling gets past kinks: fit without --no-mcmc."
-        notes.append(filled(f"{listed(kinked)} {why}"))
+        reason = f"{'have' if kinked[1:] else 'has'} {KINKED}. Sampling gets past kinks: fit without --no-mcmc."
+        notes.append(filled(f"{listed(kinked)} {reason}"))
     wide = [] if intervals else [name for name, estimate in estimates.items() if _is_wide(estimate)]
     if wide:
         notes.append(

@@ -199,8 +199,8 @@ def suggest_next_step(fit: Record) -> str:
     if rests_on_one_mounting(fit):
         return "Next: remount the cable and repeat a measurement; one mounting cannot show how far mountings differ."
     influential = few(map(_name_reading, checks.influential), most=2)  # how far on each differs from one seed to the next
-    what = "reading" if len(checks.influential) == 1 else "readings"
-    remeasure = f"; if in doubt, first repeat the most influential {what}: {influential}" if influential else ""
+    noun = "reading" if len(checks.influential) == 1 else "readings"
+    remeasure = f"; if in doubt, first repeat the most influential {noun}: {influential}" if influential else ""
     if fit.dataset.description.route is not None and fit.optimal_length().is_certain:
         return f"Next: no further measurement is needed{remeasure}. bowdenfit next ranks further measurements."
     if not has_candidates(fit):

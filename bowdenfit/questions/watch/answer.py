@@ -87,8 +87,8 @@ class History(Display):
 
     def add(self, answer: WatchedAnswer) -> "History":
         """Return the history with an answer in place of an earlier one of as many mountings."""
-        others = [one for one in self.answers if _count(one) != _count(answer)]
-        return History(tuple(sorted([*others, answer], key=_count)))
+        remaining = [one for one in self.answers if _count(one) != _count(answer)]
+        return History(tuple(sorted([*remaining, answer], key=_count)))
 
     def _table(self) -> Rows:
         rows = [

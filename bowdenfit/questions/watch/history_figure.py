@@ -34,9 +34,9 @@ def describe_history_charts(history: History) -> str:
 def _describe_marks(history: History) -> str:
     """Return the sentences that explain lines and points."""
     last = history.answers[-1]
-    what = "mounting" if last.mountings else "reading"
+    noun = "mounting" if last.mountings else "reading"
     return (
-        f"The answer ({last.words}) after each {what}: median and 90 % interval of all that was measured by then. Filled: a "
+        f"The answer ({last.words}) after each {noun}: median and 90 % interval of all that was measured by then. Filled: a "
         "fit that may be trusted; open: one that must not be, or was not checked since more was measured."
     )
 
@@ -101,8 +101,8 @@ def make_history_charts(history: History) -> tuple[Chart, ...]:
         Series("Not trusted, or not checked", "hollow", "blue", np.where(trusted, np.nan, median)),
     )
     unit = f" ({_unit(last.unit)})" if last.unit else ""
-    what = "Mountings" if last.mountings else "Readings"
-    return (Chart("History", what, f"{begin_sentence(last.words)}{unit}", (SeriesGroup(count, series),)),)
+    noun = "Mountings" if last.mountings else "Readings"
+    return (Chart("History", noun, f"{begin_sentence(last.words)}{unit}", (SeriesGroup(count, series),)),)
 
 
 def _unit(unit: str) -> str:

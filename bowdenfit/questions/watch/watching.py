@@ -123,10 +123,10 @@ class _Bench:
         except (UsageError, MemoryError):
             raise
         except BowdenfitError as error:
-            why = str(error).replace(str(self.files.copy), str(self.files.path))
-            if why != self.refused and not self.files.unsettled(time.monotonic()):
-                self.refused = why
-                yield UnreadableFiles(why)
+            reason = str(error).replace(str(self.files.copy), str(self.files.path))
+            if reason != self.refused and not self.files.unsettled(time.monotonic()):
+                self.refused = reason
+                yield UnreadableFiles(reason)
             return
         answer = self._describe(fit, time.perf_counter() - begin)
         self.refused, self.latest, self.is_assessed = "", (answer, fit), False

@@ -33,9 +33,9 @@ def watch_lines(answers: Iterable[WatchedAnswer | UnreadableFiles], name: str) -
             continue
         yield f"{describe_verdict(answer)}\n"
         is_open = False
-        if (why := tuple(one for some in (answer.troubles or {}).values() for one in some)) != reasons:
-            yield from (filled(f"- {sentence}", "  ", hangs=True) + "\n" for sentence in why)
-            reasons = why
+        if (reason := tuple(one for some in (answer.troubles or {}).values() for one in some)) != reasons:
+            yield from (filled(f"- {sentence}", "  ", hangs=True) + "\n" for sentence in reason)
+            reasons = reason
         if answer.stop != stop:
             yield filled(answer.stop) + "\n" if answer.stop else ""
             stop = answer.stop

@@ -262,8 +262,8 @@ def _flagged(common: CommonClock) -> FlaggedSamples:
     """Return the samples left out, evenly thinned to a few hundred of each kind, in order of time."""
     chosen = []
     for kind in range(GOOD + 1, NO_OVERLAP):
-        where = np.flatnonzero(common.fault == kind)
-        chosen.append(where[np.unique(np.linspace(0, len(where) - 1, min(len(where), _SHOWN_FLAGS)).astype(int))])
+        positions = np.flatnonzero(common.fault == kind)
+        chosen.append(positions[np.unique(np.linspace(0, len(positions) - 1, min(len(positions), _SHOWN_FLAGS)).astype(int))])
     at = np.sort(np.concatenate(chosen))
     kinds = tuple(KINDS[k] for k in common.fault[at].tolist())
     return FlaggedSamples(kinds, common.time[at], common.input_force[at], common.output_force[at])

@@ -135,20 +135,20 @@ def average_blocks(common: CommonClock, samples: int, input_noise: float) -> tup
         samples: Samples of a block; 0 to leave every sample by itself.
         input_noise: Standard deviation of a single sample of the input force [N].
     """
-    kept, lost, counts, start = [], [], np.zeros(len(KINDS), dtype=int), 0
+    retained, lost, counts, start = [], [], np.zeros(len(KINDS), dtype=int), 0
     while start < len(common.time):
         place, stop = _whole_blocks(common, start, samples)
         part = common.part(slice(start, stop))
         fault = _swept(part.fault, place)
-        kept.append(_means(part, place, fault == GOOD))
+        retained.append(_means(part, place, fault == GOOD))
         lost.append(_means(part, place, (part.fault == SATURATED) & _saturated_blocks(fault, place)))
         counts += np.bincount(fault, minlength=len(KINDS))
         start = stop
-    joined = [np.concatenate(column) for column in zip(*kept, *lost, strict=True)]
+    joined = [np.concatenate(column) for column in zip(*retained, *lost, strict=True)]
     order = np.argsort(joined[0], kind="stable")
     place, input_, output, velocity, lowest, highest, count = (column[order] for column in joined)
     middle = common.time[0] + common.step * ((place + 0.5) * max(samples, 1) - 0.5)
-    saturated = (np.arange(len(order)) >= sum(len(column[0]) for column in kept))[order]
+    saturated = (np.arange(len(order)) >= sum(len(column[0]) for column in retained))[order]
     time = common.time[place] if samples == 0 else middle
     turn = _turning_values(input_, lowest, highest, input_noise)
     blocks = Blocks(time, input_, output, velocity, count, saturated, turn)
@@ -203,14 +203,14 @@ def _means(
     """Return the number of each block with chosen samples; the means of the two forces and the velocity, and the lowest and
     the highest input force, of these; and their counts.
     """
-    where = np.flatnonzero(chosen)
-    starts = np.flatnonzero(np.append(True, np.diff(place[where]) > 0)) if len(where) else np.zeros(0, dtype=int)
-    count = np.diff(np.append(starts, len(where)))
+    positions = np.flatnonzero(chosen)
+    starts = np.flatnonzero(np.append(True, np.diff(place[positions]) > 0)) if len(positions) else np.zeros(0, dtype=int)
+    count = np.diff(np.append(starts, len(positions)))
     columns = (common.input_force, common.output_force, common.velocity)
-    means = [np.add.reduceat(v[where], starts) / count if len(starts) else np.zeros(0) for v in columns]
-    input_ = common.input_force[where]
+    means = [np.add.reduceat(v[positions], starts) / count if len(starts) else np.zeros(0) for v in columns]
+    input_ = common.input_force[positions]
     ends = [of.reduceat(input_, starts) if len(starts) else np.zeros(0) for of in (np.minimum, np.maximum)]
-    return place[where][starts], means[0], means[1], means[2], ends[0], ends[1], count
+    return place[positions][starts], means[0], means[1], means[2], ends[0], ends[1], count
 
 
 def estimate_bandwidth(input_force: Series, output_force: Series, rate: float, main: float, loop: bool = False) -> float:

@@ -149,16 +149,16 @@ def explain_backward_clock(name: str, time: Vector) -> str:
     at = next((start + int(np.argmax(back)) for start, back in steps if back.any()), None)
     if at is None:
         return ""
-    where = (
+    place = (
         f"the time of {name} runs backwards at sample {at + 2}, from {time[at]:.10g} s to {time[at + 1]:.10g} s; "
         "the usual cause is"
     )
     some = np.diff(subsample(time))
     if -_HALF_DAY <= time[at + 1] - time[at] < -_HALF_DAY + max(60.0, 10 * float(np.nanmedian(np.abs(some)))):
-        return f"{where} a 12-hour clock written without AM and PM. Export the time with 24 hours, or in seconds."
+        return f"{place} a 12-hour clock written without AM and PM. Export the time with 24 hours, or in seconds."
     if np.mean(some < 0) > _MOST_REPEATED:
-        return f"{where} a file whose last sample comes first. Sort its rows by the time."
-    return f"{where} two recordings in one file. Split the file there."
+        return f"{place} a file whose last sample comes first. Sort its rows by the time."
+    return f"{place} two recordings in one file. Split the file there."
 
 
 def _check_forces(file: str, name: str, force: Vector) -> None:

@@ -196,11 +196,11 @@ def _rises_at(value: float, other: Vector, runs: EqualRuns, lag: int) -> float:
 
 def _closed(flags: Flags) -> Flags:
     """Flag the few samples between flagged ones too: what is left of a clipped stretch is the lower half of its noise."""
-    where = np.flatnonzero(flags)
-    if not len(where):
+    positions = np.flatnonzero(flags)
+    if not len(positions):
         return flags
-    near = np.flatnonzero(np.diff(where) <= _CLOSED + 1)
-    return flags | _from_to(where[near], where[near + 1], len(flags))
+    near = np.flatnonzero(np.diff(positions) <= _CLOSED + 1)
+    return flags | _from_to(positions[near], positions[near + 1], len(flags))
 
 
 def _from_to(start: Positions, end: Positions, samples: int) -> Flags:
@@ -225,11 +225,11 @@ def spikes(force: Vector) -> Flags:
     noise = math.hypot(noise_of(within), quantum_of(values) / math.sqrt(12))
     for part in split_pieces(len(force)):
         start, stop = _with_neighbors(there, part)
-        where = start + np.flatnonzero(there[start:stop])
+        indices = start + np.flatnonzero(there[start:stop])
         positions = (
-            where[_spikes_in(np.asarray(force[where], dtype=float), noise)]
-            if len(where) > 2 * _HALF_WINDOW
-            else where[:0]
+            indices[_spikes_in(np.asarray(force[indices], dtype=float), noise)]
+            if len(indices) > 2 * _HALF_WINDOW
+            else indices[:0]
         )
         flags[positions[(positions >= part.start) & (positions < part.stop)]] = True
     return flags

@@ -136,8 +136,8 @@ def _sums(
 
 
 def _filled(total: Vector, count: Labels) -> Vector:
-    where = np.flatnonzero(count)
-    return np.interp(np.arange(len(count)), where, total[where] / count[where])
+    positions = np.flatnonzero(count)
+    return np.interp(np.arange(len(count)), positions, total[positions] / count[positions])
 
 
 def _coarser(forces: list[Vector], step: float) -> int:

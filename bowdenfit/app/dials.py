@@ -63,7 +63,7 @@ def answer_dials(fit: Fit, values: Mapping[str, float], is_input: bool, stroke: 
 
     Args:
         fit: The fit.
-        values: Of the dials, by key.
+        values: Values of the dials, by key.
         is_input: Whether the force is that at the motor, and what arrives is asked; else that which is wanted at the load.
         stroke: "pull" or "return".
     """

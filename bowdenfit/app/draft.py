@@ -57,7 +57,7 @@ class UnderstoodColumn:
         heading: Heading of the column.
         unit: Its unit; empty where the file does not say it.
         meaning: The quantity that it is read as; empty where it is not read.
-        first, last: What stands in its first and last row.
+        first, last: Text of its first and of its last row.
         low, high: Its range; empty of words.
         units: Units that it may have.
     """
@@ -78,7 +78,7 @@ class UnderstoodFile:
 
     Args:
         name: Its name.
-        holds: What it holds, in words.
+        holds: Contents in words.
         columns: Its columns, or the channels of a recording.
         meanings: Quantities that they may be, with their words.
     """
@@ -98,7 +98,7 @@ class Understanding:
         entries: The questions.
         refusals: Why it cannot be fitted yet.
         description: Text of its cable.toml; empty where questions are open.
-        report: What `check` says; empty where it cannot be fitted.
+        report: Report of `check`; empty where it cannot be fitted.
         left_out: Files that the data set will not have, because their contents are not what their extension says.
     """
 
@@ -116,7 +116,7 @@ class Draft:
 
     Args:
         folder: Where they lie.
-        answers: What was answered, by question.
+        answers: Answers of the user, by question.
         stated: What was stated of columns, as (quantity, unit), by file and heading.
         typed: Cells that are typed, the headings first; empty where nobody types.
         understanding: What was understood when it was last looked at.
@@ -182,7 +182,7 @@ class Draft:
 
         Args:
             file, heading: Which column.
-            quantity: What it holds; empty for what its heading says.
+            quantity: Quantity in the column; empty if its heading says so.
             unit: Its unit; empty for what its heading says.
         """
         of_file = self.stated.setdefault(file, {})

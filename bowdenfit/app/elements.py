@@ -19,7 +19,7 @@ def address(*parts: str, **query: str) -> str:
 
     Args:
         parts: Its parts, such as "fit" and the name of one.
-        query: What follows the question mark.
+        query: Text after the question mark.
     """
     path = "/" + "/".join(quote(part, safe="") for part in parts)
     return f"{path}?{urlencode(query, quote_via=quote)}" if query else path
@@ -78,7 +78,7 @@ def field(label: str, key: str, hint: str = "", fault: str = "") -> Element:
     """Return a block with a label, into which the control of that key goes; what is below it describes it.
 
     Args:
-        label: What is asked.
+        label: Label of the field.
         key: Key of the control.
         hint: Below it.
         fault: Why what it holds cannot be taken.
@@ -110,7 +110,7 @@ def choice(
 
     Args:
         key: Key of the control.
-        value: What is chosen.
+        value: Chosen value.
         options: Values with their words.
         on_change: Called with what is chosen.
         label: What it is of, where no label stands beside it.

@@ -43,7 +43,7 @@ class FitJob:
     """A fit in a process of its own, followed by a thread.
 
     Args:
-        request: What is to be fitted.
+        request: Data set, settings and seed to fit.
     """
 
     def __init__(self, request: FitRequest) -> None:

@@ -23,9 +23,9 @@ class FormEntry:
     Args:
         key: By which its answer is kept.
         words: The question.
-        answer: What was answered, or is proposed; empty where nothing may be proposed.
+        answer: Answer that was given, or is proposed; empty where nothing may be proposed.
         hint: An example, or why the files do not say it.
-        options: What may be answered, as (answer, words); empty where it is typed.
+        options: Possible answers, as (answer, words); empty where it is typed.
         fault: Why the answer cannot be taken; empty where it can.
     """
 
@@ -41,7 +41,7 @@ class Form:
     """Answers questions as the page has them, proposed answers included, up to the first that has none.
 
     Args:
-        answers: What was answered, by key.
+        answers: Answers of the user, by key.
     """
 
     def __init__(self, answers: Mapping[str, str]) -> None:

@@ -77,7 +77,7 @@ async def attempt(action: Callable[[], Any]) -> bool:
     """Do something, or say why it cannot be done; return whether it was done.
 
     Args:
-        action: What to do, which may be awaited.
+        action: Function to call, which may be awaited.
     """
     try:
         result = action()

@@ -31,7 +31,7 @@ class CheckedRows:
     Args:
         count: How many they are.
         refusals: Why they are not added; those of a cell have the row of the file in which it would stand.
-        report: What `check` says of the data set with them; empty where it is refused.
+        report: Report of `check` on the data set with them; empty where it is refused.
     """
 
     count: int
@@ -48,7 +48,7 @@ class OpenTable:
         name: Name of the file, as seen from the folder.
         content: All its bytes.
         encoding: Encoding of its text.
-        separator: What stands between its columns.
+        separator: Separator of its columns.
         headings: Heading of each column.
         rows: Its rows of readings, as text.
         last_row: Number of the last of them in the file.

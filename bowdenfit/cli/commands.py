@@ -62,7 +62,7 @@ def command(verb: Verb) -> App:
     """Return the command of a verb: a function with the signature that cyclopts reads, which asks the verb.
 
     Args:
-        verb: What it does; see `bowdenfit.verb`.
+        verb: Verb of the command; see `bowdenfit.verb`.
     """
     command_signature = _command_signature(verb)
 

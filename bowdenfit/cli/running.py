@@ -56,7 +56,7 @@ def run_interruptibly(command: Callable[[], Any]) -> Any:
     """Run a command in a thread while this one, the main one, waits for signals.
 
     Args:
-        command: What to do.
+        command: Function to run.
 
     Returns:
         What the command returns.
@@ -120,7 +120,7 @@ def watch_verb(folder: Path | None, watch: Watch) -> Iterator[Report]:
 
     Args:
         folder: Results folder, where there is one.
-        watch: What is kept there, and what the bar shows.
+        watch: Bar, and the file that lets the verb go on.
 
     Raises:
         MemoryShortageError: There is too little memory to begin.

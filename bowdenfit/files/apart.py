@@ -93,7 +93,7 @@ def call_isolated(path: Path, reader: str, *arguments: Any, limits: Limits | Non
         path: The file.
         reader: Module and name of the function.
         arguments: Further ones, which JSON can carry.
-        limits: What it may take; by its size and `LIMITS` if omitted.
+        limits: Memory and time that it may take; by its size and `LIMITS` if omitted.
 
     Raises:
         DatasetError: What the reader says of the file, or that it took more memory or time than fits its size.

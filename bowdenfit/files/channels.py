@@ -64,7 +64,7 @@ class ChannelFile:
 
     Args:
         path: The file.
-        kind: What it is, for people: "CSV", "MATLAB", "TDMS", "MDF4", "ROS bag", "Parquet", "HDF5", "Excel workbook".
+        kind: Format in words: "CSV", "MATLAB", "TDMS", "MDF4", "ROS bag", "Parquet", "HDF5", "Excel workbook".
         channels: Its numeric channels, in the order of the file.
         remarks: Omissions and assumptions, in sentences.
         account: Where its rows went; None where it has none.
@@ -133,7 +133,7 @@ def load_library(module: str, kind: str) -> ModuleType:
 
     Args:
         module: Name to import, such as "openpyxl" or "pyarrow.parquet".
-        kind: What it reads, for the error: ".xlsx", "Parquet".
+        kind: Format that it reads, for the error: ".xlsx", "Parquet".
 
     Raises:
         DatasetError: It is not installed.
@@ -189,7 +189,7 @@ def refuse_too_large(path: Path, n_samples: int, what: str = "") -> None:
     Args:
         path: The file.
         n_samples: How many numbers it holds, times included.
-        what: What these are, for the error.
+        what: Name of the rows, for the error.
 
     Raises:
         DatasetError: They would need more than `LARGEST_BYTES`.

@@ -83,7 +83,7 @@ class Sheet:
 
     Args:
         encoding: Name of the encoding.
-        separator: What stands between columns; a blank for any run of blanks and tabs.
+        separator: Separator of columns; a blank for any run of blanks and tabs.
         decimal: Decimal mark.
         start: Where the data start [bytes].
         layout: Headings and kinds of the columns.
@@ -329,7 +329,7 @@ def _account_rows(path: Path, sheet: Sheet, columns: SheetColumns, quick: tuple[
     Args:
         path: The file.
         sheet: Layout found in its first lines.
-        columns: What its last rows hold, which were read one by one.
+        columns: Cells of its last rows, which were read one by one.
         quick: Where the rows end that were read at once [bytes], and how many these are.
         stop: Where the last whole row ends [bytes].
     """

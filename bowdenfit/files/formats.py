@@ -39,9 +39,9 @@ class Content:
     """A kind of file that its first bytes give away.
 
     Args:
-        what: What it is, for people, with an article.
+        what: Name of the format, with an article.
         endings: The endings of such files, the usual one first; none for files that nobody reads.
-        remedy: What to do with such a file that has another ending, as an order; to rename it if omitted.
+        remedy: Fix for such a file that has another extension, as an order; to rename it if omitted.
     """
 
     what: str

@@ -147,7 +147,7 @@ def find_candidates(
     counts where nothing clearer does and the other end is there too.
 
     Args:
-        headings: What stands over each column, and the unit that the file gives elsewhere; both may be empty.
+        headings: Heading of each column, and the unit that the file gives elsewhere; both may be empty.
         wanted: Quantities to look for.
         stated: Quantities whose column the user has named; none is looked for.
     """
@@ -213,7 +213,7 @@ def parse_sources(texts: Sequence[str], option: str, known: Collection[str] = ()
     """Return what the user names by options such as "input_force=ai0:lbf": the name in the file, and its unit, by quantity.
 
     Args:
-        texts: What stands behind the options.
+        texts: Arguments of the options.
         option: The option, for errors.
         known: Quantities that may be named; any where it is empty.
 

@@ -29,13 +29,13 @@ class Layout:
     Args:
         start: Position of the first row of data.
         headings: One for each column; `named` says whether the file gave them.
-        kinds: What the cells of each column are.
+        kinds: Kind of the cells of each column.
         named: Whether there is a row of headings.
         score: How much speaks for this reading of the sheet: the number of cells that are numbers.
         heading_cells: Number of cells in the row of headings.
         over: Positions of the rows of headings and units.
         by_numbers: Whether the headings are a row of numbers, which may be data.
-        names, units: What stands over each column, and in a row of units below that; empty where nothing does.
+        names, units: Heading of each column, and its unit in a row of units below that; empty if there is none.
     """
 
     start: int

@@ -44,7 +44,7 @@ class _Variables:
     Args:
         channels: Vectors, and the columns of narrow matrices.
         settings: Single numbers by name, such as "fs" or "rec.fs", of the file ("") and of each structure ("rec").
-        left_out: What is neither.
+        left_out: Variables that are neither.
     """
 
     channels: list[Channel] = field(default_factory=list)

@@ -31,7 +31,7 @@ class MeasuredCell:
     Args:
         number: As written, with its percent sign and its mark of a limit.
         unit: Unit of the number, and of its error; empty without one.
-        error: What stands behind ±; empty without it.
+        error: Text after ±; empty without it.
     """
 
     number: str

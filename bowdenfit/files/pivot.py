@@ -25,7 +25,7 @@ class LongTable:
         header: Heading of each column.
         units: The unit of each column; empty without one.
         rows: Cells, which keep their place in the file.
-        remark: What was taken for what.
+        remark: Remark on how headings were read.
     """
 
     header: tuple[str, ...]

@@ -18,7 +18,7 @@ class LeftOut:
     Args:
         why: The reason, behind the words "not used, ".
         ranges: First and last of the rows that stand together.
-        texts: What the first of them say.
+        texts: Texts of the first of them.
     """
 
     why: str
@@ -50,7 +50,7 @@ class RowAccount:
         headings: The rows that hold headings and their units.
         left_out: All others.
         beside: Row and text of remarks in rows that are read, beside the table.
-        note: What else is said of its cells, as a clause; empty without.
+        note: Remark on its cells, as a clause; empty without.
     """
 
     file: str

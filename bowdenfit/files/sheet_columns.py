@@ -65,7 +65,7 @@ class SheetCells:
         numbers: The numbers of each column.
         dates: The texts of each column of dates.
         words: Position, column and text of each cell that is not as it should be; the cells of a row that has too many.
-        letters: What each row holds.
+        letters: Kinds of cells in each row, as letters.
     """
 
     numbers: dict[int, array]

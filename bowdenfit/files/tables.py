@@ -49,9 +49,9 @@ class RawTable:
         rows: Rows of readings.
         units: The unit that stands below each heading, or behind its numbers; empty without one.
         lines: Where the rows of the file went.
-        errors: What stands behind ± in the cells of a column, by its heading.
+        errors: Errors after ± in the cells of a column, by its heading.
         remarks: How its layout was understood, in sentences.
-        faults: What is found wrong while it is read.
+        faults: Faults noticed while it is read.
     """
 
     file: str

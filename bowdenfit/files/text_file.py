@@ -33,7 +33,7 @@ class Line:
     Args:
         row: Its number in the file, from 1.
         start: Where it starts [bytes].
-        text: What it says, with the end of the line.
+        text: Text of the line, with its end.
     """
 
     row: int

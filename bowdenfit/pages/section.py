@@ -71,7 +71,7 @@ class Chart:
         y_label: With unit.
         groups: Series to draw.
         spans: Shaded ranges.
-        place_names: What the places 1, 2 and so on are; empty where they are numbers.
+        place_names: Names of the places 1, 2 and so on; empty where they are numbers.
     """
 
     name: str
@@ -108,7 +108,7 @@ class Picture:
         title: Its heading, which stands for it where it is not seen.
         caption: Caption in plain words.
         charts: The same to zoom into, one after the other; none where that does not pay.
-        chart_caption: What the charts show, which have no panels.
+        chart_caption: Caption of the charts, which have no panels.
         folded: Whether only those who ask for it see it.
         alone: Whether its charts have no drawing, because a table beside them has the same numbers for paper.
     """
@@ -129,7 +129,7 @@ class PageSection:
     Args:
         title: Its heading.
         template: File that says how its context is shown.
-        context: What is shown, by the names that the template has for it; the figures are called `PICTURES`.
+        context: Values by the names that the template has for them; the figures are called `PICTURES`.
     """
 
     title: str
@@ -161,7 +161,7 @@ class HtmlPage:
 
     Args:
         title: Subject of the page.
-        subtitle: What kind of page, and when it was made.
+        subtitle: Kind of page, and when it was made.
         sections: In their order.
     """
 
@@ -216,7 +216,7 @@ def prose_section(
         items: A list below the paragraphs.
         folded: Texts as they are printed, and tables, that only those who ask for them see, with what they are.
         pictures: Figures, at its end.
-        headline: What stands above all, in large letters.
+        headline: Sentence above all, in large letters.
     """
     context = {
         "headline": headline,

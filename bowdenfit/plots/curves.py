@@ -66,7 +66,7 @@ def draw_quantiles(axes: Axes, x: np.ndarray, quantiles: np.ndarray, color: Any,
 
     Args:
         axes: Panel to draw on.
-        x: Of the line.
+        x: Horizontal positions of the line.
         quantiles: First axis from low to high, such as 5 %, 50 % and 95 %; or one row.
         color: Color of the line and the band.
         line: Label and looks of the line.

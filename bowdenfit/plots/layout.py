@@ -274,7 +274,7 @@ def _stretch_panels(figure: Figure, height: float, above: float) -> None:
     Args:
         figure: The page.
         height: Height of the page [in], with what is added above it.
-        above: What is added above it [in].
+        above: Height added above it [in].
 
     Raises:
         UsageError: Panels would be too low to be read.

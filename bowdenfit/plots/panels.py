@@ -183,7 +183,7 @@ def draw_marks(
 
     Args:
         axes: Panel to draw on.
-        x, y: Of the marks.
+        x, y: Positions of the marks.
         mark: Marker and color.
         label: Entry of the legend.
         fill: Color of the inside, if another.

@@ -52,7 +52,7 @@ class ErrorSource:
     """One cause of error.
 
     Args:
-        name: What is wrong then, "wrap angles", "gain" or "hysteresis".
+        name: Name of the error: "wrap angles", "gain" or "hysteresis".
         words: The same with how well it is known.
     """
 

@@ -125,7 +125,7 @@ def draw_with_title(
 
     Args:
         name: Which of `FIGURES`.
-        data: What it shows.
+        data: Data of the figure.
         cable: Name of the cable, for the title.
         width: Width of the page [in], on which words stay as large as they are; what suits the figure if omitted.
         mark: See `warning_mark`.
@@ -145,7 +145,7 @@ def draw_on_axes(name: str, data: Any, ax: Any, mark: str = "") -> "Figure":
 
     Args:
         name: Which of `FIGURES`.
-        data: What it shows.
+        data: Data of the figure.
         ax: One, for the first panel alone, or as many as there are panels, in a list or an array as of `plt.subplots`.
         mark: See `warning_mark`; stands in the first panel.
 
@@ -255,7 +255,7 @@ def write_figure_files(
 
     Args:
         name: Which of `FIGURES`.
-        data: What it shows.
+        data: Data of the figure.
         folder: Where the files go; made if it is missing.
         formats: Endings; the figure is written in every one.
         cable, width, mark: See `draw_with_title`.

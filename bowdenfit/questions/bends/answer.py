@@ -221,7 +221,7 @@ class ElasticAnswers(Display):
         Args:
             bends: Lowest and highest wrap angle [rad].
             input_force: Force up to which both sides must stay taut [N].
-            friction: What may be felt in free motion [N]; no limit if omitted.
+            friction: Free-motion friction allowed [N]; no limit if omitted.
 
         Raises:
             UsageError: The cable has no preload.

@@ -24,7 +24,7 @@ class PreloadWindow(Display):
         lowest: Lowest preload that keeps both sides taut [N].
         highest: Highest preload that is felt as no more than the limit [N]; None without one.
         best: Preload that keeps both sides taut with probability `TAUT`, and is felt least of those [N].
-        felt: What it is felt as in free motion, at the bend where that is most.
+        felt: Free-motion friction at the best preload, at the bend where it is most.
         possible: Probability that some preload satisfies both; 1 without a limit.
     """
 

@@ -31,7 +31,7 @@ class RingDown:
 
     Args:
         label: Number of the run, and what was added to the joint.
-        quantity, unit: What was read.
+        quantity, unit: Quantity that was read, and its unit.
         time: Along the curve [s].
         reading: Quantiles there.
         points_time, points: Readings.

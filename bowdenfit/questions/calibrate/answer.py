@@ -22,7 +22,7 @@ class QuantityLabel:
     Args:
         symbol: Its symbol in figures.
         is_answer: Whether it is what a fit is made for, a coefficient or the optimum, and no noise scale or the like.
-        meaning: What it is, in words.
+        meaning: Meaning in words.
     """
 
     symbol: str
@@ -35,7 +35,7 @@ class Coverage:
     """Share of intervals that held the truth.
 
     Args:
-        probability: What they claim.
+        probability: Claimed probability of the intervals.
         rate: How often they did.
         low, high: Rates between which chance keeps all quantities of a calibrated tool with probability 99 %.
     """
@@ -68,7 +68,7 @@ class CheckedQuantity:
             are not of the prior.
         judged_by: "ranks and coverage", or "coverage" where truths are not of the prior; empty where the verdict does not
             look at it.
-        meaning: What it is, in words.
+        meaning: Meaning in words.
     """
 
     name: str
@@ -136,13 +136,13 @@ class Calibration(Display):
         assumed: What was assumed of it in the fits against what was stated; empty of a calibration proper.
         seed: Seed.
         replications: How many were made.
-        quantities: What was ranked.
+        quantities: Quantities that were ranked.
         unconverged: Replications whose draws could not be trusted, with why; they are not ranked.
         redrawn: Why tables were drawn again, with how many were.
         seconds: Median time of a replication.
         truths: True values that did not come from the priors, in words.
-        engines: What fitted how many replications.
-        power: What so many replications can see of one quantity.
+        engines: Number of replications fitted by each engine.
+        power: Power of so many replications for one quantity.
         faults_with_all: What would be wrong with which quantity if replications whose draws could not be trusted were ranked
             too, by the draws there are.
     """

@@ -39,7 +39,7 @@ def open_calibration(
 
     Args:
         folder: The results folder; None if nothing is kept.
-        plan: What is replicated.
+        plan: Plan of the replications.
         assumptions: Settings that the fits assume.
         resume: Whether to go on with what is there.
         force: Whether to replace it.
@@ -75,7 +75,7 @@ def replicate_missing(
     """Run the replications that are not done yet, and keep each as it ends.
 
     Args:
-        plan: What is replicated.
+        plan: Plan of the replications.
         done: Replications by number, to which the others are added.
         replications: How many there are to be.
         engine: Where they run, see `open_engine`.
@@ -107,9 +107,9 @@ def summarize_calibration(
     """Return what the replications of a plan say together.
 
     Args:
-        plan: What was replicated.
-        replications: What came of it.
-        quantities: What is known of each quantity, see `list_quantities`.
+        plan: Plan of the replications.
+        replications: Replications with their ranks.
+        quantities: Label of each quantity, see `list_quantities`.
         assumptions: Settings that the fits assumed.
     """
     return summarize_replications(
@@ -143,7 +143,7 @@ class CalibrationJob:
     """A plan as work for other processes; two with the same plan are equal.
 
     Args:
-        plan: What is replicated.
+        plan: Plan of the replications.
         threads: In each process; 0 for one a core.
         key: Made from the plan.
     """
@@ -176,7 +176,7 @@ def split_into_pieces(job: CalibrationJob, numbers: Sequence[int], workers: int)
 
     Args:
         job: The plan.
-        numbers: Of the replications.
+        numbers: Numbers of the replications.
         workers: At a time; one gets as much at once as is fitted together.
     """
     size = (

@@ -109,7 +109,7 @@ def list_quantities(plan: CalibrationPlan) -> dict[str, QuantityLabel]:
     """Return what will be ranked, once it is clear that the data set can be replicated.
 
     Args:
-        plan: What is replicated.
+        plan: Plan of the replications.
 
     Raises:
         DescriptionError, DatasetError, UsageError: It cannot; says why.

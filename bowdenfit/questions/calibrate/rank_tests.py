@@ -46,9 +46,9 @@ def summarize_replications(
 
     Args:
         replications: Any number, in any order.
-        quantities: What is known of each quantity; others are shown by name.
+        quantities: Label of each quantity; others are shown by name.
         name: Name of the cable.
-        assumed: What was assumed in the fits.
+        assumed: Assumptions of the fits.
         truths: True values that did not come from the priors, in words.
         seed: Seed of the replications.
     """

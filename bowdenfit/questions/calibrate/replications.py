@@ -44,7 +44,7 @@ class RankedTruth:
     """Truth and posterior of one quantity; of a parameter in z, where its prior is a standard normal.
 
     Args:
-        truth: What the readings were simulated with.
+        truth: True values of the simulated readings.
         mean: Posterior mean.
         sd: Posterior standard deviation.
         rank: Share of the posterior below the truth; uniform between 0 and 1 if all is right.
@@ -65,9 +65,9 @@ class Replication:
         redrawn: Why tables were drawn again, with how many were.
         reasons: Why its draws should not be trusted; empty if they may.
         ranked: By quantity; empty where the fit failed.
-        seconds: What it took, of those that were fitted together on average.
+        seconds: Time of the fit, averaged over those that were fitted together.
         steps: Steps of each walker.
-        engine: What fitted it: weighted draws ("laplace"), "ensembles" or "nuts".
+        engine: Engine that fitted it: weighted draws ("laplace"), "ensembles" or "nuts".
     """
 
     number: int
@@ -92,7 +92,7 @@ def open_replications(
 
     Args:
         folder: The results folder.
-        fingerprint: What is calibrated, with its seed.
+        fingerprint: Plan and seed that identify the calibration.
         resume: Whether to go on with what is there.
         force: Whether to replace it.
 

@@ -56,7 +56,7 @@ class BatchFitter:
 
     Args:
         settings: How carefully.
-        programs: What has been compiled, by cable and shape of the data.
+        programs: Compiled programs, by cable and shape of the data.
     """
 
     settings: BatchSettings = field(default=RANK_SETTINGS)
@@ -97,7 +97,7 @@ def why_implausible(measured: Dataset, simulated: Dataset) -> str:
 
     Args:
         measured: Measurements.
-        simulated: What was simulated in its place.
+        simulated: Data set that was simulated in its place.
     """
     reasons = (
         kind.why_implausible(measured.measurements.table(kind.table), table)
@@ -132,9 +132,9 @@ class Replicator:
     """Runs replications of one plan in this process.
 
     Args:
-        plan: What is replicated.
-        laboratory: What fits; may be shared.
-        disturb: What is done to simulated tables before they are fitted, for calibrations that must fail.
+        plan: Plan of the replications.
+        laboratory: Fitter; may be shared.
+        disturb: Change of simulated tables before they are fitted, for calibrations that must fail.
         why_implausible: Why simulated tables are not to be had from a bench, in a word; empty if they may be.
     """
 

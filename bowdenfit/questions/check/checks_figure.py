@@ -42,7 +42,7 @@ class CheckedTable:
     """Readings of one table against their predictions from all the others.
 
     Args:
-        name: What they are, in words.
+        name: Name of the readings, in words.
         z_score: Deviations in standard deviations of the predictions; NaN of readings that are only a bound.
         numbers: Where the readings were taken, by axis label: the first two that vary.
         group: Contact or the like of each reading; empty where all are of one kind.

@@ -38,7 +38,7 @@ class PriorTable:
     """Readings of one table beside their prior predictive quantiles.
 
     Args:
-        name: What they are, in words.
+        name: Name of the readings, in words.
         label: Axis label of the readings.
         numbers: Where they were taken, the first that varies.
         place: Its axis label.

@@ -241,7 +241,7 @@ def describe_table_file(
         file: Its detected kind.
         commands: Commands that fit it; two where it could be either of two kinds.
         data: The data set that it makes; None if it makes none yet.
-        obstacle: What keeps it from that, in a sentence.
+        obstacle: Reason why it cannot be fitted, in a sentence.
         named: Quantities whose columns the user has named, by heading.
         usable: Whether the command can fit it as it stands.
     """
@@ -327,11 +327,11 @@ def describe_recording_file(
     """Describe the channels of a file, one a line, and the recording that they make.
 
     Args:
-        file: What was read.
+        file: Channels of the file.
         reason: Why it is taken for a recording, as a clause.
         command: The command that fits it.
         recordings: The file as a recording, where its channels say which is which.
-        obstacle: What keeps it from being one, in a sentence.
+        obstacle: Reason why it is not one, in a sentence.
         usable: Whether the command can fit it as it stands.
     """
     description = KINDS["recordings"].describe_single_file(recordings) if recordings is not None else "a recording"

@@ -157,7 +157,7 @@ def describe_assumed_widths(checks: Checks, meanings: Mapping[str, str]) -> str:
 
     Args:
         checks: The checks.
-        meanings: What each parameter is, by name.
+        meanings: Meaning of each parameter, by name.
     """
     names = [
         name

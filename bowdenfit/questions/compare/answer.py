@@ -42,7 +42,7 @@ class ComparedParameter:
         symbol: For figures.
         unit: "1" where there is none.
         by_fit: Its value and uncertainty in each fit that has it.
-        meaning: What it is, in words.
+        meaning: Meaning in words.
     """
 
     symbol: str
@@ -60,11 +60,11 @@ class Comparison(Display):
         weights: Weights of each in the mixture of all that predicts best.
         predictions: Predictions of each, reading by reading.
         omitted: Readings that the fits do not share.
-        descriptions: What each assumes, in words.
+        descriptions: Assumptions of each fit, in words.
         parameters: Coefficients and the like, by parameter and fit.
         optimal_length: Optimal length of each fit with a route, with its unit.
         rate_effects: Rate effects of the fits in which friction may depend on speed.
-        left_out: What was left out at a time: a whole run, its readings at one load, or one of them.
+        left_out: Part that was left out at a time: a whole run, its readings at one load, or one of them.
         few_runs: Number of runs, where so few are left out in parts unasked; 0 else.
         troubles: Why fits are not to be trusted, by fit; those that are to be have none.
         other_priors: Parameters whose priors are all that a fit differs in from the one that predicts best, by fit; those that

@@ -54,7 +54,7 @@ class CommonReadings:
     Args:
         readings: Table and label of each.
         positions: Where they are among the readings of each fit.
-        omitted: What they do not share, by table.
+        omitted: Readings that they do not share, by table.
     """
 
     readings: tuple[tuple[str, str], ...]
@@ -101,7 +101,7 @@ def choose_parts(
 
     Args:
         fits: By name.
-        leave_out: What is asked to be left out; None if the number of runs is to decide.
+        leave_out: Part to leave out; None if the number of runs is to decide.
     """
     runs = [len(t.labels) for fit in fits.values() for t in fit.model.terms if has_rows(t)]
     few = min(runs, default=_FEW_RUNS) if leave_out is None else 0

@@ -38,7 +38,7 @@ class BendCompensation(Part):
 
     Args:
         wrap_angle: [deg].
-        friction: What moving the device takes, of motor and loop [N m].
+        friction: Torque that moves the device, of motor and loop [N m].
         scheduled: F_cst of the schedule [N m].
         left_scheduled, left_fixed: Median of what is left to feel [N m]; negative where the device is pushed on.
     """
@@ -61,7 +61,7 @@ class FeedbackGain(Part):
         with_hand: Whether a hand that is described counts, too.
         decided_by: Input that decides it most, in words.
         decided_share: Share of the scatter of the largest gain that goes with it.
-        left: What is left to feel where friction is most, at the safe gain [N m].
+        left: Torque that a hand still feels where friction is most, at the safe gain [N m].
         from_ring_down: Whether the damping of the rope comes from a ring-down; else it was stated.
         integral: K_i on the integral of that torque, as stated [1/s].
     """
@@ -170,7 +170,7 @@ class Compensation(Display):
         by_bend: Every bend looked at.
         gain: Gain of the active law; None where it was not asked for, or cannot be told.
         missing: Keys of device.toml that a gain needs and that are not said.
-        preloads: What other preloads would do.
+        preloads: Answers at other preloads.
         slack: Probability that the loop is slack at rest at some of the bends.
         simulated: The device through time; None without simulation.
     """

@@ -155,7 +155,7 @@ def estimate_compensation(
 
     Args:
         fit: The fit.
-        device: What moves; None where nothing is said of it, so that all of it that helps counts as nothing.
+        device: Motor, joint and hand; None if nothing is stated, so that nothing of it helps.
         stated: Range of wrap angles.
         law: "karnopp", "active", or both.
         risk: Probability that is accepted.

@@ -60,7 +60,7 @@ class SimulatedDevices:
         feed_forward: F_cst there [N m].
         gain: K_f.
         active_zone: Speed below which it acts; infinite for always [rad/s].
-        control: What the controller is besides.
+        control: Other settings of the controller.
         wrap_angle: Wrap angle of the bend [deg].
         seed: Seed of the noise.
     """
@@ -141,7 +141,7 @@ def simulate_devices(
         fit: The fit.
         device: The device.
         loop: Draws of the cable.
-        answer: What may be fed forward and fed back.
+        answer: Torques that may be fed forward, and gain that may be fed back.
         schedule: Whether what is fed forward is scheduled by bend.
         draws: How many devices.
 

@@ -56,7 +56,7 @@ class FitLabel:
         seed: Seed of the fit.
         version: Version of bowdenfit.
         created: When it was fitted, UTC.
-        measured: What it was measured at, in words.
+        measured: Conditions of the measurements, in words.
         group: Group of readings that it is for; empty without groups.
         distrust: Why the fit is not to be trusted; empty where it is.
     """
@@ -98,7 +98,7 @@ class FrictionLevel:
     Args:
         name: One of `LEVELS`, or of a draw.
         exponent: Friction exponent while pulling and while returning (rows) by place [1].
-        taut_loss: What a loop loses while both sides are taut, 2 P Lambda, by place [N]; 0 of a single rope.
+        taut_loss: Force that a loop loses while both sides are taut, 2 P Lambda, by place [N]; 0 of a single rope.
         load_exponent: p of the scale g, see `bowdenfit.physics.friction.force_scale` [1].
         drag: D of that scale [N].
         rate: Stribeck rise [1], Stribeck speed and viscous coefficient, see `bowdenfit.physics.friction.rate_factor`.

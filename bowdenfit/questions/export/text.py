@@ -13,7 +13,7 @@ def format_comment(sentences: Iterable[str], before: str) -> str:
 
     Args:
         sentences: A line or more each.
-        before: What begins a line, such as " * ".
+        before: Text that begins a line, such as " * ".
     """
     return "\n".join(before + line for line in wrap_comment(sentences))
 

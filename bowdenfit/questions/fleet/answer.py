@@ -39,7 +39,7 @@ class FittedInspection:
         temperature: [°C]; NaN where nobody says.
         lubricated: Whether it was; None where nobody says.
         shape: Number of the model that it was fitted with, from 1.
-        engine: What drew: "laplace" (weighted draws), "ensembles" or "nuts".
+        engine: Engine that drew: "laplace" (weighted draws), "ensembles" or "nuts".
         pareto_k: Pareto k of the importance weights.
         n_effective: Effective number of the draws, of the worst parameter.
         reasons: Why the draws should not be trusted; empty if they may.

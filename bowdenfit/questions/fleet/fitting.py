@@ -50,7 +50,7 @@ def divide_into_pieces(
     """Divide the work by model; no result depends on how it is divided.
 
     Args:
-        cases: What is to be fitted.
+        cases: Inspections to fit.
         seed: Seed of the fleet.
         settings: How carefully.
         workers: At a time.
@@ -109,9 +109,9 @@ def gather_results(
 
     Args:
         name: Name of the fleet.
-        cases: What was fitted, in the order of cables and cycles.
-        fits: What came of each, by the hash of its input.
-        broken: What could not be read.
+        cases: Inspections that were fitted, in the order of cables and cycles.
+        fits: Fit of each, by the hash of its input.
+        broken: Inspections that could not be read.
         seed: Seed of the fleet.
     """
     shapes = _group_by_shape(cases)

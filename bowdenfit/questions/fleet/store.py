@@ -41,7 +41,7 @@ class FleetStore:
 
     Args:
         folder: The folder.
-        start: What must not change between an interrupted fleet and its continuation.
+        start: Settings and inputs that must not change between an interrupted fleet and its continuation.
     """
 
     folder: Path

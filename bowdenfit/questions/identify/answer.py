@@ -45,7 +45,7 @@ class Identifiability(Display):
         groups: Knowledge by group of `GROUPS`, as far as there are such parameters.
         profiles: How the sum of squares of the readings rises with each friction coefficient, the others fitted again.
         units: Units of the parameters.
-        meanings: What they are, in words.
+        meanings: Meanings of the parameters, in words.
     """
 
     name: str
@@ -86,7 +86,7 @@ def describe_identified(analysis: CovarianceAnalysis, measured: bool, opening: s
     """Describe what some parameters are known to, in one sentence.
 
     Args:
-        analysis: What is known of them.
+        analysis: Covariance analysis of the parameters.
         measured: Whether readings entered.
         opening: How the sentence begins.
     """

@@ -195,8 +195,8 @@ class ConfoundedPair:
     Args:
         first, second: Their names.
         factor: The combination is first + factor x second, in shown units.
-        mean, sd: Of the combination.
-        first_sd, second_sd: Of the parameters by themselves.
+        mean, sd: Mean and standard deviation of the combination.
+        first_sd, second_sd: Standard deviations of the two parameters alone.
         correlation: Correlation of their draws.
     """
 

@@ -298,7 +298,7 @@ def make_efficiency_chart(data: EfficiencyAlongRoute) -> tuple[Chart]:
     """Return the chart of the curve with its intervals, measured points, and the lengths that are good enough.
 
     Args:
-        data: What the figure shows.
+        data: Data of the figure.
     """
     points = [_points_group(table) for table in data.points if np.isfinite(table.route).any()]
     groups = (*_new_run_group(data), _curve_group(data.efficiency), *points)

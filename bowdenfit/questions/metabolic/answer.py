@@ -77,7 +77,7 @@ class Metabolic(Display):
     """Result of a study.
 
     Args:
-        name, source: Of the study.
+        name, source: Name and source of the study.
         comparisons: Comparisons of all pairs.
         contradictions: Numbers that cannot all be right, a sentence each.
         order: Conditions in the order in which all persons walked; empty where each had its own.
@@ -162,7 +162,7 @@ def find_contradictions(study: Study) -> Iterator[str]:
     """Yield what of a study cannot all be right, a sentence each.
 
     Args:
-        study: What was printed.
+        study: Published numbers.
     """
     means = {difference.name: difference.mean for difference in study.condition if difference.mean is not None}
     baselines: dict[str, list[tuple[PrintedDifference, Range]]] = {}

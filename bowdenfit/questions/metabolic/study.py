@@ -55,13 +55,13 @@ class Study(_Frozen):
     """A study; keys of metabolic.toml.
 
     Args:
-        name, source, license: What it is, and where it comes from.
+        name, source, license: Name, source and license of the data.
         persons: How many walked in every condition.
         order: Conditions in the order in which they were walked; empty where each person had an order of its own.
         rest: Condition that is taken off the others, in a table of gas.
         table: File with a row for each person and condition.
-        condition: What was printed.
-        difference: What was printed of pairs.
+        condition: Published means and deviations of each condition.
+        difference: Published differences of pairs.
     """
 
     schema_: int = Field(alias="schema", ge=1, le=1)
@@ -223,7 +223,7 @@ def probability_below(mean: float, error: float, persons: int, prior_sd: float =
     """Return the probability that the true difference is negative.
 
     Args:
-        mean, error: Of the difference, and its standard error.
+        mean, error: Mean of the difference, and its standard error.
         persons: How many.
         prior_sd: Standard deviation of what differences were expected before, about 0; infinite where nothing was.
     """

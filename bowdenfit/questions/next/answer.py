@@ -130,7 +130,7 @@ class RankedCandidate(Part):
         sd_error: Monte Carlo standard error of that.
         as_good: Whether its share is clearly above 0, and the best candidate's larger by no more than the Monte Carlo error of
             the difference.
-        cost: What it costs; None where nothing was said of costs.
+        cost: Cost of the measurement; None if no costs are stated.
     """
 
     candidate: Candidate
@@ -208,7 +208,7 @@ class LoadAndStroke(Part):
     """At which load and of which stroke the readings of the best candidate tell most.
 
     Args:
-        usual: What the candidate was taken to be, in words: the loads and strokes of the runs made so far.
+        usual: Loads and strokes assumed for the candidate, in words: those of the runs made so far.
         ranked: The same with all its readings at one load and of one stroke, best first, with that as usual among them.
     """
 
@@ -248,7 +248,7 @@ class NextMeasurement(Display):
     Args:
         answer: The answer to narrow.
         ranked: The candidates.
-        repeats: What several readings of the best would do; None where no candidate does anything.
+        repeats: Effect of several readings of the best; None where no candidate does anything.
         plan: The best, then what is best beside it, and so on.
         route_label: Axis label of the route; empty without one.
         route_range: Where the curves hold.
@@ -256,7 +256,7 @@ class NextMeasurement(Display):
         loads: Lowest and highest input force of a run like those made so far [N]; None where there is none.
         stop: Whether nothing needs to be measured, in a sentence.
         within: At which load and stroke the best is best made; None where it says so itself, or is not made under any.
-        second_mounting: What a second mounting would do; None where there are several already.
+        second_mounting: Effect of a second mounting; None where there are several already.
     """
 
     answer: TargetQuantity

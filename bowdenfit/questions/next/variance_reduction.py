@@ -179,7 +179,7 @@ def simulate_readings(
 
     Args:
         model: The fitted model; its parameters stay as they are.
-        measurements: What was measured so far, whose angles hold outside the range of the curves.
+        measurements: Measurements so far, whose angles hold outside the range of the curves.
         candidates: The candidates.
         z: Draws of the posterior, one a row.
         seed: Seed of the noise.

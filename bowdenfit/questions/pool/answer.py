@@ -104,9 +104,9 @@ class NextInspection(Part):
     Args:
         cable: Of which cable.
         cycles: After how many.
-        target: What it tells about: "failing" (probability of failing before the cycles asked for) or "wear".
+        target: Quantity that the inspection narrows: "failing" (probability of failing before the cycles asked for) or "wear".
         before: Standard deviation of that now.
-        after: What it would be, on average over what may be read.
+        after: Expected uncertainty after the inspection, averaged over possible readings.
         probability: Probability of failing now; None where that is not the target.
     """
 
@@ -167,10 +167,10 @@ class Pool(Display):
         effects: Effects of what else was told.
         reference_cycles: Cycles that wear is stated for: the longest inspected.
         reference_temperature: Temperature that coefficients are stated for [°C].
-        limit: What life is until; None where it is not asked for.
+        limit: Limit that ends the life of a cable; None if not asked for.
         new_cable: Life of a new cable of this population; None where there is none.
         mixtures: Coefficients of which cables do not look like one population, with the probability of that by chance.
-        curves: What is drawn over cycles; None where wear cannot be told.
+        curves: Curves over cycles; None where wear cannot be told.
         next_inspections: The inspections that tell most, the best first.
         notes: What is not estimated and why, and what was taken for granted, a sentence each.
         reasons: Why the answer should not be trusted; empty if it may.

@@ -104,7 +104,7 @@ def summarize_life(limit: ServiceLimit, cycles: np.ndarray, longest: float) -> L
     """Summarize draws of the cycles to failure.
 
     Args:
-        limit: What it is until.
+        limit: Limit that ends its life.
         cycles: Draws.
         longest: Cycles that were inspected.
     """
@@ -118,9 +118,9 @@ def compute_curves(data: PoolingData, draws: PopulationDraws, limit: ServiceLimi
     """Compute curves over cycles of every cable and of a new one.
 
     Args:
-        data: What is pooled.
+        data: Pooled draws of all inspections.
         draws: Draws of the population and its cables.
-        limit: What life is until.
+        limit: Limit that ends the life of a cable.
         new: Draws of new cables, (draw, number).
     """
     reference, furthest = data.reference_cycles, data.reference_cycles
@@ -170,9 +170,9 @@ def rank_next_inspections(
     """Return the most informative next inspections, the best first; none if wear is not identifiable.
 
     Args:
-        data: What is pooled.
+        data: Pooled draws of all inspections.
         draws: Draws of the population and its cables.
-        limit: What life is until.
+        limit: Limit that ends the life of a cable.
         seed: Random seed.
     """
     if data.inspected.cycles is None:
@@ -216,7 +216,7 @@ def _compute_sd_before_and_after(target: np.ndarray, proxy: np.ndarray, readings
     Args:
         target: Draws of it.
         proxy: What it depends on, about which readings tell in proportion.
-        readings: What may be read, (draw, coefficient).
+        readings: Possible readings, (draw, coefficient).
     """
     centered = readings - readings.mean(axis=0)
     slope, *_ = np.linalg.lstsq(centered, proxy - proxy.mean(), rcond=None)

@@ -35,7 +35,7 @@ class PoolingData:
         cables: Names, in the order of their numbers.
         coefficients: Names.
         symbols: Symbols of the coefficients, for axes.
-        inspected: What is known of all inspections.
+        inspected: Draws and circumstances of all inspections.
         logs: Draws of their log coefficients, (inspection, draw, coefficient).
         labels: Labels of the inspections.
         cycles: Cycles of the inspections; NaN where nobody says.
@@ -43,7 +43,7 @@ class PoolingData:
         left_out: Inspections that are not pooled.
         notes: What is not estimated and why, a sentence each.
         inputs: Inputs of the inspections, what they were fitted from.
-        own_names: What the coefficients are called in single fits.
+        own_names: Names of the coefficients in single fits.
     """
 
     cables: tuple[str, ...]
@@ -223,8 +223,8 @@ def count_effective_draws(data: PoolingData, population: PopulationDraws) -> np.
     """Return the effective number of draws of each single fit under the pooled posterior, (inspection,).
 
     Args:
-        data: What is pooled.
-        population: What was drawn of it.
+        data: Pooled draws of all inspections.
+        population: Draws of the population.
     """
     inspected, count = data.inspected, len(data.coefficients)
     columns = (
@@ -255,7 +255,7 @@ def load_readings(data: PoolingData, rows: Sequence[int], folder: Path) -> tuple
     """Load the readings of some inspections, grouped by the model that fitted them.
 
     Args:
-        data: What is pooled.
+        data: Pooled draws of all inspections.
         rows: Numbers of the inspections.
         folder: Folder of the fleet's measurements.
 

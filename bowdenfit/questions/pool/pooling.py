@@ -93,7 +93,7 @@ def pool_cables(fleet: FleetDraws, limit: ServiceLimit | None, seed: int, measur
 
     Args:
         fleet: Draws of all inspections.
-        limit: What life is until; None where it is not asked for.
+        limit: Limit that ends the life of a cable; None if not asked for.
         seed: Random seed.
         measurements: Folder of the fleet's measurements, for inspections of which single fits tell too little.
 

@@ -34,7 +34,7 @@ class BendQuery:
         output_force: Force that is wanted at the load side [N]; None where none is.
         stated_force: Whether an input force was stated.
         preload: Preload [N] that the cable is given instead of its own; None for its own.
-        friction: What may be felt in free motion [N]; None without a limit.
+        friction: Free-motion friction allowed [N]; None without a limit.
         stroke: +1 pulling, -1 returning.
         spring: Stiffness of a spring in series with each rope [N/mm]; None without.
     """
@@ -105,7 +105,7 @@ def predict_at_wrap_angles(fit: Record, quantity: str, query: BendQuery) -> list
     Args:
         fit: The fit.
         quantity: One of `QUANTITIES`.
-        query: What is asked, see `make_query`.
+        query: Query made by `make_query`.
 
     Raises:
         UsageError: There is no posterior, no wrap angle, or the cable has not what is asked for.

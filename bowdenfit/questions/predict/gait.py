@@ -99,7 +99,7 @@ def read_stated_angles(fit: Record, named: Sequence[tuple[str, tuple[float, str]
     Args:
         fit: The fit.
         named: Names of contacts, and their wrap angles with units.
-        gait: What another contact goes through; None without.
+        gait: Wrap angles that another contact goes through; None without.
 
     Raises:
         UsageError: There is no such contact, one is named twice, or an angle is none.

@@ -262,7 +262,7 @@ def make_recordings_charts(recordings: tuple[OverTime, ...]) -> tuple[Chart, ...
     """Return a chart for each recording, or for evenly chosen ones of many.
 
     Args:
-        recordings: What the figure shows, and all that it has no room for.
+        recordings: Recordings in the figure, and all that it has no room for.
     """
     shown = choose_evenly(recordings, MOST_CHARTS)
     return tuple(_make_chart(recording, _CHART_POINTS // len(shown)) for recording in shown)

@@ -88,8 +88,8 @@ def report_page(
     Args:
         fit: The fit.
         figures: Data of the figures that are on it, by name.
-        ranking: What to measure next; a sentence says how to ask if omitted.
-        changes: What changed since an earlier fit; nothing is said of any if omitted.
+        ranking: Ranking of further measurements; a sentence says how to ask if omitted.
+        changes: Changes since an earlier fit; none are shown if omitted.
     """
     (answer, *above), below = ([make_section(fit) for make_section in group] for group in (ABOVE_FIGURES, BELOW_FIGURES))
     following = next_step_section(fit) if ranking is None else ranking_section(ranking)

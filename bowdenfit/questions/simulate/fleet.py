@@ -52,10 +52,10 @@ class FleetDesign(Frozen):
         wear: Mean growth of log coefficients in the reference cycles.
         wear_spread: Its standard deviation between cables.
         lubricated: Share of the inspections that are made after lubrication.
-        lubrication: What lubrication adds to log coefficients.
+        lubrication: Effect of lubrication on log coefficients.
         temperature: Range that the temperature of each inspection is drawn from [°C].
         reference_temperature: Temperature that the coefficients are stated for [°C].
-        per_degree: What a degree adds to log coefficients [1/K].
+        per_degree: Effect of one degree on log coefficients [1/K].
     """
 
     cables: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -131,7 +131,7 @@ def simulate_fleet(plan: FleetPlan, seed: int, noise: bool = True) -> tuple[list
     """Return all inspections, and the truth: of the population, and of each cable.
 
     Args:
-        plan: What to simulate.
+        plan: Plan of the simulation.
         seed: Random seed; a cable is the same whatever others there are.
         noise: Whether readings scatter.
     """

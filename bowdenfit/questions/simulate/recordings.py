@@ -198,7 +198,7 @@ def write_recordings(recording_set: RecordingSet, folder: Path) -> None:
     """Write cable.toml, the recordings, the angles and truth.json.
 
     Args:
-        recording_set: What was made.
+        recording_set: Simulated recordings.
         folder: Where to.
     """
     plan = recording_set.plan

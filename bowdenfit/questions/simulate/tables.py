@@ -137,7 +137,7 @@ def simulate_design(
 
     Args:
         description: The cable.
-        design: What is measured.
+        design: Design of the measurements.
         values: True value of every parameter [internal units].
         key: Random key.
         noise: Whether readings scatter; without noise every reading is what the model expects.
@@ -203,7 +203,7 @@ def draw_true_values(
     Args:
         description: The cable.
         tables: Tables of the shape of what is measured.
-        truth: What is given.
+        truth: True values that are stated.
         key: Random key.
         run_once: See `simulate`.
 

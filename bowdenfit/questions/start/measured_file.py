@@ -43,7 +43,7 @@ class FileColumn:
         low, high: Lowest and highest of these.
         values: Number of different values in it.
         blanks: Number of blank cells.
-        first, last: What stands in its first and in its last row.
+        first, last: Text of its first and of its last row.
     """
 
     name: str
@@ -94,7 +94,7 @@ class MeasuredFile:
         likely: The kind that it may be where it does not say.
         sources: Columns that the description must name, by quantity.
         assigned: Headings of the columns that are known.
-        settings: What else stands beside the file in the description.
+        settings: Other settings of the file in the description.
         has_clock: Whether a recording says when its samples were taken.
     """
 
@@ -147,7 +147,7 @@ class MeasuredFile:
 
         Args:
             heading: Its heading; a heading that the file has not is passed over.
-            quantity: What it holds; empty where only its unit is stated.
+            quantity: Quantity in the column; empty where only its unit is stated.
             unit: Its unit; empty where the heading says it.
         """
         for column in [column for column in self.columns if column.name == heading]:

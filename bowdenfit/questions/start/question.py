@@ -39,10 +39,10 @@ class Question(Generic[Answer]):
     Args:
         words: The question.
         read: Return the answer that was typed; refuses what is none with a sentence.
-        default: What Enter alone says; None where nothing may be proposed.
+        default: Answer that Enter gives; None where nothing may be proposed.
         why: What the files do not say, and what would say it, in a sentence; with a default beside it, that is only proposed.
         example: An answer where there is no default, to show how it is written.
-        options: What can be answered by a number, from 1, each in words.
+        options: Answers that may be given by a number, from 1, each in words.
     """
 
     words: str
@@ -155,7 +155,7 @@ def unit_question(words: str, dimension: str, why: str, default: str | None = No
 
     Args:
         words: The question.
-        dimension: What it measures.
+        dimension: Dimension of the number.
         why: Why there is none that is more than proposed.
         default: The unit that Enter takes.
     """
@@ -178,10 +178,10 @@ def quantity_question(
 
     Args:
         words: The question.
-        dimension: What it measures.
+        dimension: Dimension of the numbers.
         example: How it is written.
         why: Why there is none that is more than proposed.
-        default: What Enter takes.
+        default: Answer that Enter gives.
     """
 
     def read(typed: str) -> tuple[float, str]:
@@ -252,7 +252,7 @@ def contact_name_question(words: str, default: str | None, taken: Collection[str
 
     Args:
         words: The question.
-        default: What Enter says; not proposed where another contact is called so.
+        default: Answer that Enter gives; not proposed where another contact is called so.
         taken: The names of the other contacts.
     """
 
@@ -271,7 +271,7 @@ def coefficient_name_question(words: str, default: str, columns: Collection[str]
 
     Args:
         words: The question.
-        default: What Enter says.
+        default: Answer that Enter gives.
         columns: Columns of wrap angles, after which the parameters of their curves are called.
     """
 

@@ -59,7 +59,7 @@ class Coefficient:
         prior: From the prior.
         least_squares: Estimate; NaN where not identified.
         standard_error: Its standard error.
-        meaning: What it is, in words.
+        meaning: Meaning in words.
     """
 
     symbol: str
@@ -190,7 +190,7 @@ def make_coefficient_charts(parameters: tuple[Coefficient, ...]) -> tuple[Chart,
     """Return a chart of the density of each coefficient, or of evenly chosen ones of many.
 
     Args:
-        parameters: What the figure shows.
+        parameters: Parameters in the figure.
     """
     return tuple(_make_chart(parameter) for parameter in choose_evenly(parameters, MOST_CHARTS))
 

@@ -165,7 +165,7 @@ def sampler_sentences(page: dict[str, Any]) -> list[str]:
     """Describe how trajectories went, whether a second sampler agrees, and which to try instead; empty of most fits.
 
     Args:
-        page: What summary.json holds.
+        page: Contents of summary.json.
     """
     sampler, sentences = page.get("sampler", {}), []
     if sampler.get("method") == "nuts":

@@ -58,7 +58,7 @@ class SampledQuantity:
         draws: The draws (walkers by draws).
         bounds: Lowest and highest possible value.
         symbol: Symbol alone, in matplotlib's math notation.
-        meaning: What it is, in words.
+        meaning: Meaning in words.
     """
 
     label: str
@@ -244,7 +244,7 @@ def make_pair_charts(data: Pairs) -> tuple[Chart, ...]:
     """Return the chart of each pair of quantities, the most correlated first.
 
     Args:
-        data: What the figure shows.
+        data: Data of the figure.
     """
     draws = np.stack([quantity.draws.ravel() for quantity in data.quantities])
     with np.errstate(invalid="ignore", divide="ignore"):  # of one that never moves

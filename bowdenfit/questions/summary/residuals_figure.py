@@ -138,7 +138,7 @@ def make_residual_charts(data: Residuals) -> tuple[Chart, Chart]:
     """Return the charts of measured efficiencies beside predicted ones, and of their differences, a place for each row.
 
     Args:
-        data: What the figure shows.
+        data: Data of the figure.
     """
     labels = [label for table in data.points for label in table.labels]
     rows = np.array(choose_evenly(range(len(labels)), MOST_POINTS))

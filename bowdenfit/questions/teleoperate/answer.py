@@ -17,8 +17,8 @@ class CouplingScheme(Part):
 
     Args:
         name: In words.
-        free_torque: What is felt in slow free motion, where the cable's friction is most [N m].
-        stiffness: What is felt of the stated wall [N m/rad]; None where no position comes back, so that none is defined.
+        free_torque: Torque in slow free motion, where the cable's friction is most [N m].
+        stiffness: Stiffness of the stated wall as the hand feels it [N m/rad]; None without a position sent back.
         free_motion_stable: Probability that it is stable in free motion.
         stable: Probability that contact is stable, by wall stiffness.
         hardest: Hardest wall up to which every softer one is stable with the probability asked for [N m/rad]; 0 where free
@@ -55,7 +55,7 @@ class SimulatedContact(Part):
     Args:
         time: [s].
         master, slave: Angles of the master's joint and of the slave [rad].
-        hand_torque, wall_torque: What the hand gives and the wall takes [N m].
+        hand_torque, wall_torque: Torques of the hand and on the wall [N m].
         wall_stiffness: Stiffness of the wall [N m/rad].
         bounces: Whether the slave leaves the wall again 1.2 s after it came; None where it never came.
     """

@@ -13,7 +13,7 @@ class UnreadableFiles(Display):
     """Files that cannot be read as they are now; they are watched on.
 
     Args:
-        why: What is wrong, in sentences with a remedy.
+        why: Faults, in sentences with a fix.
     """
 
     why: str
@@ -39,8 +39,8 @@ class WatchedAnswer(Display):
         stop: The same in a sentence; empty where more needs to be measured.
         troubles: Why the fit must not be trusted, in sentences, by kind of trouble; None until that has been looked at.
         warning: What `summary` says first of a fit that must not be trusted; else empty.
-        doubts: What speaks a little against a fit that may be trusted.
-        seconds: What it took to read and fit, once the files were settled [s].
+        doubts: Weak evidence against a fit that may be trusted.
+        seconds: Time to read and fit, once the files were settled [s].
         clock: Time of day at which it was known.
     """
 

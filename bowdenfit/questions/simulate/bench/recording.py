@@ -111,9 +111,9 @@ def simulate_recording(
     Args:
         exponent: Friction exponent of the cable [1].
         friction: How friction depends on load and speed.
-        profile: What the motor does.
+        profile: Motion of the motor.
         bench: Mechanics and sampling.
-        faults: What readings suffer.
+        faults: Faults of the readings.
         generator: Random numbers; each kind of fault draws from its own stream, so that one does not change another.
         run_effect: m, added to the exponent by how the cable was mounted [1].
 

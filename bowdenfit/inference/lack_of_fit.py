@@ -258,8 +258,8 @@ def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Seq
     def residuals(weights: Array, data: Any) -> Array:
         departures = {
             name: value
-            for curve, own in zip(curves, weights, strict=True)
-            for name, value in zip((curve.size_name, *curve.weight_names), (jnp.ones(()), *own), strict=True)
+            for curve, of_curve in zip(curves, weights, strict=True)
+            for name, value in zip((curve.size_name, *curve.weight_names), (jnp.ones(()), *of_curve), strict=True)
         }
         return jnp.concatenate([term.residuals(values | departures, d) for term, d in zip(terms, data, strict=True)])
 

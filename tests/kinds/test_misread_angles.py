@@ -35,10 +35,10 @@ def bench_table(rng, true_angles, noted_angles, mu=None, tau=None, noise=None, r
     names, run = np.unique(run, return_inverse=True)
     scatter = np.exp(noise * rng.standard_normal((2, len(rows))))
     n = len(rows)
-    own = OwnAngles(("wrap_angle",), np.deg2rad(angle)[:, None], np.full((n, 1), np.nan))
+    angles = OwnAngles(("wrap_angle",), np.deg2rad(angle)[:, None], np.full((n, 1), np.nan))
     return ForceTable(
         np.full(n, np.nan), force * scatter[0], pulled * np.exp(-exponent) * scatter[1], run, tuple(map(str, names)),
-        np.ones(n, dtype=int), own, RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2)),
+        np.ones(n, dtype=int), angles, RowOrigin(("forces.csv",), np.zeros(n, dtype=int), np.arange(2, n + 2)),
         np.full(n, np.nan),
     )  # fmt: skip
 

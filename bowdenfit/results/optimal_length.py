@@ -183,7 +183,10 @@ class OptimalLength(Display):
                 f"With {percent(self.at_edge, 0)} probability the best lies at an end of the range: a better {self.what} may "
                 "lie outside what was measured."
             )
-        return [*sentences, self.good_enough if self.is_certain else self.not_good_enough]
+        if not self.is_certain:
+            return [*sentences, self.not_good_enough]
+        is_wide = self.window.stop - self.window.start > 10.0**-digits
+        return [self.good_enough, *sentences] if is_wide else [*sentences, self.good_enough]
 
     @property
     def is_certain(self) -> bool:

@@ -81,7 +81,8 @@ def _sentence_lines(fit: Record) -> tuple[list[list[str]], list[list[str]]]:
     first, *others = summary_sentences(fit)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
-        answer = [f"{name}: {first}", widening_sentence(fit), *others]
+        n_first = 1 if fit.dataset.description.route is not None else 0  # the lengths that are good enough
+        answer = [f"{name}: {first}", *others[:n_first], widening_sentence(fit), *others[n_first:]]
         verdict = [*reasons_to_trust(fit), suggest_next_step(fit)]
     else:
         answer = [f"{name}: {distrust_warning(fit_verdict)}", *reasons_against(fit_verdict)]

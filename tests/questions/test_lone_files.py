@@ -209,7 +209,7 @@ def test_a_wrap_angle_that_stands_in_the_file_is_proposed(tmp_path, run, line, a
     path.write_text(f"# {line}\n" + path.read_text(), encoding="utf-8")
     _, out, _ = run("check", path)
     assert command(out)[0][2:] == ["--wrap-angle", angle]
-    with pytest.raises(bf.DescriptionError, match="say the angle"):
+    with pytest.raises(bf.DescriptionError, match="give the angle"):
         bf.read(path)
 
 

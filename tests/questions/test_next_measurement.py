@@ -629,4 +629,4 @@ def test_a_fit_of_one_mounting_is_told_to_mount_the_cable_anew(tmp_path, runs):
         assert "Next: remount the cable" in " ".join(str(fit).split())
     else:
         assert second is None
-        assert "Mount the cable anew" not in text
+        assert "Remount the cable" not in text

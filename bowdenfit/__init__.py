@@ -12,6 +12,7 @@ TYPE_CHECKING = False  # typing's, unloaded: until the command line listens, an 
 if TYPE_CHECKING:
     from typing import Any
 
+    from bowdenfit.addons import *  # noqa: F403  (its functions are not named in the core)
     from bowdenfit.cable_model import model
     from bowdenfit.described_cable import Cable, Contact
     from bowdenfit.errors import (
@@ -26,19 +27,14 @@ if TYPE_CHECKING:
     from bowdenfit.questions.calibrate.verb import calibrate
     from bowdenfit.questions.check.verb import check
     from bowdenfit.questions.compare.verb import compare
-    from bowdenfit.questions.compensate.verb import compensate
     from bowdenfit.questions.export.verb import export
-    from bowdenfit.questions.fleet.verb import fleet
     from bowdenfit.questions.identify.verb import identify
-    from bowdenfit.questions.metabolic.verb import metabolic
     from bowdenfit.questions.next.verb import next_measurement
-    from bowdenfit.questions.pool.verb import pool
     from bowdenfit.questions.predict.verb import predict
     from bowdenfit.questions.report.verb import report
     from bowdenfit.questions.schema.verb import schema
     from bowdenfit.questions.simulate.verb import simulate
     from bowdenfit.questions.summary.verb import plot
-    from bowdenfit.questions.teleoperate.verb import teleoperate
     from bowdenfit.questions.watch.verb import watch
     from bowdenfit.reading import read
     from bowdenfit.run.verb import fit
@@ -52,23 +48,18 @@ _WHERE = {
     "calibrate": "bowdenfit.questions.calibrate.verb",
     "check": "bowdenfit.questions.check.verb",
     "compare": "bowdenfit.questions.compare.verb",
-    "compensate": "bowdenfit.questions.compensate.verb",
     "export": "bowdenfit.questions.export.verb",
     "fit": "bowdenfit.run.verb",
-    "fleet": "bowdenfit.questions.fleet.verb",
     "identify": "bowdenfit.questions.identify.verb",
     "load": "bowdenfit.finished_fit",
-    "metabolic": "bowdenfit.questions.metabolic.verb",
     "model": "bowdenfit.cable_model",
     "next_measurement": "bowdenfit.questions.next.verb",
     "plot": "bowdenfit.questions.summary.verb",
-    "pool": "bowdenfit.questions.pool.verb",
     "predict": "bowdenfit.questions.predict.verb",
     "read": "bowdenfit.reading",
     "report": "bowdenfit.questions.report.verb",
     "schema": "bowdenfit.questions.schema.verb",
     "simulate": "bowdenfit.questions.simulate.verb",
-    "teleoperate": "bowdenfit.questions.teleoperate.verb",
     "watch": "bowdenfit.questions.watch.verb",
     **dict.fromkeys(
         ("BowdenfitError", "ConvergenceError", "DatasetError", "DescriptionError", "StoreError", "UsageError"),
@@ -89,23 +80,18 @@ __all__ = [
     "calibrate",
     "check",
     "compare",
-    "compensate",
     "export",
     "fit",
-    "fleet",
     "identify",
     "load",
-    "metabolic",
     "model",
     "next_measurement",
     "plot",
-    "pool",
     "predict",
     "read",
     "report",
     "schema",
     "simulate",
-    "teleoperate",
     "watch",
 ]
 
@@ -113,8 +99,9 @@ __all__ = [
 if not TYPE_CHECKING:  # to type checkers there are the names above, and no others
 
     def __getattr__(name: str) -> "Any":
-        """Load a public name when it is first used."""
+        """Load a public name when it is first used; a name that is not of the core is looked for among the verbs of add-ons."""
         from importlib import import_module
+        from importlib.util import find_spec
 
         if name == "__version__":
             from importlib.metadata import version
@@ -122,8 +109,19 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
             return version("bowdenfit")
         if name in _WHERE:
             return getattr(import_module(_WHERE[name]), name)
+        if not name.startswith("_") and find_spec(f"{__name__}.{name}") is None:  # a module of the core has precedence
+            from bowdenfit.extensions import VERBS, list_problems, load_extension
+
+            verb = load_extension(VERBS, name)
+            if verb is not None and not verb.serves:
+                return verb.function
+            problems = [sentence for sentence in list_problems() if repr(name) in sentence]
+            raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}. {' '.join(problems)}".strip())
         raise AttributeError(f"module 'bowdenfit' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return __all__
+    """Return the names above, and the functions of add-ons."""
+    from bowdenfit.extensions import VERBS, iterate_extensions
+
+    return [*__all__, *(name for name, verb in iterate_extensions(VERBS) if not verb.serves)]

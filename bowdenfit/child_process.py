@@ -39,7 +39,12 @@ def safe_environment() -> dict[str, str]:
 
 def _import_folders() -> list[str]:
     """Folders to import from: those of this process without the working folder, and the one that bowdenfit is in."""
-    return [*_without_working_folder(sys.path), str(Path(__file__).resolve().parents[1])]
+    return [*package_folders(), str(Path(__file__).resolve().parents[1])]
+
+
+def package_folders() -> list[str]:
+    """Folders that this process imports from, without the working folder: those in which packages were installed."""
+    return _without_working_folder(sys.path)
 
 
 def _without_working_folder(folders: Iterable[str]) -> list[str]:

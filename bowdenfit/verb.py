@@ -47,6 +47,9 @@ class Verb:
         explains: A trouble of a fit that the answer is about, so that it is right in spite of it.
         kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
             reply without a page is for people only.
+        serves: Whether it works until it is interrupted and answers nothing, as what serves pages does: then it is a command
+            alone, and has no stages.
+        reads: Name of the file by which a folder is known to be read by this verb, such as "cable.toml".
     """
 
     function: Callable[..., Any]
@@ -60,3 +63,10 @@ class Verb:
     warns: bool = False
     explains: str = ""
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
+    serves: bool = False
+    reads: str = ""
+
+    @property
+    def command_name(self) -> str:
+        """Its name on the command line."""
+        return self.name or self.function.__name__

@@ -1,27 +1,40 @@
-"""The verbs that the command line and notebooks share, one line each."""
+"""The verbs that the command line and notebooks share: of the core, one line each, and of add-ons, by entry points."""
 
+from bowdenfit.extensions import VERBS as VERB_GROUP
+from bowdenfit.extensions import iterate_extensions, report_problem
 from bowdenfit.questions.calibrate.verb import VERB as CALIBRATE
 from bowdenfit.questions.check.verb import VERB as CHECK
 from bowdenfit.questions.compare.verb import VERB as COMPARE
-from bowdenfit.questions.compensate.verb import VERB as COMPENSATE
 from bowdenfit.questions.export.verb import VERB as EXPORT
-from bowdenfit.questions.fleet.verb import VERB as FLEET
 from bowdenfit.questions.identify.verb import VERB as IDENTIFY
 from bowdenfit.questions.length.verb import VERB as LENGTH
-from bowdenfit.questions.metabolic.verb import VERB as METABOLIC
 from bowdenfit.questions.next.verb import VERB as NEXT
-from bowdenfit.questions.pool.verb import VERB as POOL
 from bowdenfit.questions.predict.verb import VERB as PREDICT
 from bowdenfit.questions.report.verb import VERB as REPORT
 from bowdenfit.questions.schema.verb import VERB as SCHEMA
 from bowdenfit.questions.simulate.verb import VERB as SIMULATE
 from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
-from bowdenfit.questions.teleoperate.verb import VERB as TELEOPERATE
 from bowdenfit.questions.watch.verb import VERB as WATCH
 from bowdenfit.run.verb import VERB as FIT
+from bowdenfit.verb import Verb
 
-VERBS = (
-    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, WATCH, COMPARE, COMPENSATE, TELEOPERATE, EXPORT, CALIBRATE, FLEET,
-    POOL, PLOT, REPORT, SIMULATE, METABOLIC, SCHEMA,
+CORE = (
+    CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, WATCH, COMPARE, EXPORT, CALIBRATE, PLOT, REPORT, SIMULATE, SCHEMA,
 )  # fmt: skip
+RESERVED = ("init", "completion", "help", "version")  # by the command line itself
+
+
+def _collect_added_verbs() -> tuple[Verb, ...]:
+    """Verbs that add-ons give by entry points, without those that take a name of the core."""
+    taken = {*RESERVED, *(verb.command_name for verb in CORE)}
+    added = []
+    for name, verb in iterate_extensions(VERB_GROUP):
+        if isinstance(verb, Verb) and verb.command_name == name and name not in taken:
+            added.append(verb)
+        else:
+            report_problem(f"the entry point {name!r} of {VERB_GROUP} is left out: it must be a Verb with this new name.")
+    return tuple(added)
+
+
+VERBS = (*CORE, *_collect_added_verbs())

@@ -15,6 +15,7 @@ from bowdenfit.cli.commands import bowdenfit, describe_error
 from bowdenfit.cli.running import INTERRUPTED, requested, run_interruptibly
 from bowdenfit.cli.terminal import NoReaderError, say, say_interrupted
 from bowdenfit.errors import BowdenfitError, UsageError, describe_unforeseen, system_error
+from bowdenfit.extensions import list_problems
 from bowdenfit.words import few
 
 _NEW_LINE = re.compile(r"[\r\n](?!- )")  # in the name of a file: our own sentences have new lines before "- " alone
@@ -74,6 +75,9 @@ def main() -> None:
         refused = system_error(error)
         _print_error(f"Error: {refused or describe_unforeseen(error, _suggest_remedy())}")
         sys.exit(refused.exit_code if refused else 1)
+    finally:
+        for problem in list_problems():
+            _print_error(f"Warning: {_NEW_LINE.sub('?', problem)}")
 
 
 def _suggest_remedy() -> str:

@@ -76,7 +76,7 @@ def command(verb: Verb) -> App:
         return _run(verb, request, "".join(forms))
 
     run.__annotations__, vars(run)["__signature__"] = {}, command_signature
-    return App(name=verb.name or verb.function.__name__, help=verb.text, default_command=run, **LOOK)
+    return App(name=verb.command_name, help=verb.text, default_command=run, **LOOK)
 
 
 def _command_signature(verb: Verb) -> Signature:

@@ -18,8 +18,12 @@ Imports go downward only (a contract of import-linter in pyproject.toml holds th
 """
 
 from collections.abc import Iterator
+from inspect import isabstract
 from typing import Any
+from warnings import warn
 
+from bowdenfit.extensions import KINDS as KIND_GROUP
+from bowdenfit.extensions import iterate_extensions, list_problems, report_problem
 from bowdenfit.kinds.angles.kind import AngleKind
 from bowdenfit.kinds.displacement.kind import DisplacementKind
 from bowdenfit.kinds.efficiencies.kind import EfficiencyKind
@@ -44,8 +48,26 @@ _ALL: tuple[Kind[Any], ...] = (
     RingDownKind(),
 )
 
-KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in _ALL}
-"""Every kind by its name, in the order in which tables are read, fitted and spoken of."""
+
+def _collect_added_kinds() -> Iterator[Kind[Any]]:
+    """Yield the kinds that add-ons give by entry points."""
+    taken = {kind.name for kind in _ALL}
+    for name, kind in iterate_extensions(KIND_GROUP):
+        is_whole = isinstance(kind, type) and issubclass(kind, Kind) and not isabstract(kind) and kind.term_class
+        if is_whole and kind.name == name and name not in taken:
+            yield kind()
+        else:
+            report_problem(
+                f"the entry point {name!r} of {KIND_GROUP} is left out: it must be a whole subclass of Kind with a term_class, "
+                "whose name is that of the entry point and of no kind of bowdenfit."
+            )
+
+
+KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in (*_ALL, *_collect_added_kinds())}
+"""Every kind by its name, in the order in which tables are read, fitted and spoken of: ours, then those of add-ons."""
+
+for _sentence in list_problems():
+    warn(_sentence, RuntimeWarning, stacklevel=2)  # to programs; the command line prints them
 
 
 def iterate_tables(measurements: Measurements) -> Iterator[tuple[Kind[Any], Any]]:

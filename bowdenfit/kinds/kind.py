@@ -2,8 +2,8 @@
 
 Its half in the likelihood is a `TermKind` (`kinds/term.py`).
 
-A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`. It must give five things, and Python and mypy refuse a
-class that lacks one:
+A kind is one class, `kinds/<kind>/kind.py`, and one line in `KINDS`; one of another package has an entry point instead. It
+must give five things, and Python and mypy refuse a class that lacks one:
 
 - `name`: what a table is called under [tables] in cable.toml, and in fit.json;
 - `table`: the class of its tables, which hold arrays in N, mm, rad and s;
@@ -94,6 +94,8 @@ class Kind(ABC, Generic[AnyTable]):
         methods_sentence: How its readings are modeled, in a sentence of a paper.
         takes_channels: Whether its files are recordings, whose channels can be named on the command line.
         init_questions: How `bowdenfit init` recognizes its files, and what it asks about them; None if it never offers it.
+        term_class: Module and class of its half in the likelihood, such as "scratch.losses.term:LossTerms", if another package
+            adds it; those of bowdenfit stand in `kinds/terms.py`.
     """
 
     settings: type[TableSettings] = Table
@@ -101,6 +103,7 @@ class Kind(ABC, Generic[AnyTable]):
     methods_sentence: str = ""
     takes_channels: bool = False
     init_questions: InitQuestions | None = None
+    term_class: str = ""
 
     @property
     @abstractmethod

@@ -31,7 +31,8 @@ from bowdenfit.cable.sensors import (
 )
 from bowdenfit.description import Description
 from bowdenfit.errors import DescriptionError
-from bowdenfit.kinds import find_kind, iterate_tables
+from bowdenfit.extensions import load_class_of_extension
+from bowdenfit.kinds import KINDS, find_kind, iterate_tables
 from bowdenfit.kinds.angles.term import AngleTerms
 from bowdenfit.kinds.candidate import CandidateKind
 from bowdenfit.kinds.descriptions import order_groups
@@ -63,7 +64,17 @@ _ALL: tuple[TermKind[Any], ...] = (
     RingDownTerms(),
 )
 
-TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in _ALL}
+
+def _collect_added_terms() -> Iterator[TermKind[Any]]:
+    """Yield the halves in the likelihood of kinds that add-ons give."""
+    for name, kind in KINDS.items():
+        if kind.term_class:
+            term_kind = load_class_of_extension(kind.term_class, name)
+            if term_kind is not None:
+                yield term_kind()
+
+
+TERMS: dict[str, TermKind[Any]] = {kind.name: kind for kind in (*_ALL, *_collect_added_terms())}
 """Every kind's half in the likelihood, by name."""
 
 _ORDER = (

@@ -41,7 +41,7 @@ class VerbAnswers(SphinxDirective):
 
 def functions() -> list[str]:
     """Return the names of all functions of the package."""
-    every = [name for name in bowdenfit.__all__ if inspect.isroutine(getattr(bowdenfit, name))]
+    every = [name for name in dir(bowdenfit) if inspect.isroutine(getattr(bowdenfit, name))]
     of_verbs = [name for verb in VERBS for name in every if getattr(bowdenfit, name) is verb.function]
     return [*of_verbs, *(name for name in every if name not in of_verbs)]
 

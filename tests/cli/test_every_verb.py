@@ -37,7 +37,7 @@ MAY_DOUBT = {"calibrate", "pool", "metabolic", "fit", "teleoperate"}  # of two r
 
 
 def test_every_verb_is_among_these():
-    assert sorted(COMMANDS) == sorted(verb.name or verb.function.__name__ for verb in verbs.VERBS)
+    assert sorted(COMMANDS) == sorted(verb.command_name for verb in verbs.VERBS)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,9 @@
-"""A newcomer adds one of everything in a package of their own, with a line in a registry each, and fits with it."""
+"""A newcomer adds one of everything in a package of their own, by an entry point or a line in a registry, and fits with it."""
 
 import json
+import os
+import shutil
+import subprocess
 import sys
 from functools import partial
 
@@ -9,17 +12,12 @@ import pytest
 from conftest import ROOT
 from scratch import curve, law, option, shares
 from scratch import format as bars
-from scratch.losses.kind import LossKind
-from scratch.losses.term import LossTerms
 
 import bowdenfit as bf
 from bowdenfit.cable.friction_options import FRICTION_OPTIONS
 from bowdenfit.cable.registry import CONTACT_LAWS, CURVES, CurveFamily
 from bowdenfit.cli.commands import command
 from bowdenfit.files import FORMATS
-from bowdenfit.kinds import KINDS
-from bowdenfit.kinds.terms import TERMS
-from bowdenfit.questions.check.data_set_words import describe_data_set
 from bowdenfit.questions.figures import FIGURES
 
 MU, ANGLE = 0.1, np.deg2rad(180.0)
@@ -72,23 +70,111 @@ def forces(data_set, exponent, says="", hidden=0.0):
     return data_set("forces", "input_force_N,output_force_N,run", (force, output, runs), says)
 
 
+@pytest.fixture
+def install(tmp_path):
+    """Install a package outside of the tree, and run Python with it: in a folder to import from, with its entry points."""
+    place, folder = tmp_path / "packages", tmp_path / "elsewhere"
+    folder.mkdir()
+
+    def call(entry_points, *words, within=folder, path=place):
+        metadata = place / "scratch-1.0.dist-info"
+        if not place.exists():
+            shutil.copytree(SCRATCH, place / "scratch")
+            metadata.mkdir()
+            (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: scratch\nVersion: 1.0\n")
+        (metadata / "entry_points.txt").write_text(entry_points)
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
+        return subprocess.run(
+            [sys.executable, *words], cwd=within, capture_output=True, text=True, check=False, timeout=500,
+            env=environment | {"PYTHONPATH": str(path), "JAX_PLATFORMS": "cpu"},
+        )  # fmt: skip
+
+    return call
+
+
+SCRATCH = ROOT / "tests" / "support" / "scratch"
+ENTRY_POINTS = """[bowdenfit.verbs]
+shares = scratch.shares:VERB
+[bowdenfit.kinds]
+losses = scratch.losses.kind:LossKind
+"""
+ASK = """import bowdenfit as bf
+from bowdenfit.kinds import KINDS
+print("shares" in dir(bf), "losses" in KINDS, hasattr(bf, "shares"))
+"""
+
+
+def test_a_package_outside_of_the_tree_adds_a_verb_and_a_kind_by_its_entry_points(install, data_set):
+    done = install(ENTRY_POINTS, "-m", "bowdenfit", "--help")
+    assert "shares" in done.stdout and done.stderr == ""
+    done = install(ENTRY_POINTS, "-m", "bowdenfit", "shares", "--help")
+    assert done.stdout.startswith("Usage: bowdenfit shares")
+    assert install(ENTRY_POINTS, "-c", ASK).stdout == "True True True\n"
+    folder = data_set("losses", "input_force_N,loss_N", (np.linspace(10.0, 80.0, 15), np.linspace(2.0, 20.0, 15)))
+    assert "15 lost forces" in install(ENTRY_POINTS, "-m", "bowdenfit", "check", folder).stdout
+
+
+def test_a_working_folder_supplies_no_entry_points(install, tmp_path):
+    """Although `python -c`, and PYTHONPATH here, import from it."""
+    place = tmp_path / "packages"
+    for path in (place, "", "."):
+        done = install(ENTRY_POINTS, "-c", f"import scratch\n{ASK}", within=place, path=path)
+        assert done.stdout == "False False False\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("shares = scratch.nowhere:VERB", "'shares' of the package scratch cannot be used and is left out"),
+        ("shares = scratch.law:Threshold", "'shares' of bowdenfit.verbs is left out"),
+        ("fit = scratch.shares:VERB", "'fit' of bowdenfit.verbs is left out"),
+    ],
+)
+def test_an_extension_that_cannot_be_used_is_named_in_one_sentence_and_the_rest_works(install, data_set, line, words):
+    force = np.linspace(10.0, 80.0, 15)
+    folder = data_set("forces", "input_force_N,output_force_N", (force, 0.8 * force))
+    done = install(f"[bowdenfit.verbs]\n{line}\n", "-m", "bowdenfit", "check", folder)
+    assert done.returncode == 0 and "15" in done.stdout
+    assert len(done.stderr.splitlines()) == 1 and words in done.stderr
+
+
+def test_a_kind_that_cannot_be_used_is_named_in_one_sentence(install, data_set):
+    folder = data_set("losses", "input_force_N,loss_N", ([1.0], [0.1]))
+    done = install("[bowdenfit.kinds]\nlosses = scratch.nowhere:LossKind\n", "-m", "bowdenfit", "check", folder)
+    error, warning = done.stderr.splitlines()
+    assert done.returncode == 2 and error.startswith("Error: ") and "losses" in error
+    assert warning.startswith("Warning: 'losses' of the package scratch cannot be used")
+
+
+def test_our_own_add_ons_that_are_not_registered_are_missed_in_one_sentence(install, tmp_path):
+    """As in an environment of an older version, in which a newer one lies without having been installed."""
+    older = tmp_path / "packages" / "bowdenfit-0.0.1.dist-info"
+    older.mkdir(parents=True)
+    (older / "METADATA").write_text("Metadata-Version: 2.1\nName: bowdenfit\nVersion: 0.0.1\n")
+    (older / "entry_points.txt").write_text("[console_scripts]\nbowdenfit = bowdenfit.__main__:start\n")
+    (tmp_path / "packages" / "scratch-1.0.dist-info").mkdir()
+    done = install("", "-m", "bowdenfit", "--help")
+    assert done.returncode == 0 and "fit " in done.stdout
+    assert len(done.stderr.splitlines()) == 1 and "install it again" in done.stderr
+
+
 @pytest.mark.extended
-def test_a_new_kind_of_table_is_a_folder_and_two_lines(data_set, monkeypatch, tmp_path):
-    monkeypatch.setitem(KINDS, "losses", LossKind())
-    monkeypatch.setitem(TERMS, "losses", LossTerms())
+def test_a_new_kind_of_table_is_a_folder_and_an_entry_point(data_set, install, tmp_path):
     force = np.linspace(10.0, 80.0, 15)
     loss = force * -np.expm1(-MU * ANGLE) + 0.2 * np.random.default_rng(2).standard_normal(15)
-    folder = data_set("losses", "input_force_N,loss_N", (force, loss))
-    assert "15 lost forces" in describe_data_set(bf.read(folder))
-    fit = bf.fit(folder, output=tmp_path / "fit", seed=1, settings=QUICK)
-    interval = fit.parameter("mu")
-    assert abs(interval.mean - MU) < 4 * interval.sd
+    folder, settings = data_set("losses", "input_force_N,loss_N", (force, loss)), [f"--set={setting}" for setting in QUICK]
+    done = install(ENTRY_POINTS, "-m", "bowdenfit", "fit", folder, "-o", tmp_path / "fit", "--seed=1", *settings)
+    assert done.returncode in (0, 3), done.stderr
+    summary = json.loads((tmp_path / "fit" / "summary.json").read_text())
+    mu = summary["parameters"]["mu"]
+    assert abs(mu["mean"] - MU) < 4 * mu["sd"]
     assert "15 lost forces" in (tmp_path / "fit" / "details.txt").read_text()
     assert {"checks.png", "coefficients.png", "pairs.png"} <= {
         path.name for path in (tmp_path / "fit" / "figures").iterdir()
     }
-    again = bf.load(tmp_path / "fit")
-    assert json.dumps(again.summary()) == json.dumps(fit.summary())
+    again = install(ENTRY_POINTS, "-m", "bowdenfit", "summary", tmp_path / "fit", "--json")
+    assert json.loads(again.stdout) == summary
+    assert install(ENTRY_POINTS, "-m", "bowdenfit", "shares", tmp_path / "fit").stdout == "sheath: 100% of the loss\n"
 
 
 def test_a_kind_that_is_not_registered_is_refused_by_name(data_set):

@@ -58,7 +58,7 @@ def parts(hint: Any) -> Iterator[Any]:
 
 def public_functions() -> Iterator[tuple[str, Any]]:
     """Functions of the package, and methods and properties of a fit."""
-    for name in bf.__all__:
+    for name in dir(bf):
         if not inspect.isclass(getattr(bf, name)):
             yield f"bf.{name}", getattr(bf, name)
     for name in dir(bf.Fit):

@@ -22,6 +22,7 @@ class LossKind(Kind[LossTable]):
     """The five things that a kind must give, and a count for the summary."""
 
     name = "losses"
+    term_class = "scratch.losses.term:LossTerms"
     table = LossTable
     readings = (Readings("lost_force", "losses", "lost forces", "loss at {}", "Lost force (N)"),)
 

@@ -110,9 +110,10 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
         if name in _WHERE:
             return getattr(import_module(_WHERE[name]), name)
         if not name.startswith("_") and find_spec(f"{__name__}.{name}") is None:  # a module of the core has precedence
-            from bowdenfit.extensions import VERBS, list_problems, load_extension
+            from bowdenfit.extensions import list_problems
+            from bowdenfit.verb import load_added_verb
 
-            verb = load_extension(VERBS, name)
+            verb = load_added_verb(name)
             if verb is not None and not verb.serves:
                 return verb.function
             problems = [sentence for sentence in list_problems() if repr(name) in sentence]
@@ -122,6 +123,6 @@ if not TYPE_CHECKING:  # to type checkers there are the names above, and no othe
 
 def __dir__() -> list[str]:
     """Return the names above, and the functions of add-ons."""
-    from bowdenfit.extensions import VERBS, iterate_extensions
+    from bowdenfit.verb import load_added_verbs
 
-    return [*__all__, *(name for name, verb in iterate_extensions(VERBS) if not verb.serves)]
+    return [*__all__, *(verb.command_name for verb in load_added_verbs() if not verb.serves)]

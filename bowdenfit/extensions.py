@@ -53,7 +53,8 @@ def list_problems() -> tuple[str, ...]:
 
 def report_problem(sentence: str) -> None:
     """Keep a sentence about an extension that is left out for `list_problems`."""
-    _problems.append(sentence)
+    if sentence not in _problems:
+        _problems.append(sentence)
 
 
 @cache

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bowdenfit.extensions import VERBS, list_names, load_extension, report_problem
 from bowdenfit.stage_bar import Watch
 
 NOT_TRUSTED = 3  # exit code
@@ -49,7 +50,8 @@ class Verb:
             reply without a page is for people only.
         serves: Whether it works until it is interrupted and answers nothing, as what serves pages does: then it is a command
             alone, and has no stages.
-        reads: Name of the file by which a folder is known to be read by this verb, such as "cable.toml".
+        reads: Name of the file by which a folder is known to be read by this verb of an add-on, such as "cables.toml"; a verb
+            that is asked of a fit reads the file itself.
     """
 
     function: Callable[..., Any]
@@ -70,3 +72,18 @@ class Verb:
     def command_name(self) -> str:
         """Its name on the command line."""
         return self.name or self.function.__name__
+
+
+def load_added_verb(name: str) -> Verb | None:
+    """Load a verb of an add-on; None if there is none of this name, or it cannot be used."""
+    verb = load_extension(VERBS, name)
+    if verb is None or (isinstance(verb, Verb) and verb.command_name == name):
+        return verb
+    report_problem(f"the entry point {name!r} of {VERBS} is left out: it must be a Verb with this name.")
+    return None
+
+
+def load_added_verbs() -> list[Verb]:
+    """Load the verbs of all add-ons that can be used, in alphabetical order."""
+    verbs = (load_added_verb(name) for name in list_names(VERBS))
+    return [verb for verb in verbs if verb is not None]

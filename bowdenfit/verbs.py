@@ -1,7 +1,6 @@
 """The verbs that the command line and notebooks share: of the core, one line each, and of add-ons, by entry points."""
 
-from bowdenfit.extensions import VERBS as VERB_GROUP
-from bowdenfit.extensions import iterate_extensions, report_problem
+from bowdenfit.extensions import report_problem
 from bowdenfit.questions.calibrate.verb import VERB as CALIBRATE
 from bowdenfit.questions.check.verb import VERB as CHECK
 from bowdenfit.questions.compare.verb import VERB as COMPARE
@@ -17,7 +16,7 @@ from bowdenfit.questions.summary.verb import PLOT_VERB as PLOT
 from bowdenfit.questions.summary.verb import SUMMARY_VERB as SUMMARY
 from bowdenfit.questions.watch.verb import VERB as WATCH
 from bowdenfit.run.verb import VERB as FIT
-from bowdenfit.verb import Verb
+from bowdenfit.verb import Verb, load_added_verbs
 
 CORE = (
     CHECK, FIT, SUMMARY, PREDICT, LENGTH, IDENTIFY, NEXT, WATCH, COMPARE, EXPORT, CALIBRATE, PLOT, REPORT, SIMULATE, SCHEMA,
@@ -27,14 +26,10 @@ RESERVED = ("init", "completion", "help", "version")  # by the command line itse
 
 def _collect_added_verbs() -> tuple[Verb, ...]:
     """Verbs that add-ons give by entry points, without those that take a name of the core."""
-    taken = {*RESERVED, *(verb.command_name for verb in CORE)}
-    added = []
-    for name, verb in iterate_extensions(VERB_GROUP):
-        if isinstance(verb, Verb) and verb.command_name == name and name not in taken:
-            added.append(verb)
-        else:
-            report_problem(f"the entry point {name!r} of {VERB_GROUP} is left out: it must be a Verb with this new name.")
-    return tuple(added)
+    taken, added = {*RESERVED, *(verb.command_name for verb in CORE)}, load_added_verbs()
+    for name in sorted(taken & {verb.command_name for verb in added}):
+        report_problem(f"the verb {name!r} of an add-on is left out, because bowdenfit has one of that name.")
+    return tuple(verb for verb in added if verb.command_name not in taken)
 
 
 VERBS = (*CORE, *_collect_added_verbs())

@@ -13,11 +13,10 @@ from bowdenfit.files import FORMATS
 from bowdenfit.questions.check.verb import check
 from bowdenfit.questions.start.describe import describe_as_read, write_description
 from bowdenfit.questions.start.folder import (
-    DEVICE_FILE,
     describe_written_files,
     find_examples,
     find_measured_files,
-    find_verb,
+    next_command,
     refuse_existing,
     refuse_files,
     write_data_set,
@@ -144,10 +143,7 @@ def _example(named: Sequence[str], folder: Path | None, files: Sequence[Path] | 
         return
     name, folder = named[0], folder or Path(named[-1])
     write_example(name, folder, notebook)
-    verb, place = find_verb(folder), shlex.quote(str(folder))
-    if (folder / DEVICE_FILE).is_file():  # which is read beside a fit
-        verb, place = f"{verb} RESULTS", shlex.quote(str(folder / DEVICE_FILE))
-    say(f"Wrote {folder}. Next: bowdenfit {verb} {place}")
+    say(f"Wrote {folder}. Next: bowdenfit {next_command(folder)}")
     if notebook:
         say(f"Or open {folder / NOTEBOOK} in Jupyter.")
 

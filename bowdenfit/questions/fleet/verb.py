@@ -100,4 +100,5 @@ VERB = Verb(
     csv="Print medians and intervals of all inspections as CSV, one a row.",
     results="fits",
     watch=WATCH,
+    reads="fleet.toml",
 )

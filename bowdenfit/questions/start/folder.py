@@ -1,27 +1,22 @@
 """Write a new data set into a folder that exists whole or not at all."""
 
+import shlex
 import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 
+from bowdenfit.arguments import FIT, parameters_of
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import DatasetError, UsageError, suggest_name
 from bowdenfit.inputs import refuse_special
 from bowdenfit.questions.start.notebook import write_notebook
-from bowdenfit.results.fleet_folder import FLEET_DESCRIPTION
 from bowdenfit.results.folder import fill_folder_atomically, is_empty
+from bowdenfit.verb import Verb, load_added_verbs
 from bowdenfit.words import listed, shown
 
 TEMPLATES = (DESCRIPTION_FILE, "angles.csv", "forces.csv")
-DEVICE_FILE = "device.toml"  # read beside a fit of a cable
-_VERB_BY_FILE = {  # the verb that reads a folder with such a description
-    DESCRIPTION_FILE: "fit",
-    FLEET_DESCRIPTION: "fleet",
-    "metabolic.toml": "metabolic",
-    DEVICE_FILE: "teleoperate",
-}
 _PACKAGE, _CHECKOUT = "examples", "datasets"  # folders of the shipped data sets, in a wheel and beside the package
 
 
@@ -112,7 +107,24 @@ def find_examples() -> Mapping[str, Path]:
 
 def find_verb(folder: Path) -> str:
     """Return the verb that reads a folder, by its description; empty without one."""
-    return next((verb for file, verb in _VERB_BY_FILE.items() if (folder / file).is_file()), "")
+    if (folder / DESCRIPTION_FILE).is_file():
+        return "fit"
+    return next((verb.command_name for verb in _iterate_readers(folder)), "")
+
+
+def next_command(folder: Path) -> str:
+    """Return the command that reads a folder which has a description: one that is asked of a fit reads the file itself."""
+    name, place = find_verb(folder), shlex.quote(str(folder))
+    for verb in _iterate_readers(folder):
+        first = next(iter(parameters_of(verb.function).values()))
+        if verb.command_name == name and first.reader is FIT:
+            return f"{name} {first.written_name} {shlex.quote(str(folder / verb.reads))}"
+    return f"{name} {place}"
+
+
+def _iterate_readers(folder: Path) -> Iterator[Verb]:
+    """Yield the verbs of add-ons that read a file in a folder."""
+    return (verb for verb in load_added_verbs() if verb.reads and (folder / verb.reads).is_file())
 
 
 def write_example(name: str, folder: Path, with_notebook: bool = False) -> None:

@@ -73,4 +73,5 @@ VERB = Verb(
     json="Print as JSON.",
     csv="Print probabilities by wall as CSV.",
     warns=True,
+    reads="device.toml",
 )

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from bowdenfit.addons import metabolic as room
 from bowdenfit.arguments import PATH, read_first
-from bowdenfit.questions import metabolic as room
 from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.metabolic.answer import Metabolic
+    from bowdenfit.addons.metabolic.answer import Metabolic
 
 
 @read_first
@@ -34,7 +34,7 @@ def _reply(result: "Metabolic", _: dict[str, Any]) -> Reply:
     return Reply(room.metabolic_text(result), lambda: result, csv=result.to_csv)
 
 
-VERB = Verb(
+METABOLIC = Verb(
     metabolic,
     _reply,
     """Analyze a study of the metabolic cost of walking with a device.
@@ -50,4 +50,5 @@ VERB = Verb(
     numbers that contradict each other.
     """,
     csv="Print the comparisons as CSV, one a row.",
+    reads="metabolic.toml",
 )

@@ -8,10 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bowdenfit.display import Display, Part, Rows, text_of
-from bowdenfit.errors import DatasetError
-from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.questions.metabolic.study import (
+from bowdenfit.addons.metabolic.study import (
     LEVEL,
     MetabolicCosts,
     PrintedDifference,
@@ -25,6 +22,9 @@ from bowdenfit.questions.metabolic.study import (
     t_from_p,
     two_sided_p,
 )
+from bowdenfit.display import Display, Part, Rows, text_of
+from bowdenfit.errors import DatasetError
+from bowdenfit.multiple_testing import adjust_p_values
 from bowdenfit.words import counted, filled, narrow_table, percent
 
 EXPECTED = 0.03  # of the cost: standard deviation of differences that one who doubts expects; a judgement

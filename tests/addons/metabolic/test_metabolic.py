@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.questions.metabolic.answer import analyze_study, find_contradictions, rounding_range
-from bowdenfit.questions.metabolic.study import (
+from bowdenfit.addons.metabolic.answer import analyze_study, find_contradictions, rounding_range
+from bowdenfit.addons.metabolic.study import (
     MetabolicCosts,
     Study,
     brockway,
@@ -24,7 +24,7 @@ from bowdenfit.questions.metabolic.study import (
     two_sided_p,
 )
 
-PRINTED = Path(__file__).parents[2] / "datasets" / "on-body-metabolic"
+PRINTED = Path(__file__).parents[3] / "datasets" / "on-body-metabolic"
 
 
 def test_the_t_of_pairs_is_scipys():

@@ -2,7 +2,6 @@
 
 import json
 import os
-import traceback
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -31,7 +30,7 @@ from bowdenfit.arguments import FIT, FITS, Declared, parameters_of, read_argumen
 from bowdenfit.cli.running import requested, watch_verb
 from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stages
 from bowdenfit.cli.terminal import say
-from bowdenfit.errors import BowdenfitError, UsageError, describe_unforeseen, system_error
+from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import read_answers
 from bowdenfit.results.folder import FIT as FIT_FILE
@@ -43,7 +42,6 @@ from bowdenfit.words import few, listed, shown
 if TYPE_CHECKING:
     from bowdenfit.finished_fit import Fit
 
-_OF_APP = {"nicegui", "fastapi", "uvicorn"}  # libraries of the extra
 LOOK: dict[str, Any] = {  # of every command
     "default_parameter": Parameter(negative=(), show_default=False, json_list=False, json_dict=False),
     "group_arguments": Group("Arguments", sort_key=1),
@@ -91,8 +89,9 @@ def _command_signature(verb: Verb) -> Signature:
         if meaning:
             annotation = Annotated[bool, Parameter(help=meaning)]
             parameters.append(Stated(form, Stated.KEYWORD_ONLY, default=False, annotation=annotation))
-    of_verbose = Parameter(name=["--verbose", "-v"], help="Print each stage of the work, with the time of day.")
-    parameters.append(Stated("verbose", Stated.KEYWORD_ONLY, default=False, annotation=Annotated[bool, of_verbose]))
+    if not verb.serves:
+        of_verbose = Parameter(name=["--verbose", "-v"], help="Print each stage of the work, with the time of day.")
+        parameters.append(Stated("verbose", Stated.KEYWORD_ONLY, default=False, annotation=Annotated[bool, of_verbose]))
     return Signature(parameters)
 
 
@@ -202,7 +201,11 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
         request["report"] = say_beside_stages
     if "is_stopped" in parameters_of(function):
         request["is_stopped"] = requested.is_set
-    if verb.watch is None:
+    if "say" in parameters_of(function):
+        request["say"] = say
+    if verb.serves:
+        answer = function(**request)
+    elif verb.watch is None:
         with show_stages(None):
             answer = function(**request)
     else:
@@ -311,45 +314,6 @@ def _init_dialog() -> ModuleType:
     return init_dialog
 
 
-APP_HELP = """Open the app in the browser: add data, fit, view, plan what to measure.
-
-The page is served to this machine alone, and asks no other for anything. Data
-sets and fits lie in FOLDER as the other commands write them: data sets beside
-each other, fits in its folder fits. It needs pip install 'bowdenfit[app]'.
-"""
-
-
-def app(
-    folder: Annotated[Path, Parameter("FOLDER")] = Path(),
-    /,
-    *,
-    port: Annotated[int, Parameter(metavar="NUMBER", show_default="one that is free")] = 0,
-    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
-) -> None:
-    """Serve the app until Ctrl-C.
-
-    Args:
-        folder: Where data sets and fits lie; the current folder if omitted.
-        port: On which this machine serves the page.
-        browser: Open the page in the default browser.
-    """
-    try:
-        from bowdenfit.app import serve_app  # here, because NiceGUI is large, and not everybody has installed it
-    except ModuleNotFoundError as error:
-        if error.name not in _OF_APP:
-            raise
-        raise UsageError("the app needs NiceGUI, which is not installed; install it: pip install 'bowdenfit[app]'.") from None
-    serve_app(folder, port, browser, requested, say, _report_error)
-
-
-def _report_error(error: Exception) -> None:
-    """Print what went wrong in a page, while the app goes on."""
-    if os.environ.get("BOWDENFIT_DEBUG"):
-        traceback.print_exception(error)
-    refusal = error if isinstance(error, BowdenfitError) else system_error(error)
-    say(f"Error: {refusal or describe_unforeseen(error)}", err=True)
-
-
 _HELP = """Friction coefficients of a Bowden cable from bench measurements.
 
 With honest uncertainty, and the cable length that transmits force best.
@@ -379,7 +343,6 @@ bowdenfit = App(name="bowdenfit", help=_HELP, version=_version, **LOOK)
 COMMANDS = (
     App(name="init", help=INIT_HELP, default_command=init, **LOOK),
     *map(command, VERBS),
-    App(name="app", help=APP_HELP, default_command=app, **LOOK),
     App(name="completion", help=_COMPLETION, default_command=_completion, **LOOK),
 )
 for position, verb in enumerate(COMMANDS):

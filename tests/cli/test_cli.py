@@ -22,8 +22,8 @@ from bowdenfit.verbs import FIT
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
-ASKING = tuple(verb.command_name for verb in verbs.VERBS)
-VERBS = ("init", *ASKING, "app", "completion")
+ASKING = tuple(verb.command_name for verb in verbs.VERBS if not verb.serves)
+VERBS = ("init", *(verb.command_name for verb in verbs.VERBS), "completion")
 OF_LIBRARIES = ("JAX_", "XLA_", "MPL", "OMP_")  # what variables begin with that tell libraries what to do
 
 

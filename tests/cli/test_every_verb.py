@@ -37,7 +37,7 @@ MAY_DOUBT = {"calibrate", "pool", "metabolic", "fit", "teleoperate"}  # of two r
 
 
 def test_every_verb_is_among_these():
-    assert sorted(COMMANDS) == sorted(verb.command_name for verb in verbs.VERBS)
+    assert sorted(COMMANDS) == sorted(verb.command_name for verb in verbs.VERBS if not verb.serves)
 
 
 @pytest.fixture(scope="module")

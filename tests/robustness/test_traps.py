@@ -14,7 +14,7 @@ FEW = ("--set", "sampler.n_walkers=32", "--set", "sampler.target_ess=100", "--se
 START_A_FIT = """
 import sys, time
 from pathlib import Path
-from bowdenfit.app.fit_job import FitJob, FitRequest
+from bowdenfit.addons.app.fit_job import FitJob, FitRequest
 job = FitJob(FitRequest(Path(sys.argv[1]), Path(sys.argv[2]), seed=1, mcmc=False))
 while job.running:
     time.sleep(0.05)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, cast
 from nicegui import ui
 
 import bowdenfit as bf
-from bowdenfit.app.add_rows import show_table_links
-from bowdenfit.app.elements import VALUE_AT_FIRST, address, block, button, choice, field, link, markup, text
-from bowdenfit.app.frame import refused, section
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.add_rows import show_table_links
+from bowdenfit.addons.app.elements import VALUE_AT_FIRST, address, block, button, choice, field, link, markup, text
+from bowdenfit.addons.app.frame import refused, section
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import as_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
@@ -25,7 +25,7 @@ from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY
 from bowdenfit.words import capitalized
 
 if TYPE_CHECKING:
-    from bowdenfit.app.dials import Dial
+    from bowdenfit.addons.app.dials import Dial
     from bowdenfit.finished_fit import Fit
 
 _THROTTLE = 0.1  # s between two positions of a dial that is moved; a judgement
@@ -43,7 +43,7 @@ class ArrivingForce:
 
     def __init__(self, workbench: Workbench, fit: "Fit") -> None:
         self._workbench, self._fit = workbench, fit
-        self._dials = import_module("bowdenfit.app.dials")  # which loads JAX
+        self._dials = import_module("bowdenfit.addons.app.dials")  # which loads JAX
         self._values: dict[str, float] = {}
         self._way, self._stroke = "in", "pull"
         self._asked, self._busy = 0, False

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 
-from bowdenfit.app.brought_folder import lay_flat, put_in_place
-from bowdenfit.app.form import Form, FormEntry, UnansweredError
+from bowdenfit.addons.app.brought_folder import lay_flat, put_in_place
+from bowdenfit.addons.app.form import Form, FormEntry, UnansweredError
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.files import FORMATS

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
-from bowdenfit.app.draft import Refusal, list_refusals
+from bowdenfit.addons.app.draft import Refusal, list_refusals
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, DatasetError, Faults, UsageError
 from bowdenfit.files.tables import WORKBOOKS, RawTable, read_table

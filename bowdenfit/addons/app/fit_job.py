@@ -52,7 +52,7 @@ class FitJob:
         self.refusal, self.trusted, self.cancelled = "", None, False  # type: str, bool | None, bool
         self._began, self._ended = time.monotonic(), None  # type: float, float | None
         self._process = subprocess.Popen(  # noqa: S603  (our own)
-            python_command("bowdenfit.app.fit_process:main"), env=safe_environment(),
+            python_command("bowdenfit.addons.app.fit_process:main"), env=safe_environment(),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, encoding="utf-8",
         )  # fmt: skip
         assert self._process.stdin is not None

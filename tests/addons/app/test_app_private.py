@@ -17,10 +17,10 @@ from urllib.parse import quote, urlsplit
 import pytest
 from app_in_browser import served
 
-from bowdenfit.app.scratch import scratch_folder
+from bowdenfit.addons.app.scratch import scratch_folder
 from bowdenfit.pages.page import page_policy
 
-DATASETS = Path(__file__).parents[2] / "datasets"
+DATASETS = Path(__file__).parents[3] / "datasets"
 pytestmark = pytest.mark.extended
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from bowdenfit.app.elements import block, link, session_root, text
+from bowdenfit.addons.app.elements import block, link, session_root, text
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_assets
 

@@ -7,12 +7,12 @@ import pytest
 from half_turn_bench import TABLE, describe_half_turn
 
 import bowdenfit as bf
-from bowdenfit.app.brought_folder import put_in_place
-from bowdenfit.app.draft import Draft
-from bowdenfit.app.workbench import refuse_module_name
+from bowdenfit.addons.app.brought_folder import put_in_place
+from bowdenfit.addons.app.draft import Draft
+from bowdenfit.addons.app.workbench import refuse_module_name
 from bowdenfit.errors import UsageError
 
-DATASETS = Path(__file__).parents[2] / "datasets"
+DATASETS = Path(__file__).parents[3] / "datasets"
 
 
 @pytest.fixture

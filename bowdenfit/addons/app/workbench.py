@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
-from threading import Event
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import bowdenfit as bf
-from bowdenfit.app.draft import Draft, is_module_name, is_reserved
-from bowdenfit.app.fit_job import FitJob, FitRequest
+from bowdenfit.addons.app.draft import Draft, is_module_name, is_reserved
+from bowdenfit.addons.app.fit_job import FitJob, FitRequest
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.inputs import refuse_special
@@ -63,12 +62,11 @@ class Workbench:
 
     Args:
         folder: Where data sets and fits lie.
-        stop: Set when the app is to end.
         scratch: Folder for temporary files, which goes with the app.
     """
 
-    def __init__(self, folder: Path, stop: Event, scratch: Path) -> None:
-        self.folder, self.stop, self._scratch = folder.resolve(), stop, scratch
+    def __init__(self, folder: Path, scratch: Path) -> None:
+        self.folder, self._scratch = folder.resolve(), scratch
         self.jobs: dict[str, FitJob] = {}
         self.drafts: dict[str, Draft] = {}
         self.watched: dict[str, Watched] = {}

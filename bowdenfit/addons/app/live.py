@@ -7,9 +7,9 @@ from typing import Any
 
 from nicegui import ui
 
-from bowdenfit.app.elements import address, block, button, field, markup, text, text_input
-from bowdenfit.app.frame import attempt, frame, section
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.elements import address, block, button, field, markup, text, text_input
+from bowdenfit.addons.app.frame import attempt, frame, section
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.pages.page import render_section
 from bowdenfit.pages.section import Picture, prose_section

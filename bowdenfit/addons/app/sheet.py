@@ -7,8 +7,8 @@ from typing import Any
 
 from nicegui.element import Element
 
-from bowdenfit.app.draft import Draft, Refusal
-from bowdenfit.app.elements import block, button, text, text_input
+from bowdenfit.addons.app.draft import Draft, Refusal
+from bowdenfit.addons.app.elements import block, button, text, text_input
 
 FILE = "typed.csv"
 _HEADINGS = ("input_force_N", "output_force_N", "run", "stroke", "wrap_angle_deg", "")

@@ -2,11 +2,11 @@
 
 from nicegui import ui
 
-from bowdenfit.app.elements import address, block, button, link, text
-from bowdenfit.app.frame import attempt, frame, refused, section
-from bowdenfit.app.new_rows import CheckedRows, OpenTable, list_tables, open_table
-from bowdenfit.app.sheet import MORE_ROWS, CellGrid
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.elements import address, block, button, link, text
+from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.new_rows import CheckedRows, OpenTable, list_tables, open_table
+from bowdenfit.addons.app.sheet import MORE_ROWS, CellGrid
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.words import counted
 
 _MOST_ABOVE = 8  # rows that are there already, which a page shows; a judgement

@@ -7,12 +7,23 @@ from typing import TypeAlias
 
 from nicegui import ui
 
-from bowdenfit.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
-from bowdenfit.app.elements import address, block, button, choice, field, link, markup, session_root, text, text_input
-from bowdenfit.app.frame import NAME, attempt, frame, notify, refused, section
-from bowdenfit.app.sheet import FILE as TYPED
-from bowdenfit.app.sheet import TypedSheet
-from bowdenfit.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
+from bowdenfit.addons.app.draft import Draft, Refusal, Understanding, UnderstoodColumn, UnderstoodFile
+from bowdenfit.addons.app.elements import (
+    address,
+    block,
+    button,
+    choice,
+    field,
+    link,
+    markup,
+    session_root,
+    text,
+    text_input,
+)
+from bowdenfit.addons.app.frame import NAME, attempt, frame, notify, refused, section
+from bowdenfit.addons.app.sheet import FILE as TYPED
+from bowdenfit.addons.app.sheet import TypedSheet
+from bowdenfit.addons.app.workbench import KeptFit, Workbench, refuse_folder_name, refuse_module_name
 from bowdenfit.dataset import DESCRIPTION_FILE
 from bowdenfit.files import FORMATS
 from bowdenfit.questions.start.folder import find_examples, find_verb, write_example

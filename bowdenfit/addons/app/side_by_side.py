@@ -2,9 +2,9 @@
 
 from nicegui import ui
 
-from bowdenfit.app.elements import block, choice, field, markup, text
-from bowdenfit.app.frame import frame, refused
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.elements import block, choice, field, markup, text
+from bowdenfit.addons.app.frame import frame, refused
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section
 from bowdenfit.questions import compare as compare_room

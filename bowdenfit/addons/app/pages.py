@@ -6,15 +6,15 @@ from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 from nicegui import ui
 
-from bowdenfit.app.add_rows import AddRowsPage
-from bowdenfit.app.ask import export_file
-from bowdenfit.app.bring import show_draft, show_start
-from bowdenfit.app.data_set import DataSetPage
-from bowdenfit.app.frame import frame, refused, style_and_script
-from bowdenfit.app.live import LivePage
-from bowdenfit.app.see import FitPage
-from bowdenfit.app.side_by_side import TwoFitsPage
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.add_rows import AddRowsPage
+from bowdenfit.addons.app.ask import export_file
+from bowdenfit.addons.app.bring import show_draft, show_start
+from bowdenfit.addons.app.data_set import DataSetPage
+from bowdenfit.addons.app.frame import frame, refused, style_and_script
+from bowdenfit.addons.app.live import LivePage
+from bowdenfit.addons.app.see import FitPage
+from bowdenfit.addons.app.side_by_side import TwoFitsPage
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import page_policy
 from bowdenfit.results.folder import DETAILS_TEXT, POSTERIOR, REPORT, SUMMARY, SUMMARY_TEXT, kept_file

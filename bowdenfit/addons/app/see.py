@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from bowdenfit.app.ask import show_arriving, show_files, show_next
-from bowdenfit.app.elements import address, block, button, choice, field, markup, session_root, text
-from bowdenfit.app.fit_job import FitJob
-from bowdenfit.app.frame import attempt, frame, refused, section
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.ask import show_arriving, show_files, show_next
+from bowdenfit.addons.app.elements import address, block, button, choice, field, markup, session_root, text
+from bowdenfit.addons.app.fit_job import FitJob
+from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.display import as_html
 from bowdenfit.errors import BowdenfitError
 from bowdenfit.pages.page import render_section

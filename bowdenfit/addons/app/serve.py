@@ -7,24 +7,28 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
-from threading import Event
 
 import uvicorn
 from fastapi import FastAPI
 from nicegui import app as nicegui_app
 from nicegui import ui
 
-from bowdenfit.app.guard import HOST, Guard, entry_page
-from bowdenfit.app.pages import register_pages
-from bowdenfit.app.scratch import scratch_folder
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.guard import HOST, Guard, entry_page
+from bowdenfit.addons.app.pages import register_pages
+from bowdenfit.addons.app.scratch import scratch_folder
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.errors import UsageError
 
 _LOOK = 0.2  # s between two looks at whether to stop; a judgement
 
 
 def serve_app(
-    folder: Path, port: int, browser: bool, stop: Event, say: Callable[[str], None], on_error: Callable[[Exception], None]
+    folder: Path,
+    port: int,
+    browser: bool,
+    is_stopped: Callable[[], bool],
+    say: Callable[[str], None],
+    on_error: Callable[[Exception], None],
 ) -> None:
     """Serve the app until it is stopped; fits that run then end, and keep what is sampled.
 
@@ -32,7 +36,7 @@ def serve_app(
         folder: Folder of the data sets and fits.
         port: Port to listen on; 0 for one that is free.
         browser: Whether to open the page in the default browser.
-        stop: Set when the program is to stop.
+        is_stopped: Whether the program is to stop.
         say: Prints the address.
         on_error: Called with what goes wrong in a page.
 
@@ -42,7 +46,7 @@ def serve_app(
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder; name the one in which data sets and fits are, or leave it out.")
     with _listen(port) as listening, scratch_folder() as scratch:
-        workbench = Workbench(folder, stop, scratch)
+        workbench = Workbench(folder, scratch)
         application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         register_pages(workbench, application)
         ui.run_with(
@@ -63,7 +67,7 @@ def serve_app(
         if browser:
             open_browser(guard.address(guard.new_key()), scratch)
         try:
-            asyncio.run(_serve(guard, listening, stop))
+            asyncio.run(_serve(guard, listening, is_stopped))
         finally:
             workbench.close()
 
@@ -96,13 +100,13 @@ def _listen(port: int) -> socket.socket:
     return listening
 
 
-async def _serve(guarded: Guard, listening: socket.socket, stop: Event) -> None:
+async def _serve(guarded: Guard, listening: socket.socket, is_stopped: Callable[[], bool]) -> None:
     """Serve until it is stopped; libraries do not print, because each browser that waits no longer is an error to them."""
     logging.getLogger("nicegui").setLevel(logging.CRITICAL)
     config = uvicorn.Config(guarded, log_level="critical", access_log=False, timeout_graceful_shutdown=1, server_header=False)
     server = uvicorn.Server(config)
     serving = asyncio.create_task(server.serve([listening]))
-    while not (stop.is_set() or serving.done()):
+    while not (is_stopped() or serving.done()):
         await asyncio.sleep(_LOOK)
     server.should_exit = True
     await serving

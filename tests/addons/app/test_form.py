@@ -2,9 +2,9 @@
 
 import pytest
 
-from bowdenfit.app.data_set import read_seed
-from bowdenfit.app.draft import Draft
-from bowdenfit.app.form import Form, UnansweredError
+from bowdenfit.addons.app.data_set import read_seed
+from bowdenfit.addons.app.draft import Draft
+from bowdenfit.addons.app.form import Form, UnansweredError
 from bowdenfit.cli.init_dialog import start_data_set
 from bowdenfit.errors import UsageError
 from bowdenfit.questions.start.question import number_question, quantity_question, yes_no_question

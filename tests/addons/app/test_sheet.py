@@ -1,6 +1,6 @@
 """A table that is typed or pasted becomes a file like any other."""
 
-from bowdenfit.app.sheet import paste_cells, to_csv
+from bowdenfit.addons.app.sheet import paste_cells, to_csv
 
 EMPTY = [["input_force_N", "output_force_N", "run"], *([""] * 3 for _ in range(2))]
 

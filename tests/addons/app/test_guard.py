@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from bowdenfit.app.draft import refuse_file_name
-from bowdenfit.app.guard import LARGEST_REQUEST, Guard
-from bowdenfit.app.workbench import refuse_folder_name
+from bowdenfit.addons.app.draft import refuse_file_name
+from bowdenfit.addons.app.guard import LARGEST_REQUEST, Guard
+from bowdenfit.addons.app.workbench import refuse_folder_name
 from bowdenfit.errors import UsageError
 
 PORT = 4711

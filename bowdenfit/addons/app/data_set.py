@@ -2,10 +2,10 @@
 
 from nicegui import ui
 
-from bowdenfit.app.add_rows import show_table_links
-from bowdenfit.app.elements import address, block, button, field, link, text, text_input
-from bowdenfit.app.frame import attempt, frame, refused, section
-from bowdenfit.app.workbench import Workbench
+from bowdenfit.addons.app.add_rows import show_table_links
+from bowdenfit.addons.app.elements import address, block, button, field, link, text, text_input
+from bowdenfit.addons.app.frame import attempt, frame, refused, section
+from bowdenfit.addons.app.workbench import Workbench
 from bowdenfit.arguments import read_arguments
 from bowdenfit.errors import BowdenfitError, UsageError
 from bowdenfit.questions.check.verb import check

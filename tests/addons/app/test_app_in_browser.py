@@ -14,7 +14,7 @@ from offline_browser import browser
 
 import bowdenfit as bf
 
-DATASETS = Path(__file__).parents[2] / "datasets"
+DATASETS = Path(__file__).parents[3] / "datasets"
 QUICK = "[sampler]\nn_walkers = 64\ntarget_ess = 200\ntarget_r_hat = 1.05\nmax_steps = 4000\n"
 ROWS = ("20,15.2,1", "40,30.1,1", "60,45.6,1", "20,15.0,2", "40,30.9,2", "60,46.0,2", "20,14.8,3", "40,29.9,3", "60,44.6,3")
 PASTE = """(cell, words) => {

@@ -4,7 +4,7 @@ import pytest
 from half_turn_bench import TABLE, describe_half_turn
 
 import bowdenfit as bf
-from bowdenfit.app.new_rows import list_tables, open_table
+from bowdenfit.addons.app.new_rows import list_tables, open_table
 from bowdenfit.errors import BowdenfitError, UsageError
 
 NEW = [["20", "15.3", "3"], ["40", "30.4", "3"]]

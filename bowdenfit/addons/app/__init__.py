@@ -1,7 +1,7 @@
 """The bench in the browser: bring measurements, fit them, see the answer, in pages that this machine serves to itself alone.
 
-Pages ask the functions that the command line asks, and say what it says: nothing is read, fitted or worded here. Nothing below
-imports this room, and the command line loads it when `bowdenfit app` runs, because NiceGUI is large.
+Pages ask the functions that the command line asks, and say what it says: nothing is read, fitted or worded here. The pages are
+loaded when `bowdenfit app` runs, because NiceGUI is large.
 """
 
 import os

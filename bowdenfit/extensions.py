@@ -18,6 +18,8 @@ from bowdenfit.child_process import package_folders
 
 VERBS = "bowdenfit.verbs"  # group of entry points, of a `Verb` each
 KINDS = "bowdenfit.kinds"  # of a subclass of `Kind` each
+CLUSTERS = "bowdenfit.engines"  # of a `Cluster` each
+SIMULATIONS = "bowdenfit.simulations"  # of a function each, with the arguments and the answer of `make_data_set`
 _OURS, _GROUPS = "bowdenfit", "bowdenfit."
 
 _problems: list[str] = []

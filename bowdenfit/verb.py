@@ -52,6 +52,7 @@ class Verb:
             alone, and has no stages.
         reads: Name of the file by which a folder is known to be read by this verb of an add-on, such as "cables.toml"; a verb
             that is asked of a fit reads the file itself.
+        referral: What to say of such a folder to who takes it for that of a single cable, with {folder} in it.
     """
 
     function: Callable[..., Any]
@@ -67,6 +68,7 @@ class Verb:
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
     serves: bool = False
     reads: str = ""
+    referral: str = ""
 
     @property
     def command_name(self) -> str:

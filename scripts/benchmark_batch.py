@@ -26,6 +26,9 @@ from pathlib import Path
 
 import jax
 
+from bowdenfit.addons.fleet.fitting import SETTINGS
+from bowdenfit.addons.fleet.folder import FLEET_PAGE
+from bowdenfit.addons.fleet.simulation import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.batch.fitting import fit_batch
 from bowdenfit.inference.batch.programs import BatchPrograms
@@ -38,10 +41,7 @@ from bowdenfit.inference.walkers import compile_walkers
 from bowdenfit.kinds.descriptions import make_design, parse_description
 from bowdenfit.models import build_model
 from bowdenfit.questions.calibrate.replicator import why_implausible
-from bowdenfit.questions.fleet.fitting import SETTINGS
-from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
 from bowdenfit.questions.simulate.tables import draw_true_values, empty_tables, simulate_design
-from bowdenfit.results.fleet_folder import FLEET_PAGE
 
 CONTACTS = ("sheath", "clamp", "edge")
 ANGLES = ((200, 30, 20), (150, 80, 20), (90, 30, 60), (240, 60, 90), (60, 90, 30), (120, 20, 80))  # deg, of each run

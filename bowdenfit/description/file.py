@@ -16,9 +16,8 @@ from bowdenfit.description.wrong_keys import explain_validation_error
 from bowdenfit.errors import DatasetError, DescriptionError, Faults
 from bowdenfit.inputs import read_toml_file
 from bowdenfit.units import route_conversion_factor
+from bowdenfit.verb import load_added_verbs
 from bowdenfit.words import shown
-
-_FLEET = "fleet.toml"  # stands in the folder of many cables, which have no description of their own
 
 Stated = tuple[str, QuantityValue | None, str]
 """Where a quantity stands, the quantity, and what it must measure."""
@@ -46,11 +45,17 @@ def read_toml(path: Path, overrides: Sequence[str] = ()) -> tuple[str, dict[str,
     Raises:
         DescriptionError: The file is missing or no TOML, or a setting leads nowhere.
     """
-    remedy = "name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`"
-    if (path.parent / _FLEET).is_file():
-        remedy = f"the folder holds a fleet: `bowdenfit fleet {path.parent}` reads, checks and fits all of its cables"
-    text, raw = read_toml_file(path, remedy)
+    text, raw = read_toml_file(path, _suggest_remedy(path))
     return text, override(raw, overrides)
+
+
+def _suggest_remedy(path: Path) -> str:
+    """Return what to do where there is no cable.toml; a verb of an add-on may read the folder."""
+    if not path.exists():
+        for verb in load_added_verbs():
+            if verb.referral and (path.parent / verb.reads).is_file():
+                return verb.referral.format(folder=path.parent)
+    return "name a folder that holds a cable.toml, or write one with `bowdenfit init FOLDER`"
 
 
 def override(raw: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:

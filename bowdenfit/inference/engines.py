@@ -1,4 +1,4 @@
-"""Engines: where many independent pieces of work are done (this machine, a Dask cluster, Slurm, or any executor).
+"""Engines: where many independent pieces of work are done (this machine, a cluster of an add-on, or any executor).
 
 The result of a piece depends on the piece alone, never on the engine, so every engine gives the same results. Client and
 workers must run the same versions of the libraries that compute.
@@ -6,7 +6,6 @@ workers must run the same versions of the libraries that compute.
 
 import platform
 import re
-import shutil
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -19,19 +18,17 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from bowdenfit.child_process import SafeContext, starting_safely
 from bowdenfit.errors import BowdenfitError, UsageError
+from bowdenfit.extensions import CLUSTERS, iterate_extensions, load_extension
 from bowdenfit.inference.resources import available_cores, start_worker
-from bowdenfit.inputs import refuse_special
-from bowdenfit.outputs import refuse_link
 from bowdenfit.words import listed, shown
 
 Work = TypeVar("Work")
@@ -40,12 +37,7 @@ Outcome: TypeAlias = tuple[Exception | None, Any]
 _PIECES_PER_WORKER = 2  # pieces submitted per worker, so that none waits for its next one
 _PATIENCE = 30.0  # seconds without a finished piece before the engine checks that workers are left
 _MOST_ATTEMPTS = 3  # times that a piece is tried when workers die of it
-ENGINES = "local, dask://HOST:PORT or slurm"
-DATASETS_PER_JOB = 4096  # most data sets of one Slurm job; each job loads and compiles everything again
-JOBS_FOLDER = "jobs"  # folder in which Slurm jobs write
-_DEFAULT_JOBS = 16  # Slurm jobs at a time, by default
-_CONNECT_SECONDS, _WORKER_SECONDS = 10, 60  # seconds to wait for a Dask scheduler, and for its first worker
-_JOB_MINUTES = 240  # time limit of a Slurm job; SBATCH_TIMELIMIT overrides it
+JOBS_FOLDER = "jobs"  # folder in which jobs of a cluster write
 VERSIONED = ("bowdenfit", "jax", "optimistix", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 
@@ -177,19 +169,18 @@ class InThisProcess(Engine[Work, Result]):
         return map(function, pieces)
 
 
-def make_waiting_executor(submit: Callable[..., Any], most: int) -> Executor:
-    """Return an executor whose threads wait for work that is done elsewhere.
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster of which an add-on makes an engine; its entry point has the name that stands before `://`.
 
     Args:
-        submit: Runs a piece elsewhere, and waits for it.
-        most: Pieces at once.
+        written: What is written behind --engine, such as "dask://HOST:PORT".
+        open: Opens it, given the address behind `://`, jobs at a time (None for as many as it likes), and the folder in which
+            jobs may write.
     """
 
-    class Waiting(ThreadPoolExecutor):
-        def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
-            return super().submit(submit, function, *arguments, **named)
-
-    return Waiting(most)
+    written: str
+    open: Callable[[str, int | None, Path | None], AbstractContextManager[Engine[Any, Any]]]
 
 
 @contextmanager
@@ -204,7 +195,7 @@ def open_engine(
     Args:
         engine: Its name, or an executor of the caller, which is left open.
         workers: Processes here, or jobs at a time.
-        folder: Where Slurm jobs write; needed for Slurm only.
+        folder: Where jobs of a cluster may write.
         processes: Processes of this machine that "local" uses; with more than one, programs begin with
             `if __name__ == "__main__"`, as with everything that starts processes.
 
@@ -222,117 +213,35 @@ def open_engine(
             if processes == 1
             else Engine(partial(_make_process_pool, processes), processes, "this machine")
         )
-    elif engine.startswith("dask://"):
-        address = engine.removeprefix("dask://")
-        with _dask_client(address) as (client, count):
-            check = partial(_refuse_no_workers, client, address)
-            yield Engine(lambda: client.get_executor(pure=False), count, engine, check=check)
-        return
-    elif engine == "slurm":
-        if folder is None:
-            raise UsageError("--engine slurm needs a folder that all its nodes see; name it with --output.")
-        if shutil.which("srun") is None:
-            raise _slurm_missing_error()
-        opened = Engine(
-            partial(make_slurm_executor, folder, workers or _DEFAULT_JOBS),
-            workers or _DEFAULT_JOBS,
-            "slurm",
-            DATASETS_PER_JOB,
-        )
     else:
-        raise UsageError(f"there is no engine {shown(engine)}; known here: {ENGINES}.")
+        cluster, address = _find_cluster(engine)
+        with cluster.open(address, workers, folder) as of_cluster:
+            yield of_cluster
+        return
     try:
         yield opened
     finally:
         opened.close()
 
 
+def _find_cluster(engine: str) -> tuple[Cluster, str]:
+    """Return the cluster that an engine names, and the address behind its name.
+
+    Raises:
+        UsageError: There is no such engine.
+    """
+    name, separator, address = engine.partition("://")
+    cluster = load_extension(CLUSTERS, name)
+    if isinstance(cluster, Cluster) and bool(separator) == ("://" in cluster.written):
+        return cluster, address
+    *others, last = "local", *(cluster.written for _, cluster in iterate_extensions(CLUSTERS) if isinstance(cluster, Cluster))
+    known = f"{', '.join(others)} or {last}" if others else last
+    raise UsageError(f"there is no engine {shown(engine)}; known here: {known}.")
+
+
 def _make_process_pool(count: int) -> Executor:
     with starting_safely():  # its queues start the tracker of resources
         return ProcessPoolExecutor(count, SafeContext(), start_worker)
-
-
-@contextmanager
-def _dask_client(address: str) -> Iterator[tuple[Any, int]]:
-    """Connect to a Dask cluster; yield its client and how many pieces its workers do at a time."""
-    try:
-        from distributed import Client
-    except ImportError:
-        raise _library_missing_error("distributed") from None
-    try:
-        client = Client(f"tcp://{address}", timeout=_CONNECT_SECONDS, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
-        raise EngineError(
-            f"the scheduler at {shown(address)} does not answer ({type(error).__name__}); start it with `dask scheduler`, and "
-            "write the address that it prints behind tcp:// as --engine dask://HOST:PORT."
-        ) from None
-    try:
-        _refuse_no_workers(client, address)
-        yield client, max(sum(client.nthreads().values()), 1)
-    finally:
-        client.close()
-
-
-def _refuse_no_workers(client: Any, address: str) -> None:
-    """Wait for a worker for a limited time.
-
-    Raises:
-        EngineError: There is no worker, or the scheduler is gone.
-    """
-    try:
-        client.wait_for_workers(1, timeout=_WORKER_SECONDS)
-    except TimeoutError:
-        raise EngineError(
-            f"the scheduler at {shown(address)} has no worker; start some with `dask worker tcp://{address}`. What is done is "
-            "kept where there is a results folder, and goes on with --resume."
-        ) from None
-    except Exception as error:  # of whatever kind: a client whose scheduler is gone says so in several ways
-        raise EngineError(
-            f"the scheduler at {shown(address)} is gone ({type(error).__name__}); start it and its workers again. What is done "
-            "is kept where there is a results folder, and goes on with --resume."
-        ) from None
-
-
-def make_slurm_executor(folder: Path, jobs: int, cluster: str = "slurm") -> Executor:
-    """Return an executor of Slurm jobs, or of local processes in their place.
-
-    Args:
-        folder: Where jobs write; all nodes must see it.
-        jobs: Jobs at a time.
-        cluster: "slurm", or "local" for processes here.
-
-    Raises:
-        UsageError: submitit is not installed, or there is no Slurm here.
-    """
-    try:
-        import submitit
-    except ImportError:
-        raise _library_missing_error("submitit") from None
-    refuse_special(folder)
-    refuse_link(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    try:  # in a folder that is new: answers come back as pickles, and nobody else's may be taken for one
-        inner = submitit.AutoExecutor(mkdtemp(dir=folder.resolve()), cluster=cluster)
-    except RuntimeError:
-        raise _slurm_missing_error() from None
-    inner.update_parameters(timeout_min=_JOB_MINUTES, name="bowdenfit")
-
-    def submit(function: Callable[..., Any], *arguments: Any) -> Any:
-        with starting_safely(keep_paths=True):  # a job inherits the environment of whoever submits it
-            job = inner.submit(function, *arguments)
-        return job.result()
-
-    return make_waiting_executor(submit, jobs)
-
-
-def _slurm_missing_error() -> UsageError:
-    return UsageError(
-        "there is no Slurm here (no srun and sbatch); run this on a login node of the cluster, or leave --engine out."
-    )
-
-
-def _library_missing_error(library: str) -> UsageError:
-    return UsageError(f"this engine needs {library}, which is not installed; install bowdenfit[cluster].")
 
 
 @cache

@@ -52,7 +52,7 @@ class Job:
 
             return bf.load(folder).posterior.z.tobytes()
         if self.done == "fleet.json":
-            from bowdenfit.results.fleet_folder import read_fleet_draws
+            from bowdenfit.addons.fleet.folder import read_fleet_draws
 
             fleet = read_fleet_draws(folder)
             return fleet.label, {name: values.tobytes() for name, values in fleet.values.items()}

@@ -7,8 +7,8 @@ import pytest
 from pooled_fleets import fleet_draws
 
 from bowdenfit import verbs
+from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FLEET_TABLE, write_fleet_draws
 from bowdenfit.results.answer_cache import file_checksum
-from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FLEET_TABLE, write_fleet_draws
 
 TABLE = "input_force_N,output_force_N\n10,8\n20,16.1\n30,23.9\n40,32.1\n50,39.9\n60,48.1\n"
 COMMANDS = {  # what is typed behind each verb, and a word of what it prints

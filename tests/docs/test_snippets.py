@@ -18,11 +18,11 @@ from distributed.cli import dask_scheduler, dask_worker
 from snippets import FIRST, PAGES, PUBLISHED, as_shown, blocks, masked
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.inspections import read_inspections
 from bowdenfit.addons.metabolic.study import read_study
 from bowdenfit.cli import bowdenfit as program
 from bowdenfit.kinds.descriptions import parse_description
 from bowdenfit.questions.calibrate.plan import read_truths
-from bowdenfit.questions.fleet.inspections import read_inspections
 from bowdenfit.reading import Reading
 
 pytestmark = pytest.mark.extended

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.clusters import make_slurm_executor
+from bowdenfit.addons.fleet.store import PIECES_FOLDER
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
-from bowdenfit.inference.engines import JOBS_FOLDER, make_slurm_executor
+from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.calibrate.replications import Replication, append_replication, open_replications
-from bowdenfit.questions.fleet.store import PIECES_FOLDER
 from bowdenfit.results.answer_cache import CAPTIONS, write_captions
 from bowdenfit.results.folder import CHAIN, FIGURES, REPLICATIONS, reserve_folder
 

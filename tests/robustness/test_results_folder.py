@@ -12,11 +12,11 @@ import pytest
 from filelock import FileLock
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.store import FleetStore
 from bowdenfit.errors import DiskError
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_fingerprint, read_records
 from bowdenfit.outputs import write_text
 from bowdenfit.questions.calibrate.replications import open_replications
-from bowdenfit.questions.fleet.store import FleetStore
 from bowdenfit.results import store
 from bowdenfit.results.folder import fill_folder_atomically, folder_to_write, refuse_unwritable, reserve_folder
 

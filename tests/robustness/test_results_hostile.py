@@ -13,9 +13,9 @@ import pytest
 from fuzzing_results import SHAPES, begun_fleet, resume_fleet
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
+from bowdenfit.addons.fleet.store import PIECES_FOLDER
 from bowdenfit.inference.checkpoint import append_record, checkpoint_header, read_records
-from bowdenfit.questions.fleet.store import PIECES_FOLDER
-from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, read_fleet_draws
 from bowdenfit.results.netcdf import read_groups, read_groups_isolated, write_groups
 from bowdenfit.results.serialization import read_arrays
 

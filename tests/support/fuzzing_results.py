@@ -17,6 +17,8 @@ from fuzzing import Outcome, meet
 from mangled_bytes import mangled
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
+from bowdenfit.addons.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.dataset import Dataset
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append_record, read_records
@@ -29,10 +31,8 @@ from bowdenfit.questions.calibrate.replications import (
     open_replications,
     read_seed,
 )
-from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.results import folder as names
 from bowdenfit.results.answer_cache import file_checksum, read_answers
-from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
 from bowdenfit.run.preparing import choose_seed
 
 ODD_JSON: tuple[Any, ...] = (

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpyro.infer import MCMC, NUTS
 
-from bowdenfit.inference.population.sampling import PopulationDraws
-from bowdenfit.questions.fleet.inspections import read_cases, read_inspections
+from bowdenfit.addons.fleet.inspections import read_cases, read_inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws
 
 SPREAD, WEAR, WEAR_SPREAD, OIL, DEGREE = 0.5, 1.0, 0.3, 1.0, 0.05  # scales of the priors, as the model is written down
 WARM_UP, CHAINS = 400, 4

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bowdenfit.results.fleet_folder import FleetDraws
+from bowdenfit.addons.fleet.folder import FleetDraws
 
 PRIOR = json.dumps({"kind": "LogNormal", "median": 0.12, "log_sd": 0.7})
 REFERENCE = 50_000.0

@@ -6,8 +6,8 @@ normal. Spreads have a grid, and every third sweep cables are stretched with the
 
 import numpy as np
 
-from bowdenfit.inference.population.model import Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws
+from bowdenfit.addons.fleet.population.model import Inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws
 
 SPREADS = np.exp(np.linspace(np.log(2e-3), np.log(3.0), 120))
 SPREAD, WEAR, WEAR_SPREAD, OIL = 0.5, 1.0, 0.3, 1.0  # scales of the priors, as the model is written down

@@ -1,4 +1,4 @@
-"""Data sets from known truth: tables, recordings and fleets; functions are loaded when first used."""
+"""Data sets from known truth: tables and recordings; functions are loaded when first used."""
 
 import lazy_loader as lazy
 

@@ -1,3 +1,2 @@
-from .fleet import make_fleet as make_fleet
 from .recordings import make_recorded_data_set as make_recorded_data_set
 from .tables import make_data_set as make_data_set

@@ -1,6 +1,7 @@
 """The verb `simulate`: make a data set whose true values are known."""
 
 import secrets
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,6 +9,7 @@ from cyclopts import Parameter
 
 from bowdenfit.arguments import LARGEST_SEED, PATH, Output, Seed, read_first
 from bowdenfit.errors import StoreError, UsageError
+from bowdenfit.extensions import SIMULATIONS, load_extension
 from bowdenfit.questions import simulate as room
 from bowdenfit.verb import Reply, Verb
 
@@ -50,8 +52,20 @@ def simulate(
         if folder is None:
             raise UsageError("simulated recordings are files; name a folder for them with output.")
         return room.make_recorded_data_set(Path(bench), folder, seed, noise)
-    make = room.make_fleet if fleet else room.make_data_set
+    make = _load_fleet_maker() if fleet else room.make_data_set
     return make(Path(bench), folder, seed, noise)
+
+
+def _load_fleet_maker() -> "Callable[[Path, Path | None, int, bool], Dataset]":
+    """Return what an add-on makes fleets with.
+
+    Raises:
+        UsageError: There is none.
+    """
+    make: Callable[[Path, Path | None, int, bool], Dataset] | None = load_extension(SIMULATIONS, "fleet")
+    if make is None:
+        raise UsageError("--fleet needs an add-on that comes with bowdenfit, and it is not installed; install bowdenfit again.")
+    return make
 
 
 def _reply(_: "Dataset", options: dict[str, Any]) -> Reply:

@@ -8,29 +8,29 @@ from pathlib import Path
 import jax
 import numpy as np
 
-import bowdenfit.questions.pool.words  # noqa: F401  registers the text of the answer
-from bowdenfit.arguments import NumberWithUnit
-from bowdenfit.inference.interval import Interval
-from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws, draw_population, draw_unpooled
-from bowdenfit.questions.fleet.inspections import read_inspections
-from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable, ServiceLimit
-from bowdenfit.questions.pool.lifetime import (
+import bowdenfit.addons.fleet.pool.words  # noqa: F401  registers the text of the answer
+from bowdenfit.addons.fleet.folder import FleetDraws, read_fleet_draws
+from bowdenfit.addons.fleet.inspections import read_inspections
+from bowdenfit.addons.fleet.pool.answer import Effect, Life, Pool, PooledCable, ServiceLimit
+from bowdenfit.addons.fleet.pool.lifetime import (
     compute_curves,
     cycles_to_failure,
     parse_service_limit,
     rank_next_inspections,
     summarize_life,
 )
-from bowdenfit.questions.pool.outlier_cables import FALSE_ALARM, find_departure, find_mixtures, separate_outliers
-from bowdenfit.questions.pool.pooled_data import (
+from bowdenfit.addons.fleet.pool.outlier_cables import FALSE_ALARM, find_departure, find_mixtures, separate_outliers
+from bowdenfit.addons.fleet.pool.pooled_data import (
     LEAST_EFFECTIVE_DRAWS,
     PoolingData,
     count_effective_draws,
     load_readings,
     select_inspections,
 )
-from bowdenfit.results.fleet_folder import FleetDraws, read_fleet_draws
+from bowdenfit.addons.fleet.population.model import REFERENCE_TEMPERATURE, Inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws, draw_population, draw_unpooled
+from bowdenfit.arguments import NumberWithUnit
+from bowdenfit.inference.interval import Interval
 from bowdenfit.stages import announce_stage
 from bowdenfit.words import few
 

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from pydantic import Field, ValidationError
 
+from bowdenfit.addons.fleet.folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
 from bowdenfit.csv_tables import csv_table
 from bowdenfit.dataset import Dataset
 from bowdenfit.description.values import Finite, Frozen, NonNegative, Positive
@@ -35,7 +36,6 @@ from bowdenfit.questions.simulate.tables import (
     read_plan_file,
     table_texts,
 )
-from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
 from bowdenfit.results.folder import fill_folder_atomically
 
 READINGS = "readings"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from bowdenfit.addons.fleet import pool as _pool
 from bowdenfit.arguments import (
     PATH,
     TEXTS,
@@ -17,13 +18,12 @@ from bowdenfit.arguments import (
     read_first,
     whole_number,
 )
-from bowdenfit.questions import pool as _pool
 from bowdenfit.questions.writing import refuse_to_replace
 from bowdenfit.stage_bar import show_progress_bar
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.pool.answer import Pool
+    from bowdenfit.addons.fleet.pool.answer import Pool
 
 NAME = "pool"
 FLEET = Parameter("FLEET", help="Such as fits/my-fleet, which `bowdenfit fleet my-fleet` writes.")
@@ -76,7 +76,7 @@ def _reply(answer: "Pool", options: dict[str, Any]) -> Reply:
     return Reply(_pool.pool_text(answer), lambda: answer, notes, 0 if answer.is_trusted else NOT_TRUSTED, answer.to_csv)
 
 
-VERB = Verb(
+POOL = Verb(
     pool,
     _reply,
     """Look at the cables of a fleet together: wear and life.

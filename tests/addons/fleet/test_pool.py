@@ -14,20 +14,20 @@ from scipy import stats
 from scipy.linalg import block_diag
 
 import bowdenfit as bf
-from bowdenfit.inference.population.likelihoods import Summaries
-from bowdenfit.inference.population.model import Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws, draw_population
+from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
+from bowdenfit.addons.fleet.pool import pooling
+from bowdenfit.addons.fleet.pool.answer import ServiceLimit
+from bowdenfit.addons.fleet.pool.figures import draw_figures
+from bowdenfit.addons.fleet.pool.lifetime import cycles_to_failure, rank_next_inspections, summarize_life
+from bowdenfit.addons.fleet.pool.outlier_cables import anderson_darling_p_value, outlier_p_values
+from bowdenfit.addons.fleet.pool.pooled_data import select_inspections
+from bowdenfit.addons.fleet.pool.pooling import pool_cables
+from bowdenfit.addons.fleet.pool.words import captions, pool_text
+from bowdenfit.addons.fleet.population.likelihoods import Summaries
+from bowdenfit.addons.fleet.population.model import Inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws, draw_population
 from bowdenfit.multiple_testing import adjust_p_values
-from bowdenfit.questions.pool import pooling
-from bowdenfit.questions.pool.answer import ServiceLimit
-from bowdenfit.questions.pool.figures import draw_figures
-from bowdenfit.questions.pool.lifetime import cycles_to_failure, rank_next_inspections, summarize_life
-from bowdenfit.questions.pool.outlier_cables import anderson_darling_p_value, outlier_p_values
-from bowdenfit.questions.pool.pooled_data import select_inspections
-from bowdenfit.questions.pool.pooling import pool_cables
-from bowdenfit.questions.pool.words import captions, pool_text
 from bowdenfit.results.answer_cache import file_checksum
-from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, write_fleet_draws
 
 pytestmark = pytest.mark.extended
 

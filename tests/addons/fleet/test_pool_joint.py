@@ -11,9 +11,10 @@ from pooled_fleets import fleet_draws
 from scipy import stats
 
 import bowdenfit as bf
-from bowdenfit.inference.diagnostics import diagnose
-from bowdenfit.inference.population.likelihoods import summarize_likelihoods
-from bowdenfit.inference.population.model import (
+from bowdenfit.addons.fleet.folder import read_fleet_draws
+from bowdenfit.addons.fleet.pool.pooled_data import select_inspections
+from bowdenfit.addons.fleet.population.likelihoods import summarize_likelihoods
+from bowdenfit.addons.fleet.population.model import (
     LUBRICATION,
     SPREAD,
     WEAR,
@@ -22,10 +23,9 @@ from bowdenfit.inference.population.model import (
     PopulationDensity,
     log_likelihood,
 )
-from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool.pooled_data import select_inspections
-from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
-from bowdenfit.results.fleet_folder import read_fleet_draws
+from bowdenfit.addons.fleet.population.sampling import draw_population
+from bowdenfit.addons.fleet.simulation import read_fleet_plan, simulate_fleet, write_fleet
+from bowdenfit.inference.diagnostics import diagnose
 
 pytestmark = pytest.mark.extended
 

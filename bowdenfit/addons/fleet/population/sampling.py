@@ -23,12 +23,12 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
+from bowdenfit.addons.fleet.population.likelihoods import JointReadings, without_cables
+from bowdenfit.addons.fleet.population.model import WEAR, Inspections, PopulationDensity, whitening_roots
 from bowdenfit.description import SamplerSettings
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.diagnostics import describe_convergence_shortfalls, diagnose
 from bowdenfit.inference.nuts import BLOCK, WARM_UP, compile_block, next_block_state
-from bowdenfit.inference.population.likelihoods import JointReadings, without_cables
-from bowdenfit.inference.population.model import WEAR, Inspections, PopulationDensity, whitening_roots
 from bowdenfit.words import percent
 
 _SETTINGS = SamplerSettings(n_chains=4, target_acceptance=0.8, target_ess=400, target_r_hat=1.02)

@@ -102,7 +102,7 @@ def read_fleet_draws(folder: Path) -> FleetDraws:
         problem = "holds an unfinished fleet; finish it with --resume" if folder.is_dir() else "does not exist"
         raise StoreError(f"{path} cannot be read: {folder} {problem}, or name a folder that `bowdenfit fleet` wrote.")
     _refuse_changed(folder, StoreError(f"{path} is damaged; fit the fleet again, or restore the folder from a copy."))
-    draws: FleetDraws = read_own_hdf5(path, "bowdenfit.results.fleet_folder:read_draws_file")
+    draws: FleetDraws = read_own_hdf5(path, "bowdenfit.addons.fleet.folder:read_draws_file")
     return draws
 
 

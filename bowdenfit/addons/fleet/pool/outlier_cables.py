@@ -22,12 +22,12 @@ from collections.abc import Callable, Collection
 import numpy as np
 from scipy.special import chdtrc, gammaln, log_ndtr, ndtr
 
-from bowdenfit.inference.population.model import Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws
+from bowdenfit.addons.fleet.population.model import Inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws
 from bowdenfit.inference.psis import smooth_weights
 from bowdenfit.multiple_testing import adjust_p_values
 
-# Share of homogeneous fleets in which any cable is named as an outlier; measured in `tests/questions/test_pool_alarms.py`.
+# Share of homogeneous fleets in which any cable is named as an outlier; measured in `tests/addons/fleet/test_pool_alarms.py`.
 FALSE_ALARM = 0.05
 MIXTURE_LEVEL = 0.01  # significance level of the test for a mixture of populations; customary
 _POPULATIONS = 1000  # draws of the population; a judgement

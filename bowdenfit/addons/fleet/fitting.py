@@ -13,6 +13,10 @@ from typing import Any
 import jax
 import numpy as np
 
+from bowdenfit.addons.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
+from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
+from bowdenfit.addons.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
+from bowdenfit.addons.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import StoreError, UsageError
@@ -24,12 +28,8 @@ from bowdenfit.inference.interval import Interval
 from bowdenfit.inference.resources import keep_compiled_programs
 from bowdenfit.models import Model, build_model
 from bowdenfit.outputs import write_text
-from bowdenfit.questions.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
-from bowdenfit.questions.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
-from bowdenfit.questions.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.reading import Reading
 from bowdenfit.results.answer_cache import file_checksum
-from bowdenfit.results.fleet_folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
 from bowdenfit.results.folder import SUMMARY_TEXT, fill_folder_atomically
 from bowdenfit.results.serialization import plain_data
 from bowdenfit.stages import announce_stage

@@ -15,11 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bowdenfit.addons.fleet.pool.answer import Curves, Life, NextInspection, ServiceLimit
+from bowdenfit.addons.fleet.pool.pooled_data import PoolingData
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws
 from bowdenfit.arguments import NumberWithUnit
 from bowdenfit.errors import DatasetError, UsageError
-from bowdenfit.inference.population.sampling import PopulationDraws
-from bowdenfit.questions.pool.answer import Curves, Life, NextInspection, ServiceLimit
-from bowdenfit.questions.pool.pooled_data import PoolingData
 from bowdenfit.units import conversion_factor
 from bowdenfit.words import shown
 

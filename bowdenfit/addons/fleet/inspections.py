@@ -8,6 +8,8 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
+from bowdenfit.addons.fleet.answer import FailedInspection
+from bowdenfit.addons.fleet.folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
@@ -19,9 +21,7 @@ from bowdenfit.files.tables import RawTable, read_table
 from bowdenfit.inference.batch.pieces import ShapedDataset, input_hash, shape_dataset
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.descriptions import load_description
-from bowdenfit.questions.fleet.answer import FailedInspection
 from bowdenfit.reading import Reading, changed_settings, read
-from bowdenfit.results.fleet_folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
 from bowdenfit.words import few, shown
 
 _TEMPERATURES = {"temperature_degC": 0.0, "temperature_C": 0.0, "temperature_K": -273.15}  # what each adds to be in °C

@@ -20,7 +20,7 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Float
 
-from bowdenfit.inference.population.likelihoods import JointReadings, Summaries
+from bowdenfit.addons.fleet.population.likelihoods import JointReadings, Summaries
 from bowdenfit.parameters.priors import HalfNormal, Normal, Prior
 
 SPREAD, WEAR, WEAR_SPREAD = HalfNormal(0.5), Normal(0.0, 1.0), HalfNormal(0.3)

@@ -10,14 +10,14 @@ import pytest
 from joint_fleets import joint_draws
 
 import bowdenfit as bf
-from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool import pooling
-from bowdenfit.questions.pool.pooled_data import count_effective_draws, load_readings, select_inspections
-from bowdenfit.results.fleet_folder import FLEET_TABLE, read_fleet_draws
+from bowdenfit.addons.fleet.folder import FLEET_TABLE, read_fleet_draws
+from bowdenfit.addons.fleet.pool import pooling
+from bowdenfit.addons.fleet.pool.pooled_data import count_effective_draws, load_readings, select_inspections
+from bowdenfit.addons.fleet.population.sampling import draw_population
 
 pytestmark = pytest.mark.extended
 
-FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+FLEET = Path(__file__).parents[3] / "datasets" / "synthetic-fleet"
 ANGLES = (("180", "60", "120", "240"), ("20", "90", "45", "20"))  # deg
 
 

@@ -9,10 +9,10 @@ import pytest
 from populations import gibbs
 from scipy import stats
 
-from bowdenfit.inference.population.likelihoods import Summaries, summarize_likelihoods
-from bowdenfit.inference.population.model import Inspections
-from bowdenfit.inference.population.sampling import draw_population
-from bowdenfit.questions.pool import outlier_cables
+from bowdenfit.addons.fleet.pool import outlier_cables
+from bowdenfit.addons.fleet.population.likelihoods import Summaries, summarize_likelihoods
+from bowdenfit.addons.fleet.population.model import Inspections
+from bowdenfit.addons.fleet.population.sampling import draw_population
 
 pytestmark = pytest.mark.extended
 

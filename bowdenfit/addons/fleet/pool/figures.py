@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bowdenfit.addons.fleet.pool.words import HEADINGS, pool_page, pool_text
 from bowdenfit.outputs import write_text
 from bowdenfit.plots.layout import (
     LEFT,
@@ -34,16 +35,15 @@ from bowdenfit.plots.style import (
     in_paper_style,
 )
 from bowdenfit.plots.write import write_all
-from bowdenfit.questions.pool.words import HEADINGS, pool_page, pool_text
 from bowdenfit.questions.writing import write_page
 from bowdenfit.results.folder import fill_folder_atomically
 from bowdenfit.results.serialization import plain_data
 from bowdenfit.words import printable
 
 if TYPE_CHECKING:
+    from bowdenfit.addons.fleet.pool.answer import Curves, Pool
     from bowdenfit.inference.interval import Interval
     from bowdenfit.plots.layout import Axes, Figure
-    from bowdenfit.questions.pool.answer import Curves, Pool
 
 MOST_CABLES, LONGEST_NAME, MOST_COEFFICIENTS = 60, 18, 2  # rows, characters and panels that a page has room for
 _ROW, _BELOW, _HEIGHT = 0.115, 0.45, 2.3  # in

@@ -1,4 +1,4 @@
-"""The verb `fleet`: fit many cables at once, and save each as soon as it is done."""
+"""The verbs `fleet`, which fits many cables at once and saves each as soon as it is done, and `pool`."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from cyclopts import Parameter
 
+from bowdenfit.addons import fleet as _fleet
+from bowdenfit.addons.fleet.pool.verb import POOL
 from bowdenfit.arguments import HIDDEN, PATH, Output, Seed, read_first, whole_number
 from bowdenfit.inference.resources import refuse_low_memory
-from bowdenfit.questions import fleet as _fleet
 from bowdenfit.reading import Reading
 from bowdenfit.results.folder import reserve_folder
 from bowdenfit.stage_bar import Watch, show_progress_bar
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
-    from bowdenfit.questions.fleet.answer import Fleet
+    from bowdenfit.addons.fleet.answer import Fleet
 
 FOLDER = Parameter("FOLDER", help="Such as my-fleet, with its fleet.toml and fleet.csv.")
 Report = Callable[[int, int, float], None]
@@ -79,7 +80,7 @@ def _show(bar: Any, done: int, total: int, seconds: float) -> None:
 
 _BAR = {"unit": "cable", "desc": "fitting", "bar_format": "{desc} {n_fmt} of {total_fmt} cables, {elapsed}{postfix}"}
 WATCH = Watch("kept", "what is done is kept in", _BAR, _show)
-VERB = Verb(
+FLEET = Verb(
     fleet,
     _reply,
     """Fit many cables, inspected again and again.
@@ -101,4 +102,7 @@ VERB = Verb(
     results="fits",
     watch=WATCH,
     reads="fleet.toml",
+    referral="the folder holds a fleet: `bowdenfit fleet {folder}` reads, checks and fits all of its cables",
 )
+
+__all__ = ["FLEET", "POOL", "fleet"]

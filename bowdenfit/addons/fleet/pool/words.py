@@ -2,10 +2,10 @@
 
 import math
 
+from bowdenfit.addons.fleet.pool.answer import Effect, Life, Pool, PooledCable
 from bowdenfit.display import text_of
 from bowdenfit.inference.interval import Interval
 from bowdenfit.pages.section import HtmlPage, PageTable, Picture, prose_section
-from bowdenfit.questions.pool.answer import Effect, Life, Pool, PooledCable
 from bowdenfit.words import counted, decimals, few, filled, listed, percent, table
 
 HEADINGS = {

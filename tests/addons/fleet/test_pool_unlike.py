@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from test_pool_alarms import MEAN, SD, like_cables
 
-from bowdenfit.inference.population.sampling import PopulationDraws, draw_unpooled
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws, draw_unpooled
 
 pytestmark = pytest.mark.extended
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE, read_fleet_draws
+from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_TABLE, read_fleet_draws
 
-FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+FLEET = Path(__file__).parents[3] / "datasets" / "synthetic-fleet"
 
 
 def some(folder: Path, rows) -> Path:

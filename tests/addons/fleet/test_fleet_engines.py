@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
-from bowdenfit.inference.engines import make_slurm_executor
-from bowdenfit.questions.fleet.store import PIECES_FOLDER
-from bowdenfit.questions.simulate.fleet import read_fleet_plan, simulate_fleet, write_fleet
-from bowdenfit.results.fleet_folder import FLEET_DRAWS
+from bowdenfit.addons.fleet.clusters import make_slurm_executor
+from bowdenfit.addons.fleet.folder import FLEET_DRAWS
+from bowdenfit.addons.fleet.simulation import read_fleet_plan, simulate_fleet, write_fleet
+from bowdenfit.addons.fleet.store import PIECES_FOLDER
 
 pytestmark = pytest.mark.extended
 
-BENCH = Path(__file__).parents[2] / "datasets" / "synthetic-fleet" / "bench.toml"
+BENCH = Path(__file__).parents[3] / "datasets" / "synthetic-fleet" / "bench.toml"
 SEED = 7
 MORE = {  # a contact that hardly any run tells from the others
     "[tables]": '[[contact]]\nname = "clamp"\nfriction = "mu_clamp"\nwrap_angle = { column = "clamp_angle" }\n\n[tables]',

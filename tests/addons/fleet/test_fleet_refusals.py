@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_TABLE
+from bowdenfit.addons.fleet.inspections import read_cases, read_inspections
+from bowdenfit.addons.fleet.store import PIECES_FOLDER, FleetStore
 from bowdenfit.inference import engines
 from bowdenfit.inference.engines import Engine, EngineError, installed_versions
-from bowdenfit.questions.fleet.inspections import read_cases, read_inspections
-from bowdenfit.questions.fleet.store import PIECES_FOLDER, FleetStore
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_TABLE
 
 pytestmark = pytest.mark.extended
 
-FLEET = Path(__file__).parents[2] / "datasets" / "synthetic-fleet"
+FLEET = Path(__file__).parents[3] / "datasets" / "synthetic-fleet"
 HEADING, *ROWS = (FLEET / FLEET_TABLE).read_text().splitlines()
 
 
@@ -160,7 +160,7 @@ def test_a_scheduler_without_workers_is_a_sentence(monkeypatch):
 def test_a_worker_with_other_versions_is_refused(fleet, monkeypatch):
     """The work says with which versions it was made."""
     installed = installed_versions()
-    monkeypatch.setattr("bowdenfit.questions.fleet.fitting.installed_versions", lambda: installed | {"jax": "0.0.1"})
+    monkeypatch.setattr("bowdenfit.addons.fleet.fitting.installed_versions", lambda: installed | {"jax": "0.0.1"})
     with pytest.raises(bf.UsageError, match=r"a worker has other versions: jax .* \(here 0\.0\.1\)"):
         bf.fleet(fleet(ROWS[0]), seed=1)
 

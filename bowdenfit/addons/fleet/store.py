@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.errors import StoreError
 from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import damage_as
 from bowdenfit.outputs import write_text
-from bowdenfit.results.fleet_folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
 from bowdenfit.results.folder import (
     SUMMARY_TEXT,
     folder_to_write,

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from bowdenfit.addons.fleet.folder import FleetDraws
+from bowdenfit.addons.fleet.inspections import Case, read_cases, read_inspections
+from bowdenfit.addons.fleet.pool.answer import ExcludedFit
+from bowdenfit.addons.fleet.population.likelihoods import JointReadings, Summaries, summarize_likelihoods
+from bowdenfit.addons.fleet.population.model import REFERENCE_TEMPERATURE, Inspections
+from bowdenfit.addons.fleet.population.sampling import PopulationDraws
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.population.likelihoods import JointReadings, Summaries, summarize_likelihoods
-from bowdenfit.inference.population.model import REFERENCE_TEMPERATURE, Inspections
-from bowdenfit.inference.population.sampling import PopulationDraws
-from bowdenfit.questions.fleet.inspections import Case, read_cases, read_inspections
-from bowdenfit.questions.pool.answer import ExcludedFit
 from bowdenfit.reading import Reading
-from bowdenfit.results.fleet_folder import FleetDraws
 from bowdenfit.words import counted, few, listed
 
 FRICTION = "friction"  # the role of what is pooled

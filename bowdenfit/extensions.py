@@ -19,6 +19,9 @@ from bowdenfit.child_process import package_folders
 VERBS = "bowdenfit.verbs"  # group of entry points, of a `Verb` each
 KINDS = "bowdenfit.kinds"  # of a subclass of `Kind` each
 CLUSTERS = "bowdenfit.engines"  # of a `Cluster` each
+EXPORTS = "bowdenfit.exports"  # of an `ExportFormat` each
+CONTROLLERS = "bowdenfit.controllers"  # of a function each, which gives parameters of a controller by fit and device.toml
+SCHEMAS = "bowdenfit.schemas"  # of a model of pydantic each, by the name of its file
 SIMULATIONS = "bowdenfit.simulations"  # of a function each, with the arguments and the answer of `make_data_set`
 _OURS, _GROUPS = "bowdenfit", "bowdenfit."
 

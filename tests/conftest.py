@@ -45,7 +45,7 @@ NEW = keep_what_is_compiled()  # before anything large is loaded
 from jaxtyping import install_import_hook  # noqa: E402
 
 # The rooms whose functions are about arrays. They are loaded when they are first needed, so that the hook stays.
-CHECKED = ("physics", "cable", "recordings", "kinds", "device")
+CHECKED = ("physics", "cable", "recordings", "kinds", "addons.device.mechanics")
 install_import_hook([f"bowdenfit.{room}" for room in CHECKED], "type_checks.check")
 
 import jax  # noqa: E402

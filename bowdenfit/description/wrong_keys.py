@@ -7,7 +7,6 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from bowdenfit.description import SCHEMA, QuantityValue
-from bowdenfit.description.device_keys import KEYS
 from bowdenfit.errors import BowdenfitError, DescriptionError, combine_errors, suggest_name
 from bowdenfit.words import shown
 
@@ -24,7 +23,12 @@ _LARGE = 1e15  # a number that nobody measures
 
 
 def explain_validation_error(
-    error: ValidationError, raw: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str = _INIT
+    error: ValidationError,
+    raw: Mapping[str, Any],
+    model: type[BaseModel],
+    file: str,
+    remedy: str = _INIT,
+    units: Mapping[str, str] | None = None,
 ) -> BowdenfitError:
     """Return all that is wrong with the keys of a file.
 
@@ -34,12 +38,13 @@ def explain_validation_error(
         model: Model of the file.
         file: Its name.
         remedy: Fix for a missing key.
+        units: Units of quantities by key, for examples of how to write one.
     """
     faults: list[BowdenfitError] = []
     for number, cause in enumerate(_causes(error, raw, model)):
         of = model if number < _MOST_UNKNOWN else BaseModel
         for message in cause["msg"].removeprefix("Value error, ").splitlines():
-            fault = DescriptionError(_sentence({**cause, "msg": message}, of, file, remedy))
+            fault = DescriptionError(_sentence({**cause, "msg": message}, of, file, remedy, units or {}))
             fault.key_path = tuple(cause["loc"])
             faults.append(fault)
     return combine_errors(faults)
@@ -76,7 +81,7 @@ def _written(place: Sequence[str | int], raw: Any) -> tuple[str | int, ...]:
     return tuple(keys)
 
 
-def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str) -> str:
+def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remedy: str, units: Mapping[str, str]) -> str:
     """Return what is wrong with one key."""
     where = [str(part) for part in error["loc"]]
     parts = [part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]}..." for part in where]
@@ -84,11 +89,11 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     if error["type"] == "extra_forbidden":
         return f"{file}: unknown key {shown('.'.join(where))}{suggest_name(where[-1][:80], _siblings(model, where[:-1]))}"
     if error["type"] == "missing" and where[-1] == "unit" and isinstance(error["input"], dict):
-        return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1])}."
+        return f"{place}: the unit is missing; write one, such as {_with_unit(error['input'].get('value'), where[:-1], units)}."
     if error["type"] == "missing":
         return f"{file}: the key {'.'.join(where)!r} is missing; {remedy}."
     if error["type"] == "model_type":
-        return f"{place}: {_written_as(error, where)}"
+        return f"{place}: {_written_as(error, where, units)}"
     if error["type"] == "too_long":
         most = error["ctx"]["max_length"]
         remedy = _FEWER.get(where[-1], "keep the entries that matter")
@@ -101,20 +106,20 @@ def _sentence(error: Mapping[str, Any], model: type[BaseModel], file: str, remed
     return sentence if sentence.endswith((".", "?")) else f"{sentence}."
 
 
-def _written_as(error: Mapping[str, Any], where: Sequence[str]) -> str:
+def _written_as(error: Mapping[str, Any], where: Sequence[str], units: Mapping[str, str]) -> str:
     """Return how to write what must be a table of keys."""
     value = error["input"]
     if error.get("ctx", {}).get("class_name") == QuantityValue.__name__:
-        return f"a number needs its unit (found {shown(value)}); write it as {_with_unit(value, where)}."
+        return f"a number needs its unit (found {shown(value)}); write it as {_with_unit(value, where, units)}."
     how = f"under [{where[0]}]" if len(where) == 1 else "between braces, { key = ... }"
     return f"this holds keys of its own (found {shown(value)}); write them {how}."
 
 
-def _with_unit(value: Any, where: Sequence[str]) -> str:
+def _with_unit(value: Any, where: Sequence[str], units: Mapping[str, str]) -> str:
     """Return a number with a unit that fits its place, as TOML."""
     number = value if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGE else 20
     key = ".".join(where)
-    unit = KEYS[key].example.split('"')[1] if key in KEYS else "mm"
+    unit = units.get(key, "mm")
     unit = "deg" if "angle" in key else "N" if "force" in key or key == "preload.value" else unit
     return f'{{ value = {number}, unit = "{unit}" }}'
 

@@ -11,10 +11,10 @@ from fuzzing import ROOT, Outcome, Wrong, meet
 from mangled_inputs import DESCRIPTIONS, ODD_CELLS, TABLES
 
 import bowdenfit as bf
+from bowdenfit.addons.device.description import read_device
+from bowdenfit.addons.device.description_keys import KEYS
 from bowdenfit.addons.fleet.inspections import read_cases, read_inspections, refuse_if_none_usable
 from bowdenfit.addons.metabolic.answer import metabolic_text
-from bowdenfit.description.device import read_device
-from bowdenfit.description.device_keys import KEYS
 from bowdenfit.results.serialization import plain_data
 
 INSPECTIONS = 3  # of the fleet that is mangled

@@ -161,7 +161,8 @@ def show_files(name: str) -> None:
     with section("Files", "kept-files"):
         _show_links([(words, address("kept", name, file)) for words, file in kept])
         text("For other programs:")
-        _show_links([(capitalized(words), address("export", name, target)) for target, words in export_room.NAMES.items()])
+        formats = export_room.load_formats().items()
+        _show_links([(capitalized(of.words), address("export", name, target)) for target, of in formats])
 
 
 def _show_links(links: Sequence[tuple[str, str]]) -> None:
@@ -183,7 +184,14 @@ def export_file(fit: "Fit", target: str) -> tuple[str, bytes]:
         UsageError: There is no such format, or it cannot express the cable.
     """
     with TemporaryDirectory() as folder:
-        needs_callback = target == "mujoco" and not fit.model.cable.is_loop
-        name = f"cable{export_room.CALLBACK_ENDING if needs_callback else export_room.ENDINGS.get(target, '')}"
+        name = f"cable{_find_ending(fit, target)}"
         export(fit, cast("Target", target), output=Path(folder) / name)
         return name, (Path(folder) / name).read_bytes()
+
+
+def _find_ending(fit: "Fit", target: str) -> str:
+    """Return the ending of an exported file; empty for a format that there is none of."""
+    export_format = export_room.load_formats().get(target)
+    if export_format is None:
+        return ""
+    return (not fit.model.cable.is_loop and export_format.callback_ending) or export_format.ending

@@ -1,5 +1,3 @@
-from .writers import CALLBACK_ENDING as CALLBACK_ENDING
-from .writers import ENDINGS as ENDINGS
-from .writers import NAMES as NAMES
 from .writers import ExportOptions as ExportOptions
 from .writers import export_fit as export_fit
+from .writers import load_formats as load_formats

@@ -32,14 +32,15 @@ def ascii_text(text: str) -> str:
     return text_out
 
 
-def fill_template(name: str, **values: object) -> str:
-    """Return a template of this folder with its places filled.
+def fill_template(name: str, *, package: str = "bowdenfit.questions.export", **values: object) -> str:
+    """Return a template with its places filled.
 
     Args:
         name: Name of the file.
+        package: Package in whose folder `templates` it lies.
         values: By the name of the place.
     """
-    text = files("bowdenfit.questions.export").joinpath("templates", name).read_text(encoding="utf-8")
+    text = files(package).joinpath("templates", name).read_text(encoding="utf-8")
     return Template(text).substitute(values)
 
 

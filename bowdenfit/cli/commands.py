@@ -56,6 +56,9 @@ LOOK: dict[str, Any] = {  # of every command
 }
 
 
+_READING_PARAMETERS = parse(Reading.__doc__ or "").params  # which several verbs share
+
+
 def command(verb: Verb) -> App:
     """Return the command of a verb: a function with the signature that cyclopts reads, which asks the verb.
 
@@ -79,7 +82,7 @@ def command(verb: Verb) -> App:
 
 def _command_signature(verb: Verb) -> Signature:
     """Return the signature that cyclopts reads: the function's parameters, and --csv and --json."""
-    described = [*parse(Reading.__doc__ or "").params, *parse(verb.function.__doc__ or "").params]
+    described = [*_READING_PARAMETERS, *parse(verb.function.__doc__ or "").params]
     words = {parameter.arg_name: " ".join((parameter.description or "").split()) for parameter in described}
     declared = parameters_of(verb.function).items()
     parameters = [

@@ -234,9 +234,10 @@ def _find_cluster(engine: str) -> tuple[Cluster, str]:
     cluster = load_extension(CLUSTERS, name)
     if isinstance(cluster, Cluster) and bool(separator) == ("://" in cluster.written):
         return cluster, address
-    *others, last = "local", *(cluster.written for _, cluster in iterate_extensions(CLUSTERS) if isinstance(cluster, Cluster))
-    known = f"{', '.join(others)} or {last}" if others else last
-    raise UsageError(f"there is no engine {shown(engine)}; known here: {known}.")
+    clusters = [cluster.written for _, cluster in iterate_extensions(CLUSTERS) if isinstance(cluster, Cluster)]
+    *first, last = "local", *clusters
+    engines = f"{', '.join(first)} or {last}" if first else last
+    raise UsageError(f"there is no engine {shown(engine)}; known here: {engines}.")
 
 
 def _make_process_pool(count: int) -> Executor:

@@ -18,9 +18,9 @@ from mangled_bytes import mangled
 
 import bowdenfit as bf
 from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
+from bowdenfit.addons.fleet.pieces import PieceFit
 from bowdenfit.addons.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.dataset import Dataset
-from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.checkpoint import append_record, read_records
 from bowdenfit.inference.engines import installed_versions
 from bowdenfit.inference.ensemble import CheckpointedBackend

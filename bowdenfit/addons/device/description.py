@@ -239,7 +239,7 @@ def read_device(path: Path) -> Device:
     try:
         device = Device.model_validate(raw)
     except ValidationError as error:
-        units = {key: known.example.split('"')[1] for key, known in KEYS.items()}
+        units = {key: entry.example.split('"')[1] for key, entry in KEYS.items()}
         raise explain_validation_error(error, raw, Device, path.name, 'write it, such as name = "knee"', units) from None
     faults = Faults()
     for key, stated in _quantities(device):

@@ -16,11 +16,11 @@ import numpy as np
 from bowdenfit.addons.fleet.answer import FailedInspection, FittedInspection, Fleet, fleet_text
 from bowdenfit.addons.fleet.folder import CHECKSUM, FLEET_DRAWS, FLEET_PAGE, FleetDraws, write_fleet_draws
 from bowdenfit.addons.fleet.inspections import Case, Inspection, read_cases, refuse_if_none_usable
+from bowdenfit.addons.fleet.pieces import Example, Piece, PieceFit, fit_piece
 from bowdenfit.addons.fleet.store import SEPARATOR, FleetStore, read_start
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import StoreError, UsageError
-from bowdenfit.inference.batch.pieces import Example, Piece, PieceFit, fit_piece
 from bowdenfit.inference.batch.programs import CHUNK, BatchSettings
 from bowdenfit.inference.draws import derived_units
 from bowdenfit.inference.engines import JOBS_FOLDER, Engine, installed_versions, open_engine

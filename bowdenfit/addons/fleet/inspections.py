@@ -10,6 +10,7 @@ from typing import Any
 
 from bowdenfit.addons.fleet.answer import FailedInspection
 from bowdenfit.addons.fleet.folder import COLUMNS, FLEET_DESCRIPTION, FLEET_TABLE
+from bowdenfit.addons.fleet.pieces import input_hash
 from bowdenfit.arguments import LARGEST_SEED
 from bowdenfit.dataset import DESCRIPTION_FILE, Dataset, read_dataset
 from bowdenfit.description import Description
@@ -18,7 +19,7 @@ from bowdenfit.files.cells import Cell
 from bowdenfit.files.columns import Column, Quantity, find_columns, require_column
 from bowdenfit.files.headings import parse_sources
 from bowdenfit.files.tables import RawTable, read_table
-from bowdenfit.inference.batch.pieces import ShapedDataset, input_hash, shape_dataset
+from bowdenfit.inference.batch.shaped_data import ShapedDataset, shape_dataset
 from bowdenfit.inputs import refuse_special
 from bowdenfit.kinds.descriptions import load_description
 from bowdenfit.reading import Reading, changed_settings, read

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_PAGE, FleetDraws, read_fleet_draws
+from bowdenfit.addons.fleet.pieces import PieceFit
 from bowdenfit.errors import StoreError
-from bowdenfit.inference.batch.pieces import PieceFit
 from bowdenfit.inference.engines import JOBS_FOLDER
 from bowdenfit.inputs import damage_as
 from bowdenfit.outputs import write_text

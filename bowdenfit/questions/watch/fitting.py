@@ -19,8 +19,8 @@ from bowdenfit.dataset import Dataset
 from bowdenfit.description import SamplerSettings
 from bowdenfit.errors import ConvergenceError
 from bowdenfit.inference.batch.fitting import fit_batch
-from bowdenfit.inference.batch.pieces import ScaledDensity, ShapedDataset, shape_dataset
 from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
+from bowdenfit.inference.batch.shaped_data import ScaledDensity, ShapedDataset, shape_dataset
 from bowdenfit.inference.compilation import compile_program
 from bowdenfit.inference.draws import BATCH, compile_replicator, curves_at, imply_groups, run_in_batches, shown_values
 from bowdenfit.inference.engines import installed_versions

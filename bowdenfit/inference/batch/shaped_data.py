@@ -1,27 +1,20 @@
-"""Pieces of a fleet's work: which data sets one program serves, and what a worker does with some of them.
+"""Data sets in a form that one program serves: which ones share it, and the data that tell them apart.
 
 Default priors of quantities with a unit are proportional to the size of the measurements, so every data set has priors of its
 own. Here the priors have unit scale, and the scale is one more array of the data: z, and the density in z, are the same.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from bowdenfit.cable.cable import Cable
-from bowdenfit.dataset import DESCRIPTION_FILE, Dataset
-from bowdenfit.inference.batch.fitting import BatchFit, fit_batch
-from bowdenfit.inference.batch.programs import BatchPrograms, BatchSettings
-from bowdenfit.inference.compilation import compile_program
-from bowdenfit.inference.draws import derived_units, shown_values
-from bowdenfit.inference.engines import refuse_other_versions
+from bowdenfit.dataset import Dataset
 from bowdenfit.inference.log_density import LogDensity
 from bowdenfit.kinds.term import Term
 from bowdenfit.models import Model, build_model
@@ -30,8 +23,6 @@ from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 _IRRELEVANT_KEYS = {"name", "source", "license", "file", "files"}  # keys of a description that do not affect a fit
 _DATA_FIELDS = ("cable", "data", "labels", "rows")  # fields of a term that are data, or enter the key by themselves
-DRAWS = 2048  # draws of each data set, of equal weight
-_SHUFFLE_STREAM = 3  # stream of random numbers that shuffles draws
 
 
 @dataclass(frozen=True)
@@ -123,10 +114,10 @@ def _program_key(posterior: ScaledDensity) -> str:
     """Return a digest of what a program depends on: shapes, parameters, description, and conditions where they matter."""
     shapes = jax.tree.map(lambda array: (np.shape(array), str(np.asarray(array).dtype)), posterior.data)
     terms = [_describe_term(term) for term in posterior.model.terms]
-    description = _relevant_parts(posterior.model.description.to_json())
+    description = drop_irrelevant_keys(posterior.model.description.to_json())
     cable = posterior.model.cable
     key = f"{shapes} {posterior.model.space.parameters} {description} {terms} {dict(cable.nominal)}"
-    return _digest(f"{key} {cable.friction.conditions}" if _conditions_matter(posterior.model) else key)
+    return digest(f"{key} {cable.friction.conditions}" if _conditions_matter(posterior.model) else key)
 
 
 def _conditions_matter(model: Model) -> bool:
@@ -134,21 +125,11 @@ def _conditions_matter(model: Model) -> bool:
     return any(getattr(term, "depends_on_conditions", True) for term in model.terms)
 
 
-def input_hash(dataset: Dataset) -> str:
-    """Return a digest of what was measured and how it is described, independent of its name and folder.
-
-    Args:
-        dataset: A data set read from files.
-    """
-    read = [checksum for name, checksum in dataset.sha256.items() if name != DESCRIPTION_FILE]
-    return _digest(f"{_relevant_parts(dataset.description.to_json())} {read}")
-
-
-def _relevant_parts(page: Any) -> Any:
+def drop_irrelevant_keys(page: Any) -> Any:
     """Return a description without the keys that do not affect a fit."""
     if isinstance(page, Mapping):
-        return {key: _relevant_parts(value) for key, value in page.items() if key not in _IRRELEVANT_KEYS}
-    return [_relevant_parts(item) for item in page] if isinstance(page, list | tuple) else page
+        return {key: drop_irrelevant_keys(value) for key, value in page.items() if key not in _IRRELEVANT_KEYS}
+    return [drop_irrelevant_keys(item) for item in page] if isinstance(page, list | tuple) else page
 
 
 def _describe_term(term: Term) -> str:
@@ -162,106 +143,9 @@ def _describe_term(term: Term) -> str:
 
 
 def _leaf(leaf: Any) -> str:
-    return _digest(leaf.tobytes().hex()) if isinstance(leaf, np.ndarray) else repr(leaf)
+    return digest(leaf.tobytes().hex()) if isinstance(leaf, np.ndarray) else repr(leaf)
 
 
-def _digest(text: str) -> str:
+def digest(text: str) -> str:
+    """Return 32 hexadecimal digits that stand for a text."""
     return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-@dataclass(frozen=True)
-class Example:
-    """A data set that a program can be compiled for; any data set of one key will do.
-
-    Args:
-        key: See `ShapedDataset`.
-        dataset: One of the data sets with this key.
-    """
-
-    key: str
-    dataset: Dataset = field(compare=False)
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Data sets of one shape, a unit of work.
-
-    Args:
-        example: Data set that the program is compiled for.
-        settings: Sampler settings and targets.
-        names: Name of each data set.
-        data: Data of each, see `ShapedDataset`.
-        seeds: Seed of each.
-        versions: Versions of the libraries where the work comes from.
-    """
-
-    example: Example
-    settings: BatchSettings
-    names: tuple[str, ...]
-    data: tuple[Any, ...]
-    seeds: tuple[int, ...]
-    versions: dict[str, str]
-
-
-@dataclass(frozen=True)
-class PieceFit:
-    """The fit of one data set of a piece.
-
-    Args:
-        name: Name of the data set.
-        values: Shuffled draws of equal weight by quantity in shown units, (quantity, draw); empty where nothing can be
-            computed.
-        engine: "laplace", "ensembles" or "nuts".
-        pareto_k: See `BatchFit`.
-        n_effective: Effective sample size of the worst parameter.
-        reasons: Why the draws should not be trusted; empty if they can be.
-    """
-
-    name: str
-    values: np.ndarray
-    engine: str
-    pareto_k: float
-    n_effective: float
-    reasons: tuple[str, ...]
-
-
-def fit_piece(piece: Piece) -> list[PieceFit]:
-    """Fit each data set of a piece; each fit depends on its own data, its seed and the settings alone.
-
-    Args:
-        piece: The data sets.
-
-    Raises:
-        UsageError: The work comes from a program of other versions.
-    """
-    refuse_other_versions(piece.versions)
-    with jax.enable_x64(True):
-        programs, values_of = _compile(piece.example, piece.settings)
-        fits = fit_batch(programs.posterior, piece.data, piece.seeds, programs=programs)
-        every = zip(piece.names, piece.data, piece.seeds, fits, strict=True)
-        return [_make_piece_fit(name, data, seed, fit, values_of) for name, data, seed, fit in every]
-
-
-@lru_cache(maxsize=8)
-def _compile(example: Example, settings: BatchSettings) -> tuple[BatchPrograms, Callable[..., Any]]:
-    """Compile the programs that serve all pieces of one shape."""
-    posterior = shape_dataset(example.dataset).posterior
-    model = posterior.model
-
-    def stack_shown_values(z: Array, data: Any) -> Array:
-        values = shown_values(model, posterior.values(z, data))
-        names = [*(p.name for p in model.space.free), *derived_units(model)]
-        return jnp.stack([values[name] for name in names])
-
-    rows = jax.ShapeDtypeStruct((DRAWS, model.space.size), jnp.float64)
-    return BatchPrograms(posterior, settings), compile_program(jax.vmap(stack_shown_values, (0, None), 1), rows, posterior.data)
-
-
-def _make_piece_fit(name: str, data: Any, seed: int, fit: BatchFit, values_of: Callable[..., Any]) -> PieceFit:
-    """Return a fit as named values of a fixed number of draws."""
-    n_effective = min((min(d.ess_bulk, d.ess_tail) for d in fit.diagnostics.values()), default=0.0)
-    if not len(fit.z):
-        return PieceFit(name, np.zeros((0, 0)), fit.engine, fit.pareto_k, n_effective, fit.reasons)
-    order = np.random.default_rng([seed, _SHUFFLE_STREAM]).permutation(len(fit.z))
-    z = fit.z[np.resize(order, DRAWS)]
-    return PieceFit(name, np.asarray(values_of(z, data)), fit.engine, fit.pareto_k, float(n_effective), fit.reasons)

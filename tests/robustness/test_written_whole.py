@@ -3,11 +3,12 @@
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet import simulation as fleet
 from bowdenfit.errors import DiskError
 from bowdenfit.plots import write
 from bowdenfit.plots.layout import empty_page
 from bowdenfit.questions.check import show_priors
-from bowdenfit.questions.simulate import fleet, tables
+from bowdenfit.questions.simulate import tables
 from bowdenfit.questions.writing import write_answer
 from bowdenfit.results.folder import fill_folder_atomically
 

@@ -11,8 +11,9 @@ PROGRAM = Path(sys.executable).with_name("bowdenfit")
 CAUGHT = "CAUGHT"
 # What is imported only for some files, engines and targets, whether or not it is installed.
 OPTIONAL = (
-    "asammdf", "bowdenfit", "dask", "distributed", "fastapi", "h5netcdf", "h5py", "matplotlib", "multiprocessing", "nicegui",
-    "nptdms", "openpyxl", "pyarrow", "rosbags", "scipy", "sitecustomize", "submitit", "tempfile", "usercustomize", "uvicorn",
+    "asammdf", "bowdenfit", "dask", "distributed", "entrypoint", "fastapi", "h5netcdf", "h5py", "matplotlib", "multiprocessing",
+    "nicegui", "nptdms", "openpyxl", "pyarrow", "rosbags", "scipy", "sitecustomize", "submitit", "tempfile", "usercustomize",
+    "uvicorn",
 )  # fmt: skip
 _IMPORTS = """
 import os, sys
@@ -39,6 +40,11 @@ def set_traps(folder: Path, scratch: Path) -> Path:
     for name in names:
         note = f"open({str(folder / CAUGHT)!r}, 'a').write('{name}\\n')\n"
         (folder / f"{name}.py").write_text(note)
+    metadata = folder / "entrypoint-1.0.dist-info"  # as of an installed package
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: entrypoint\nVersion: 1.0\n")
+    groups = ("verbs", "kinds", "engines", "exports", "controllers", "schemas", "simulations")
+    (metadata / "entry_points.txt").write_text("".join(f"[bowdenfit.{group}]\ntrap = entrypoint:TRAP\n" for group in groups))
     (folder / ".nicegui").mkdir()
     for settings in ("matplotlibrc", "arvizrc", ".nicegui/storage-general.json"):
         os.mkfifo(folder / settings)  # over which the library that reads it would wait for ever

@@ -251,8 +251,7 @@ def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Seq
     model = posterior.model
     cable = model.cable.departing(tested)
     terms: list[Any] = [replace(cast("Any", term), cable=cable) for term in model.terms]
-    values = {p.name: p.fixed or 0.0 for p in model.space.fixed}
-    values |= dict(zip((p.name for p in model.space.free), solution["values"], strict=True))
+    values = model.space.named(jnp.asarray(solution["values"]))
     curves = [cable.curves[column] for column in tested]
 
     def residuals(weights: Array, data: Any) -> Array:

@@ -32,8 +32,9 @@ pytestmark = pytest.mark.extended
 ROOT = Path(__file__).parents[2]
 SETS = sorted(path.parent for path in (ROOT / "datasets").glob("*/cable.toml"))
 FILES = {
-    path.stem: importlib.import_module(f"bowdenfit.questions.{path.parent.name}.{path.stem}")
-    for path in (ROOT / "bowdenfit" / "questions").glob("*/*_figure.py")
+    path.stem: importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    for folder in ("questions", "addons")
+    for path in (ROOT / "bowdenfit" / folder).rglob("*_figure.py")
 }
 LONG = "a_cable_with_a_name_that_is_as_long_as_names_of_files_may_well_be_in_some_laboratories"
 NAME = LONG.replace("_", " ")  # of a cable; those of fits are names of folders, and shown as they are

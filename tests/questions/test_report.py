@@ -213,7 +213,7 @@ def test_a_folder_that_is_no_fit_or_was_edited_is_refused(refuse, tmp_path):
     assert "does not exist" in refuse("report", tmp_path / "nowhere")
     (tmp_path / "fit").mkdir()
     assert "is not a results folder" in refuse("report", tmp_path / "fit")
-    (tmp_path / "fit" / "fit.json").write_text('{"schema": 6, "description": 3}')
+    (tmp_path / "fit" / "fit.json").write_text('{"schema": 7, "description": 3}')
     assert "damaged)" in refuse("report", tmp_path / "fit")
 
 

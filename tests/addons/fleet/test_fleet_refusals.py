@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import bowdenfit as bf
+from bowdenfit.addons.fleet import clusters
 from bowdenfit.addons.fleet.folder import FLEET_DRAWS, FLEET_TABLE
 from bowdenfit.addons.fleet.inspections import read_cases, read_inspections
 from bowdenfit.addons.fleet.store import PIECES_FOLDER, FleetStore
@@ -59,7 +60,7 @@ def test_a_wrong_table_is_refused_and_nothing_is_written(refuse, fleet, tmp_path
 )
 def test_an_engine_that_cannot_be_had_leaves_nothing_behind(run, fleet, tmp_path, monkeypatch, engine, code, message):
     monkeypatch.setenv("PATH", str(tmp_path))  # no Slurm on any machine
-    monkeypatch.setattr(engines, "_CONNECT_SECONDS", 1.0)
+    monkeypatch.setattr(clusters, "_CONNECT_SECONDS", 1.0)
     results = tmp_path / "results"
     exit_code, _, error = run("fleet", fleet(ROWS[0]), "-o", results, "--engine", engine)
     assert exit_code == code and message in " ".join(error.split()) and "Traceback" not in error

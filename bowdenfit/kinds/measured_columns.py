@@ -88,7 +88,8 @@ def find_cut_off(column: MeasuredColumn) -> tuple[np.ndarray, np.ndarray]:
         tied = there & np.isclose(values, np.max(values, where=there, initial=-np.inf), rtol=1e-9, atol=0.0)
         remaining = column.values[there & ~tied & (values != 0)]
         repeats = np.unique(remaining.round(12), return_counts=True)[1]
-        few_others = len(np.unique(remaining)) < _FEWEST or tied.sum() < max(_FEWEST, _RARER * (repeats.max(initial=1) - 1))
+        fewest = max(_FEWEST, _RARER * (int(repeats.max(initial=1)) - 1))
+        few_others = len(np.unique(remaining)) < _FEWEST or int(tied.sum()) < fewest
         rows = np.zeros(0, dtype=int)
         if not few_others and column.values[tied][0] != 0:
             if column.along is not None:

@@ -89,38 +89,35 @@ def _group_rows(table: ForceTable) -> list[_Group]:
     groups = list[_Group]()
     for angle in np.unique(degrees[sliding]):
         rows = sliding[degrees[sliding] == angle]
-        limit = max(
-            (
-                _split_loss(log_ratio[part], table.input_force[part])
-                for label in np.unique(labels[rows])
-                for run in np.unique(table.run[rows])
-                for part in [rows[(table.run[rows] == run) & (labels[rows] == label)]]
-            ),
-            default=float("nan"),
-            key=lambda loss: -np.inf if np.isnan(loss) else loss,
-        )
-        parts = [rows] if np.isnan(limit) else [rows[log_ratio[rows] < limit], rows[log_ratio[rows] >= limit]]
+        of_runs = [
+            rows[(table.run[rows] == run) & (labels[rows] == label)]
+            for label in np.unique(labels[rows])
+            for run in np.unique(table.run[rows])
+        ]
+        limits = [_split_loss(log_ratio[part], table.input_force[part]) for part in of_runs]
+        limit = max((limit for limit in limits if limit is not None), default=None)
+        parts = [rows] if limit is None else [rows[log_ratio[rows] < limit], rows[log_ratio[rows] >= limit]]
         groups += [
             _Group(part, float(np.deg2rad(angle)), float(np.median(log_ratio[part])), len(parts) > 1) for part in parts
         ]
     return groups
 
 
-def _split_loss(loss: Vector, load: Vector) -> float:
-    """Friction exponent between two parts of a run that differ by `_FACTOR` at equal loads; NaN if they do not."""
+def _split_loss(loss: Vector, load: Vector) -> float | None:
+    """Friction exponent between two parts of a run that differ by `_FACTOR` at equal loads; None if they do not."""
     order = np.argsort(loss)
     gaps = np.diff(loss[order])[_FEWEST - 1 : len(loss) - _FEWEST]
     if len(gaps) == 0:
-        return float("nan")
+        return None
     cut = int(np.argmax(gaps)) + _FEWEST
     low, high = order[:cut], order[cut:]
     squares = sum(float(np.sum((loss[part] - loss[part].mean()) ** 2)) for part in (low, high))
     scatter = np.sqrt(squares / max(len(loss) - 2, 1))
     if loss[order[0]] <= 0 or loss[high].min() < _FACTOR * loss[low].max() or np.max(gaps) < _CLEAR * scatter:
-        return float("nan")
+        return None
     pairs = np.abs(np.log(load[low][:, None] / load[high])) < _EQUAL_LOADS
     both = min(int(pairs.any(axis=1).sum()), int(pairs.any(axis=0).sum()))
-    return float(loss[high].min() + loss[low].max()) / 2 if both >= _FEWEST else float("nan")
+    return float(loss[high].min() + loss[low].max()) / 2 if both >= _FEWEST else None
 
 
 def _find_turns(groups: list[_Group]) -> list[int] | None:

@@ -118,7 +118,7 @@ def _groups_note(dataset: Dataset, coefficient: str) -> str:
 def collect_warnings(dataset: Dataset) -> list[str]:
     """Return warnings about what the measurements cannot determine, as far as counting shows."""
     description, measurements = dataset.description, dataset.measurements
-    warnings = [*describe_copied_readings(dataset), *describe_cut_off_readings(dataset), *describe_wrong_angles(dataset)]
+    warnings = list(describe_unusable_readings(dataset))
     free = [
         n
         for n in description.coefficients
@@ -143,6 +143,11 @@ def collect_warnings(dataset: Dataset) -> list[str]:
             'model = "stretch" under [preload] if it changes with the wrap angle.'
         )
     return warnings
+
+
+def describe_unusable_readings(dataset: Dataset) -> tuple[str, ...]:
+    """Describe copied and cut-off readings and wrong wrap angles, with remedies; a fit of such readings is not trusted."""
+    return describe_copied_readings(dataset) + describe_cut_off_readings(dataset) + describe_wrong_angles(dataset)
 
 
 def describe_copied_readings(dataset: Dataset) -> tuple[str, ...]:

@@ -34,11 +34,9 @@ from bowdenfit.kinds.fit_command import (
 from bowdenfit.kinds.recordings.kind import describe_preparations
 from bowdenfit.questions.check.data_set_words import (
     check_data_set,
-    describe_copied_readings,
-    describe_cut_off_readings,
     describe_first_and_last_rows,
     describe_row_account,
-    describe_wrong_angles,
+    describe_unusable_readings,
 )
 from bowdenfit.reading import Reading
 from bowdenfit.recordings.angle_channels import AngleChannel, find_angle_channels
@@ -255,8 +253,7 @@ def describe_table_file(
     lines += ["", *describe_row_account(account)]
     if data is not None:
         lines += [filled(f"Note: {remark}") for remark in data.measurements.remarks if remark not in account.remarks]
-        faults = (*describe_copied_readings(data), *describe_cut_off_readings(data), *describe_wrong_angles(data))
-        lines += [filled(f"Warning: {sentence}") for sentence in faults]
+        lines += [filled(f"Warning: {sentence}") for sentence in describe_unusable_readings(data)]
     if obstacle:
         lines += ["", *map(filled, f"As it stands it cannot be fitted: {obstacle}".splitlines())]
     return "\n".join([*lines, "", *describe_commands(commands, usable)]) + "\n"

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 from forged_fits import sealed
 from fuzzing import SLOWEST, Outcome, Wrong, ended_in_time
-from fuzzing_results import ODD_ARRAYS, other_json
+from fuzzing_results import ODD_ARRAYS, other_arrays, other_json
 
 from bowdenfit import cli
 from bowdenfit.results.answer_cache import file_checksum
@@ -56,15 +56,7 @@ def forge(chance: random.Random, folder: Path) -> str:
     elif way == "draws":
         forge_draws(chance, folder / "posterior.nc")
     elif way == "figures":
-        with np.load(folder / "figures.npz") as file:
-            arrays = dict(file)
-        name = chance.choice(list(arrays))
-        if name == "page":
-            text = other_json(chance, arrays[name].tobytes().decode())
-            arrays[name] = np.frombuffer(text.encode("utf-8", "surrogatepass"), np.uint8)
-        else:
-            arrays[name] = chance.choice(ODD_ARRAYS)
-        written = io.BytesIO()
+        arrays, written = other_arrays(chance, folder / "figures.npz"), io.BytesIO()
         chance.choice((np.savez, np.savez, np.savez, np.savez_compressed))(written, **arrays)
         if chance.random() < 0.2:
             np.save(folder / "figures.npy", np.zeros(1 << 20))

@@ -121,8 +121,8 @@ def _mangle_checkpoint(chance: random.Random, path: Path) -> None:
         append_record(path, record)
 
 
-def _mangle_arrays(chance: random.Random, path: Path) -> None:
-    """Other arrays in an archive of them."""
+def other_arrays(chance: random.Random, path: Path) -> dict[str, np.ndarray]:
+    """The arrays of an archive, one of them another."""
     with np.load(path) as file:
         arrays = dict(file)
     name = chance.choice(list(arrays))
@@ -131,8 +131,13 @@ def _mangle_arrays(chance: random.Random, path: Path) -> None:
         arrays[name] = np.frombuffer(text.encode("utf-8", "surrogatepass"), np.uint8)
     else:
         arrays[name] = chance.choice(ODD_ARRAYS)
+    return arrays
+
+
+def _mangle_arrays(chance: random.Random, path: Path) -> None:
+    """Other arrays in an archive of them."""
     written = io.BytesIO()
-    np.savez(written, **arrays)
+    np.savez(written, **other_arrays(chance, path))
     path.write_bytes(written.getvalue())
 
 

@@ -43,7 +43,7 @@ FAULTS = (
         "kinds/runs.py",
         "weights[RUN_SCATTER] ** 2 + from_angles",
         "0.0 * weights[RUN_SCATTER] ** 2 + from_angles",
-        ("tests/kinds/test_likelihoods.py", "tests/kinds/test_recorded_likelihoods.py"),
+        ("tests/kinds/test_likelihoods.py", "tests/kinds/recordings/test_recorded_likelihoods.py"),
     ),
     Fault(
         "likelihood: an angle too small to detect counts as one that is too large",
@@ -71,14 +71,14 @@ FAULTS = (
         "inference/interval.py",
         "(0.05, 0.5, 0.95)",
         "(0.1, 0.5, 0.9)",
-        ("tests/questions/test_predictions.py", "tests/inference/test_recovery.py", "tests/data_sets"),
+        ("tests/questions/length/test_predictions.py", "tests/inference/test_recovery.py", "tests/data_sets"),
     ),
     Fault(
         "prediction: the length that is best most often is ranked by the worst efficiency",
         "results/optimal_length.py",
         "best = efficiency.max(axis=1, keepdims=True)",
         "best = efficiency.min(axis=1, keepdims=True)",
-        ("tests/questions/test_predictions.py",),
+        ("tests/questions/length/test_predictions.py",),
     ),
 )
 

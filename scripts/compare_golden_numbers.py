@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 GOLDEN = (
-    "tests/questions/golden/*.txt",
+    "tests/questions/summary/golden/*.txt",
     "tests/data_sets/golden.json",
     "fits/published/*/*.txt",
     "fits/published/*/summary.json",
@@ -23,10 +23,17 @@ GOLDEN = (
 NUMBER = re.compile(r"#|(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")  # a mask, or no digit inside a name such as mu1
 
 
+def git(*arguments: str) -> str:
+    """Return what a command of Git prints."""
+    return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
 def text_at(commit: str, path: Path) -> str:
-    """Return the text of a file at a commit; empty where it was not there."""
-    shown = subprocess.run(["git", "show", f"{commit}:{path}"], cwd=ROOT, capture_output=True, text=True, check=False)
-    return shown.stdout if shown.returncode == 0 else ""
+    """Return the text of a file at a commit, or of the only file of its name there; empty where there was none."""
+    files = git("ls-tree", "-r", "--name-only", commit).splitlines()
+    same_name = [file for file in files if Path(file).name == path.name]
+    earlier = [str(path)] if str(path) in same_name else same_name
+    return git("show", f"{commit}:{earlier[0]}") if len(earlier) == 1 else ""
 
 
 def main() -> int:

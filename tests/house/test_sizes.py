@@ -1,7 +1,8 @@
-"""The house stays readable: no function longer than a page."""
+"""The house stays readable: no function longer than a page, and tests lie as what they test does."""
 
 import ast
 
+import pytest
 from conftest import ROOT
 
 LONGEST = 60  # lines, docstring included
@@ -15,3 +16,9 @@ def test_no_function_is_longer_than_a_page():
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.end_lineno - node.lineno >= LONGEST
     ]
     assert not long
+
+
+@pytest.mark.parametrize("room", ["questions", "kinds"])
+def test_tests_lie_in_folders_of_the_names_of_what_they_test(room):
+    for folder in {path.parent for path in (ROOT / "tests" / room).glob("*/test_*.py")}:
+        assert (ROOT / "bowdenfit" / room / folder.name).is_dir(), folder

@@ -26,7 +26,7 @@ from bowdenfit.recordings.rope_strokes import OPPOSED
 from bowdenfit.types import Flags, Labels, Vector
 from bowdenfit.words import percent, shown
 
-FALSE_ALARM = 1e-3  # healthy tables that are refused, at most; held by tests/kinds/test_gained_forces.py
+FALSE_ALARM = 1e-3  # healthy tables that are refused, at most; held by tests/kinds/forces/test_gained_forces.py
 _RARER = 1e-3  # factor on FALSE_ALARM for outliers, whose noise need not be normal; a judgement
 _FEWEST = 4  # degrees of freedom from which scatter estimates the noise, to about a third: 1 / sqrt(2 * 4)
 # Noise of a log ratio where no readings repeat: 2 % in each of two cells, as if known from six readings. A judgement.
@@ -36,7 +36,7 @@ _LEAST_FOR_LINE = 3  # readings of a cell above which a line with two coefficien
 
 
 # An output does not follow the input where its slope is surely below half of a rope's least, and the input explains less than
-# a quarter of its variance. Judgements, by which none of 3000 noisy benches is refused (tests/kinds/test_following.py).
+# a quarter of its variance. Judgements, by which none of 3000 noisy benches is refused (tests/kinds/forces/test_following.py).
 _WIDE = 0.3  # standard deviation of the loads of a run over their mean, from which the slope is looked at
 _SURE = 3.0  # standard errors of the slope
 _SLOPE = 0.5  # share of a rope's least slope

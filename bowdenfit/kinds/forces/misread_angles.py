@@ -13,7 +13,7 @@ from bowdenfit.kinds.forces.table import ForceTable
 from bowdenfit.types import Labels, Vector
 from bowdenfit.words import listed, percent
 
-# Judgements, by which none of 4000 healthy benches is named (tests/kinds/test_misread_angles.py).
+# Judgements, by which none of 4000 healthy benches is named (tests/kinds/forces/test_misread_angles.py).
 _FACTOR = 2.0  # friction of one part of a run over that of the other, at equal loads
 _CLEAR = 10.0  # the gap between both parts over the scatter inside them
 _FEWEST = 2  # readings of each part, and loads at which both were read

@@ -26,7 +26,8 @@ from bowdenfit.recordings.recording import Blocks, Recording, Recordings
 from bowdenfit.types import Labels, Vector
 
 RECORDED = "recorded_efficiency"  # name of the readings of recordings in results
-_QUIET = 0.1  # noise of a drift over the spread of drifts; more makes a delay seem small (tests/kinds/test_block_noise.py)
+# Noise of a drift over the spread of drifts; more makes a delay seem small (tests/kinds/recordings/test_block_noise.py).
+_QUIET = 0.1
 _CORNER = 1  # blocks on both sides of a turn that its rate of change is taken from
 _LEAST_KNOWN = 1e-9  # share of a standing phase that is known, to keep weights positive
 _NEAR_LIMIT = 0.005  # distance from the end of a range, over it, at which a saturated reading stands; a judgement

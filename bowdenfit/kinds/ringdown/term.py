@@ -26,7 +26,7 @@ _TIMES = 1.5  # prior sd of damping and of friction over what would stop the joi
 # Shares of the first deflection: noise, as of an encoder of 2000 counts a turn, and the zero of a sensor; judgements.
 _NOISE_SHARE, _REST_SHARE = 0.005, 0.1
 # Starts in z: how many half swings friction leaves is a whole number, and each has a best fit of its own.
-# Three starts pass tests/kinds/test_ring_down_coverage.py.
+# Three starts pass tests/kinds/ringdown/test_ring_down_coverage.py.
 _STARTS = (-1.5, 0.0, 1.5)
 _LEAST = 1e-9  # least first estimate, because priors are positive
 _LARGE = 0.15  # share of the first swing above which one counts; smaller ones are mostly noise. A judgement

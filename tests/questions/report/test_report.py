@@ -15,7 +15,7 @@ from bowdenfit.results.folder import REPORT
 
 pytestmark = pytest.mark.extended
 
-DATASETS = Path(__file__).parents[2] / "datasets"
+DATASETS = Path(__file__).parents[3] / "datasets"
 QUICK = ("sampler.n_walkers=64", "sampler.target_ess=200", "sampler.target_r_hat=1.05", "sampler.max_steps=4000")
 SHEETS = 6
 CHART = "#figure-{} .chart"

@@ -33,7 +33,7 @@ from bowdenfit.results.along_route import make_optimizer
 
 pytestmark = pytest.mark.extended
 
-FOLDER = Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop"
+FOLDER = Path(__file__).parents[3] / "datasets" / "synthetic-haptic-loop"
 TRUTH = json.loads((FOLDER / "truth.json").read_text())["truth"]
 
 

@@ -335,7 +335,7 @@ def test_what_is_proposed_where_nothing_is_offered_can_be_asked(on_body):
 
 
 def test_what_is_not_understood_is_answered_with_a_name_that_is(fit):
-    dataset = load_dataset(Path(__file__).parents[2] / "datasets" / "synthetic-haptic-loop")
+    dataset = load_dataset(Path(__file__).parents[3] / "datasets" / "synthetic-haptic-loop")
     loop = pretended(dataset, np.zeros(build_model(dataset).space.size), n=10)
     for of, kinds in ((fit, ("angle", "efficiency")), (loop, ("stretch", "preload", "loop"))):
         for kind in kinds:

@@ -9,7 +9,7 @@ import pytest
 
 import bowdenfit as bf
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 TOML = {"cable": "cable.toml", "device": "device.toml", "fleet": "fleet.toml"}
 SHIPPED = [(kind, path) for kind, name in TOML.items() for path in sorted((ROOT / "datasets").rglob(name))]
 

@@ -13,9 +13,9 @@ import numpy as np
 from jax import Array
 from jaxtyping import Float
 
-from bowdenfit.cable.departure import N_FUNCTIONS, departure_functions, departure_variances
+from bowdenfit.cable.departure import N_FUNCTIONS, VARIANCE_SHARES, departure_functions
 from bowdenfit.description import PriorDefaults, Route
-from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, Normal, Prior, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, JohnsonSU, Normal, Prior, Uniform
 from bowdenfit.parameters.space import Parameter
 from bowdenfit.parameters.symbols import make_symbol
 from bowdenfit.physics.geometry import (
@@ -51,40 +51,42 @@ class Curve(ABC):
         self.what = column.replace("_", " ")
         self.names = tuple(f"{column}_{ending}" for ending in self.coefficients)
         self.departs = departs
-        self.size_name = f"{column}_departure"
-        self.rms_name = f"{self.size_name}_rms"
-        self.weight_names = tuple(f"{self.size_name}_{number}" for number in range(1, N_FUNCTIONS + 1))
+        self.rms_name = f"{column}_departure_rms"
+        self.weight_names = tuple(f"{column}_departure_{number}" for number in range(1, N_FUNCTIONS + 1))
 
     @abstractmethod
     def parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
         """Parameters of the family's curve, with priors that may use the detected angles [rad]."""
 
     def departure_parameters(self, detected: Vector, defaults: PriorDefaults) -> tuple[Parameter, ...]:
-        """Size of the departure [rad] and the weights of its functions [1]; none if it does not depart."""
+        """Weights of the functions of the departure [rad], with priors of heavy tails; none if it does not depart.
+
+        Most weights are far below the scale of their prior and a few far above it, so that a departure vanishes where the
+        family fits; no parameter for its size is needed, which would be a funnel.
+        """
         if not self.departs:
             return ()
-        prior, unit = HalfNormal(defaults.departure_share * _median(detected, defaults)), ("deg", 1 / _DEGREE)
-        words, meaning = prior.text(*unit, digits=3), f"scale of the departure of the {self.what} from its curve"
-        size = Parameter(self.size_name, self._symbol("s"), meaning, "noise", prior, *unit, prior_words=words)
-        weights = (
+        scale = defaults.departure_share * _median(detected, defaults)
+        return tuple(
             Parameter(
-                name, self._symbol(f"w{number}"), f"weight {number} of the departure of the {self.what}", "departure",
-                Normal(0.0, 1.0),
+                name, self._symbol(f"w{number}"), f"weight {number} of the departure of the {self.what} from its curve",
+                "departure", JohnsonSU(scale * share), "deg", 1 / _DEGREE,
             )
-            for number, name in enumerate(self.weight_names, 1)
+            for number, (name, share) in enumerate(
+                zip(self.weight_names, np.sqrt(VARIANCE_SHARES), strict=True), 1
+            )
         )  # fmt: skip
-        return (size, *weights)
 
     def departure(self, values: Mapping[str, Array], z: Float[Array, " rows"]) -> Float[Array, " rows"]:
         """Departure from the family's curve [rad] at z."""
-        return values[self.size_name] * (departure_functions(z) @ self._weights(values))
+        functions = departure_functions(z)
+        return sum((values[name] * functions[..., i] for i, name in enumerate(self.weight_names)), jnp.zeros_like(z))
 
     def departure_rms(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """Root mean square of the departure over the range [deg], by name; none if it does not depart."""
         if not self.departs:
             return {}
-        mean_square = jnp.sum(departure_variances() * self._weights(values) ** 2)
-        return {self.rms_name: jnp.rad2deg(values[self.size_name] * jnp.sqrt(mean_square))}
+        return {self.rms_name: jnp.rad2deg(jnp.linalg.norm(self._weights(values)))}
 
     def departure_units(self) -> dict[str, tuple[str, str]]:
         """Unit and symbol of what `departure_rms` gives."""

@@ -161,7 +161,7 @@ class PriorDefaults(Frozen):
     curve_half_ranges: Positive = 1.0
     curve_steepness_sd: Positive = 5.0
     curve_end_over_median: Positive = 3.0
-    departure_share: Positive = 0.1
+    departure_share: Positive = 0.05
     angle_noise_degrees: Positive = 3.0
     run_scatter: Positive = 0.025
     force_noise_share: Positive = 0.02

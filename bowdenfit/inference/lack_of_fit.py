@@ -258,7 +258,7 @@ def _derive_by_departures(posterior: LogDensity, solution: Solution, tested: Seq
         departures = {
             name: value
             for curve, of_curve in zip(curves, weights, strict=True)
-            for name, value in zip((curve.size_name, *curve.weight_names), (jnp.ones(()), *of_curve), strict=True)
+            for name, value in zip(curve.weight_names, of_curve, strict=True)
         }
         return jnp.concatenate([term.residuals(values | departures, d) for term, d in zip(terms, data, strict=True)])
 

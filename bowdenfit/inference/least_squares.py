@@ -73,7 +73,7 @@ class Estimate:
 
 @dataclass(frozen=True, repr=False)
 class LeastSquares(Display):
-    """Classical least squares without priors.
+    """Classical least squares, without priors but those of the weights of departures.
 
     Args:
         estimates: Estimates by parameter name; noise scales are not among them.
@@ -160,7 +160,7 @@ def _squares_with_priors(solution: Solution) -> float:
 def fit_least_squares(
     posterior: LogDensity, objective: Objective, start: np.ndarray, intervals: bool = True
 ) -> LeastSquares:
-    """Fit by least squares without priors, from the maximum of the posterior.
+    """Fit by least squares, from the maximum of the posterior; weights of departures keep their priors.
 
     The relative weights of the tables are the prior medians of the noise scales, or the scatter of single readings where runs
     consist of such. The standard errors use the scatter of the residuals (sandwich form), table by table; a force table

@@ -19,21 +19,23 @@ class Linearized:
     """The least-squares problem about its minimum.
 
     Args:
-        readings: Orthonormal columns: directions of the readings that move parameters.
+        readings: Orthonormal columns: directions of the readings, and of priors that count below them, that move parameters.
         parameters: Change of the parameters by a unit error along each of those directions.
         determined: Whether the readings determine each parameter.
         condition_number: Condition number of the Jacobian; infinite where a direction is undetermined.
+        n_readings: Number of readings, without priors.
     """
 
     readings: np.ndarray
     parameters: np.ndarray
     determined: np.ndarray
     condition_number: float
+    n_readings: int
 
     @property
     def leverage(self) -> np.ndarray:
         """Leverage of each reading, 0 to 1."""
-        return np.sum(self.readings**2, axis=1)
+        return np.sum(self.readings[: self.n_readings] ** 2, axis=1)
 
     @property
     def unit_error(self) -> np.ndarray:
@@ -41,22 +43,30 @@ class Linearized:
         return np.linalg.norm(self.parameters, axis=1)
 
     def moves(self, scale: np.ndarray) -> np.ndarray:
-        """Return how far one standard deviation of each reading's scatter moves each parameter."""
-        return self.parameters @ (self.readings.T * scale)
+        """How far one standard deviation of each reading's scatter, and below them of each prior, moves each parameter."""
+        priors = np.ones(len(self.readings) - self.n_readings)
+        return self.parameters @ (self.readings.T * np.concatenate([scale, priors]))
 
 
-def linearize(jacobian: np.ndarray) -> Linearized:
-    """Linearize the problem: by QR, or by singular values where these find directions undetermined."""
-    rows, n = jacobian.shape
+def linearize(readings_jacobian: np.ndarray, penalty: np.ndarray) -> Linearized:
+    """Linearize the problem: by QR, or by singular values where these find directions undetermined.
+
+    Args:
+        readings_jacobian: Jacobian of the residuals, (reading, parameter).
+        penalty: Weight of each parameter's prior; 0 where it does not count.
+    """
+    n_readings, n = readings_jacobian.shape
+    jacobian = np.concatenate([readings_jacobian, np.diag(penalty)[penalty > 0]])
+    rows = len(jacobian)
     if n == 0:
-        return Linearized(np.zeros((rows, 0)), np.zeros((0, 0)), np.zeros(0, dtype=bool), 1.0)
+        return Linearized(np.zeros((rows, 0)), np.zeros((0, 0)), np.zeros(0, dtype=bool), 1.0, n_readings)
     padded = np.concatenate([jacobian, np.zeros((max(n - rows, 0), n))])
     u, s, vt = np.linalg.svd(padded, full_matrices=False)
     informed = s > _SINGULAR * max(s[0], 1e-30)
     if informed.all():
-        return Linearized(*orthogonalize(jacobian), np.ones(n, dtype=bool), float(s[0] / s[-1]))
+        return Linearized(*orthogonalize(jacobian), np.ones(n, dtype=bool), float(s[0] / s[-1]), n_readings)
     determined = np.sum(vt[~informed] ** 2, axis=0) <= 1e-6
-    return Linearized(u[:rows, informed], vt[informed].T / s[informed], determined, float("inf"))
+    return Linearized(u[:rows, informed], vt[informed].T / s[informed], determined, float("inf"), n_readings)
 
 
 def estimate_scatter(

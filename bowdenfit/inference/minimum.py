@@ -101,7 +101,7 @@ def _describe_minimum(basin: Basin) -> LocalMinimum:
     """Linearize about a minimum; return it with scatter and standard errors."""
     solution = basin.solution
     active = np.flatnonzero(~basin.problem.noise & ~basin.at_end)
-    linearized = linearize(solution["jacobian"][:, active])
+    linearized = linearize(solution["jacobian"][:, active], basin.problem.penalty[active])
     scale, residual_sd = estimate_scatter(
         basin.problem.posterior.model.terms, solution["residuals"], linearized.leverage
     )

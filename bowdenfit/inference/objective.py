@@ -112,9 +112,17 @@ class Problem:
         return noise_scales(self.posterior)
 
     @cached_property
+    def penalty(self) -> np.ndarray:
+        """Weight of each prior that counts with or without the others: 1 for weights of departures, 0 elsewhere.
+
+        Without theirs, smooth departures would follow the noise of the angles.
+        """
+        return np.array([p.role == "departure" for p in self.posterior.model.space.free], dtype=float)
+
+    @cached_property
     def weight(self) -> np.ndarray:
         """Weight of each z as a residual of its own."""
-        return np.where(self.noise, 0.0, 1.0 if self.with_priors else _TIE)
+        return np.where(self.noise, 0.0, 1.0 if self.with_priors else np.maximum(self.penalty, _TIE))
 
     @cached_property
     def data(self) -> Any:

@@ -37,6 +37,7 @@ UNKNOWN_LIMITS = (float("nan"), float("nan"))
 _STUCK = 0.05  # predicted decrease at which the solver counts as stuck, relative to the level that limits a parameter
 _ROUNDING = 1e-12  # decrease of a sum of squares that is rounding, for readings without scatter
 _ALWAYS = ("friction", "friction_model")  # roles whose intervals are computed in large problems too
+_NEVER = ("noise", "departure")  # roles without intervals: noise scales are held, and nobody reads the weights of a departure
 _SMALL = 20_000  # entries of the Jacobian up to which all intervals are computed
 _AT_END = 6.0  # z so near to the end of a range that other parameters, fitted at the end, need not be fitted again
 _INSIDE = 2.0  # z a little inside the range, for a parameter that is at an end of it
@@ -218,11 +219,11 @@ class ProfileIntervals:
 
 
 def compute_profile_intervals(basin: Basin, scale: np.ndarray, determined: np.ndarray) -> ProfileIntervals:
-    """Compute 90 % intervals of determined parameters, given the scatter of each residual about the minimum."""
+    """Compute 90 % intervals of determined parameters that are answers, given the scatter of each residual."""
     limits, lowest, least_level = {}, basin.solution, np.inf
     cheap = basin.solution["jacobian"].size <= _SMALL
     for i, p in enumerate(basin.parameters):
-        if determined[i] and not basin.problem.noise[i] and (cheap or p.role in _ALWAYS):
+        if determined[i] and p.role not in _NEVER and (cheap or p.role in _ALWAYS):
             error, ratio, freedom = _estimate_spread(basin, scale, i)
             if ratio > 0:
                 rise, level = Rise(basin, i), ratio * student_quantile(freedom) ** 2
@@ -248,7 +249,7 @@ def _estimate_spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float
     if basin.at_end[index]:  # where z has no influence; a little inside its range
         solution = basin.solve_pinned(index, float(np.copysign(_INSIDE, basin.solution["z"][index])), basin.solution)
     columns = np.flatnonzero(~basin.problem.noise & ~basin.at_end | (np.arange(len(basin.at_end)) == index))
-    linearized = linearize(solution["sensitivity"][:, columns])
+    linearized = linearize(solution["sensitivity"][:, columns], basin.problem.penalty[columns])
     column = int(np.searchsorted(columns, index))
     if not linearized.determined[column] or not linearized.unit_error[column] > 0:
         return float("nan"), float("nan"), 1.0
@@ -257,6 +258,7 @@ def _estimate_spread(basin: Basin, scale: np.ndarray, index: int) -> tuple[float
         (np.sum(moves[rows]), freedom)
         for _, rows, _, freedom in iterate_blocks(terms, basin.solution["residuals"], linearized.leverage)
     ]
+    parts.append((np.sum(moves[linearized.n_readings :]), np.inf))  # priors
     variance = float(np.sum(moves))
     return (
         float(np.sqrt(variance)),

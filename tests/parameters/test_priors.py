@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from bowdenfit.errors import DescriptionError
-from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, JohnsonSU, LogNormal, Normal, Prior, TruncatedNormal, Uniform
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 # Each prior with the same distribution as scipy writes it.
@@ -21,6 +21,7 @@ PRIORS = {
     "lognormal": (LogNormal(0.12, 0.7), stats.lognorm(0.7, scale=0.12)),
     "half-normal": (HalfNormal(0.02), stats.halfnorm(scale=0.02)),
     "half-Cauchy": (HalfCauchy(0.025), stats.halfcauchy(scale=0.025)),
+    "Johnson's SU": (JohnsonSU(0.02), stats.johnsonsu(0.0, 1.0, scale=0.02)),
     "uniform from 0": (Uniform(0.0, 0.4), stats.uniform(0.0, 0.4)),
     "uniform across 0": (Uniform(-2.0, 3.0), stats.uniform(-2.0, 5.0)),
     "measured well": (TruncatedNormal(0.1, 0.004), stats.truncnorm(-25.0, np.inf, 0.1, 0.004)),

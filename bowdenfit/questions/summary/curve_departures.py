@@ -1,13 +1,17 @@
 """What readings reveal of smooth departures of wrap angles from their curves, in sentences."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bowdenfit.cable.curves import Curve
+from bowdenfit.parameters.priors import Prior
 from bowdenfit.results.record import Record
 
-# The size counts as none where the prior has a tenth of its probability. A family is refuted where the readings leave a
-# twentieth of that, which is a Bayes factor of 20 (Savage and Dickey), and supported where they leave more than that.
-_SMALL_Z, _SMALL_PROBABILITY = -1.2816, 0.1
+# A departure counts as none where it is smaller than nine tenths of the prior's. A family is refuted where the readings leave a
+# twentieth of that probability, which is a Bayes factor of 20 (Savage and Dickey), and supported where they leave more than it.
+_SMALL_PROBABILITY = 0.1
+_N_PRIOR_DRAWS = 10_000
 _REFUTED = 0.05
 
 
@@ -55,5 +59,16 @@ def _size(fit: Record, curve: Curve) -> str:
 
 def _odds(fit: Record, curve: Curve) -> float:
     """How much likelier the readings are without than with a departure."""
-    z = np.asarray(fit.draws().z[..., fit.model.space.index[curve.size_name]])
-    return float(np.mean(z < _SMALL_Z)) / _SMALL_PROBABILITY
+    space = fit.model.space
+    names = [name for name in curve.weight_names if name in space.index]
+    columns = [space.index[name] for name in names]
+    drawn = np.asarray(fit.draws().z[..., columns]).reshape(-1, len(columns))
+    from_prior = np.random.default_rng(0).standard_normal((_N_PRIOR_DRAWS, len(columns)))
+    sizes, prior_sizes = (_root_mean_squares([space.free[i].prior for i in columns], z) for z in (drawn, from_prior))
+    return float(np.mean(sizes < np.quantile(prior_sizes, _SMALL_PROBABILITY))) / _SMALL_PROBABILITY
+
+
+def _root_mean_squares(priors: Sequence[Prior], z: np.ndarray) -> np.ndarray:
+    """Root mean square of each departure [rad], given z of its weights (rows)."""
+    weights = [np.asarray(prior.constrain(column)) for prior, column in zip(priors, z.T, strict=True)]
+    return np.linalg.norm(weights, axis=0)

@@ -43,6 +43,9 @@ from bowdenfit.words import counted, filled, listed, table
 _DRAWS = 4096  # a covariance of so many is known to 2 %; more would only take longer
 _STEP = 1e-4  # relative, and of an angle in rad: small beside any interval, large beside rounding
 _NOTABLE = 1.5  # factor on an interval from which it is shown: the errors then add more than half to it
+# Median deviations at which the score of a draw is cut off: of a normal distribution hardly any is beyond 10, and where scatter
+# is nearly nothing some 5 % of the draws are, so that a shift is at most that much too small; a judgement.
+_FARTHEST_SCORE = 10.0
 TITLE = "Error budget: what bench errors that readings cannot reveal would add"
 KEY_ROLES = ("friction", "friction_model", "angle", "elastic")  # of coefficients that are answers, not means to them
 
@@ -138,6 +141,7 @@ def error_budget(fit: Record) -> ErrorBudget | None:
         return None
     chosen = np.linspace(0, len(fit.draws().flat_z) - 1, _DRAWS).astype(int)
     scores = _scores(fit, fit.draws().flat_z[chosen], [step for _, steps in uncertainties for step in steps])
+    scores = {step: _without_far_scores(of_step) for step, of_step in scores.items()}
     rows = []
     for name, (unit, draws) in quantities.items():
         deviation = draws[chosen] - draws[chosen].mean()
@@ -203,6 +207,17 @@ def _scores(fit: Record, z: np.ndarray, errors: list[BenchError]) -> dict[BenchE
             after = run_in_batches(lambda part, changed=changed: program(part, changed), BATCH, z)
             changes[error] = np.where(np.isfinite(after - before), after - before, 0.0)
     return changes
+
+
+def _without_far_scores(scores: np.ndarray) -> np.ndarray:
+    """Scores cut off far from their median.
+
+    Where few readings allow nearly no scatter, the few draws with the least have scores in proportion to one over it. They
+    cancel in a covariance over infinitely many draws, but not over some thousand.
+    """
+    middle = np.median(scores)
+    reach = _FARTHEST_SCORE * np.median(np.abs(scores - middle))
+    return np.clip(scores, middle - reach, middle + reach)
 
 
 def _data_with(fit: Record, error: BenchError) -> tuple[dict[str, Any], ...]:

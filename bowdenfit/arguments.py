@@ -304,6 +304,8 @@ DATASET = Parameter(
     "DATASET", help="Such as my-cable, a folder with a cable.toml, which `bowdenfit init my-cable` begins."
 )
 ANSWER = Parameter("--for", metavar="ANSWER", show_default="optimal-length; without a route the friction coefficient")
+Purpose: TypeAlias = Annotated[Literal["design", "coefficients"], Parameter("--for", metavar="PURPOSE")]
+"""What an answer is for: which length to cut, with its efficiency; or the coefficients."""
 RESULTS = Parameter("RESULTS", help="Such as fits/my-cable, which `bowdenfit fit my-cable` writes.")
 Output: TypeAlias = Annotated[str | Path | None, Parameter(alias="-o", metavar="FOLDER"), PATH]
 Seed: TypeAlias = Annotated[int | None, Parameter(metavar="NUMBER"), whole_number(0, LARGEST_SEED)]

@@ -32,6 +32,7 @@ from bowdenfit.questions.summary.details import posterior_intervals
 from bowdenfit.questions.summary.page import Summary, summarize
 from bowdenfit.questions.summary.verdict import Verdict, assess_fit, verdict_text
 from bowdenfit.results.along_route import Efficiencies
+from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES
 from bowdenfit.results.record import Record
 from bowdenfit.results.store import load as load_record
 from bowdenfit.results.store import make_data_tree, save
@@ -244,7 +245,10 @@ def collect_answers(fit: Record) -> dict[str, Any]:
     Args:
         fit: The fit.
     """
-    answers: dict[str, Any] = {"troubles": list(assess_fit(fit).troubles)}
+    verdict = assess_fit(fit)
+    answers: dict[str, Any] = {
+        TROUBLES: list(verdict.troubles), COEFFICIENT_TROUBLES: list(verdict.for_coefficients().troubles),
+    }  # fmt: skip
     if fit.sampled is not None:
         answers["identify"] = serialize(vars(assess_identifiability(fit)))
         if (route := fit.dataset.description.route) is not None:

@@ -45,6 +45,7 @@ class Verb:
         results: Folder in which results go unless `output` names another.
         watch: How it is interrupted; None if it is quick.
         warns: Whether a fit that is not to be trusted is said beside the answer, which then ends with `NOT_TRUSTED`.
+        needs_coefficients: Whether the answer rests on every coefficient, not only on what makes a length the best.
         explains: A trouble of a fit that the answer is about, so that it is right in spite of it.
         kept: The reply by what a fit has answered before, and the keywords; None where they ask for something else. A
             reply without a page is for people only.
@@ -64,6 +65,7 @@ class Verb:
     results: str = ""
     watch: Watch | None = None
     warns: bool = False
+    needs_coefficients: bool = False
     explains: str = ""
     kept: Callable[[Mapping[str, Any], Mapping[str, Any]], Reply | None] | None = None
     serves: bool = False

@@ -6,10 +6,10 @@ noise of 0.7 to 3 deg. The simulator shares no code with the likelihood. Every b
 
     python scripts/check_routes.py --benches 12 --seed 1 [--only bell kinked] [--departure none smooth] [--workers 2]
 
-Prints one line per fit as it ends, then one line per family and departure: how many fits are trusted; among these, how many
-of the 90 % intervals of coefficients, best length and efficiency contain the truth, and how many of the promised windows are
-within 1 % of the best efficiency; the median ratio of the widths of the coefficients' intervals to those without departure; and
-the median time of a fit [s of CPU].
+Prints one line per fit as it ends, then one line per family and departure: of how many fits the design answer may be used (exit
+code 0); of all answers that may be used, how many of the 90 % intervals of coefficients, best length and efficiency contain the
+truth, and how many of the promised windows are within 1 % of the best efficiency; the median ratio of the widths of the
+coefficients' intervals to those without departure; and the median time of a fit [s of CPU].
 """
 
 import argparse
@@ -179,6 +179,11 @@ def fit_bench(task: tuple[str, int, str]) -> dict[str, Any]:
     }  # fmt: skip
     row["ended"] = "trusted" if verdict.trusted else "not trusted"
     row["reasons"] = list(verdict.troubles)
+    row["usable"] = [name for name in intervals if name not in verdict.usable.undetermined] if verdict.trusted else []
+    if not verdict.may_be_used_for("design"):
+        row["usable"] = [name for name in row["usable"] if name not in ("length", "efficiency")]
+    elif "length" in row["usable"]:
+        row["usable"].append("window")
     row["holds"] = {name: bool(i.q05 <= truth[name] <= i.q95) for name, i in intervals.items()}
     window = optimum.window
     if np.isfinite(window.start):
@@ -191,18 +196,17 @@ def fit_bench(task: tuple[str, int, str]) -> dict[str, Any]:
 def summarize(rows: list[dict[str, Any]]) -> Iterator[str]:
     """One line per family and departure."""
     plain = {(row["family"], row["seed"]): row for row in rows if row["departure"] == DEPARTURES[0]}
-    heads = "family", "departure", "trusted", "coefficients", "length", "efficiency", "window", "width", "s"
+    heads = "family", "departure", "usable", "coefficients", "length", "efficiency", "window", "width", "s"
     yield "{:<11}{:<10}{:>9}{:>15}{:>9}{:>12}{:>9}{:>7}{:>6}".format(*heads)
     for family in (*FAMILIES, "all"):
         for departure in DEPARTURES:
             group = [row for row in rows if family in (row["family"], "all") and row["departure"] == departure]
-            trusted = [row for row in group if row["ended"] == "trusted"]
             if not group:
                 continue
             mu, length, efficiency, window = (
                 f"{sum(map(bool, holds))}/{len(holds)}"
                 for names in (("mu1", "mu2", "mu3"), ("length",), ("efficiency",), ("window",))
-                for holds in [[row["holds"][name] for row in trusted for name in names if name in row["holds"]]]
+                for holds in [[row["holds"][n] for row in group for n in names if n in row.get("usable", ())]]
             )
             ratios = [
                 row["width"][name] / plain[key]["width"][name]
@@ -212,7 +216,7 @@ def summarize(rows: list[dict[str, Any]]) -> Iterator[str]:
             ]
             width = f"{np.median(ratios):.2f}" if ratios else ""
             seconds = f"{np.median([row['seconds'] for row in group if 'seconds' in row] or [np.nan]):.0f}"
-            counts = f"{len(trusted)}/{len(group)}"
+            counts = f"{sum('length' in row.get('usable', ()) for row in group)}/{len(group)}"
             cells = family, departure, counts, mu, length, efficiency, window, width, seconds
             yield "{:<11}{:<10}{:>9}{:>15}{:>9}{:>12}{:>9}{:>7}{:>6}".format(*cells)
 

@@ -32,7 +32,7 @@ from bowdenfit.cli.stage_line import print_stages, say_beside_stages, show_stage
 from bowdenfit.cli.terminal import say
 from bowdenfit.errors import UsageError
 from bowdenfit.reading import Reading
-from bowdenfit.results.answer_cache import read_answers
+from bowdenfit.results.answer_cache import COEFFICIENT_TROUBLES, TROUBLES, read_answers
 from bowdenfit.results.folder import FIT as FIT_FILE
 from bowdenfit.results.folder import refuse_unwritable
 from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
@@ -156,7 +156,8 @@ def _run(verb: Verb, options: dict[str, Any], form: str) -> int:
         request[first] = _load_fits(source) if is_of_fit else source
         reply = _compute_reply(verb, request, source)
     if verb.warns and isinstance(source, Path):
-        troubles = answers["troubles"] if "troubles" in answers else _list_troubles(request[first], source)
+        key = COEFFICIENT_TROUBLES if verb.needs_coefficients else TROUBLES
+        troubles = answers[key] if key in answers else _list_troubles(request[first], source, verb.needs_coefficients)
         reply = _add_warning(reply, [trouble for trouble in troubles if trouble != verb.explains], source)
     for piece in reply.pieces:
         say(piece, nl=False)
@@ -217,16 +218,20 @@ def _compute_reply(verb: Verb, request: dict[str, Any], source: Any) -> Reply:
     return verb.reply(answer, request)
 
 
-def _list_troubles(fit: Any, source: Path) -> Collection[str]:
+def _list_troubles(fit: Any, source: Path, of_coefficients: bool) -> Collection[str]:
     """Return why a fit is not to be trusted; empty if the source is not a fit.
 
     Args:
         fit: The fit, if it has been loaded; else the same as `source`.
         source: Its results folder, or what else a verb may be asked of.
+        of_coefficients: Whether every coefficient must be determined.
     """
     if fit is source and (source / FIT_FILE).exists():
         fit = _load_fits(source)
-    return () if isinstance(fit, Path) else tuple(fit.verdict().troubles)
+    if isinstance(fit, Path):
+        return ()
+    verdict = fit.verdict()
+    return tuple((verdict.for_coefficients() if of_coefficients else verdict).troubles)
 
 
 def _add_warning(reply: Reply, troubles: Collection[str], results: Path) -> Reply:

@@ -29,7 +29,8 @@ from bowdenfit.results.folder import (
 )
 from bowdenfit.words import filled, printable
 
-SCHEMA = 9  # counted up with every change of what one of the questions answers, and of how figures look
+SCHEMA = 10  # counted up with every change of what one of the questions answers, and of how figures look
+TROUBLES, COEFFICIENT_TROUBLES = "troubles", "troubles of coefficients"  # keys of the answers: see `Verb.needs_coefficients`
 CHECKSUM = "crc32"  # of a page, in itself
 _PIECE = 1 << 22  # bytes of a file read at once; a judgement
 CAPTIONS = "captions.txt"
@@ -73,7 +74,8 @@ def read_answers(folder: Path, *beside: str) -> dict[str, Any]:
         as_written = page.pop(CHECKSUM) == page_checksum(page) and of_this
         same = as_written and all(file_checksum(folder / name) == page["of"][name] for name in (FIT, POSTERIOR, *beside))
         answers = dict(page["answers"]) if same else {}
-        return answers if all(isinstance(trouble, str) for trouble in answers.get("troubles", ())) else {}
+        troubles = [*answers.get(TROUBLES, ()), *answers.get(COEFFICIENT_TROUBLES, ())]
+        return answers if all(isinstance(trouble, str) for trouble in troubles) else {}
     except (StoreError, OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 

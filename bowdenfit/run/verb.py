@@ -1,6 +1,7 @@
 """`bf.fit` and `bowdenfit fit`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
@@ -9,14 +10,14 @@ from warnings import warn
 from cyclopts import Parameter
 
 from bowdenfit import run
-from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Seed, read_first
+from bowdenfit.arguments import DATASET, HIDDEN, PATH, Output, Purpose, Seed, read_first
 from bowdenfit.inference.resources import keep_compiled_programs, refuse_low_memory
 from bowdenfit.questions.summary.verb import reply
 from bowdenfit.reading import Reading, read
 from bowdenfit.results.folder import CHAIN, remove_checkpoint, reserve_folder
 from bowdenfit.stage_bar import Watch, show_progress_bar
 from bowdenfit.stages import announce_stage
-from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
+from bowdenfit.verb import Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.dataset import Dataset
@@ -38,6 +39,7 @@ def fit(
     seed: Annotated[Seed, Parameter(show_default="random, and recorded")] = None,
     resume: bool = False,
     force: bool = False,
+    purpose: Purpose = "design",
     progress: Annotated["Callable[[Progress], None] | None", HIDDEN] = None,
     report: Annotated[Callable[[str], None], HIDDEN] = warn,
     **reading: Unpack[Reading],
@@ -53,6 +55,7 @@ def fit(
         seed: Random seed.
         resume: Go on with an interrupted or unconverged fit; refuses changed inputs.
         force: Replace an earlier fit in the results folder.
+        purpose: What the command's first line and exit code are about: "design", the best length, or "coefficients".
         progress: Called while sampling; a notebook shows one line with stage, clock and progress if omitted.
         report: Called with a sentence where the fit is whole but its figures could not be drawn; a warning if omitted.
         reading: Keywords of `bowdenfit.read`.
@@ -60,6 +63,7 @@ def fit(
     Raises:
         BowdenfitError: What is wrong, in a sentence; nothing is written then.
     """
+    del purpose  # of the command alone
     refuse_low_memory()
     folder = Path(output) if output is not None else None
     with show_progress_bar(WATCH, progress) as show:
@@ -81,9 +85,8 @@ def fit(
 
 
 def _reply(fit: "Fit", request: dict[str, Any]) -> Reply:
-    summary = reply(fit, {})
-    exit_code = 0 if fit.verdict().trusted else NOT_TRUSTED
-    return Reply(summary.text, summary.page, (f"Wrote {request['output']}.",), exit_code)
+    summary = reply(fit, {"purpose": request["purpose"]})
+    return replace(summary, notes=(f"Wrote {request['output']}.",))
 
 
 def _show(bar: Any, progress: "Progress") -> None:

@@ -12,7 +12,16 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from bowdenfit.errors import DescriptionError
-from bowdenfit.parameters.priors import HalfCauchy, HalfNormal, JohnsonSU, LogNormal, Normal, Prior, TruncatedNormal, Uniform
+from bowdenfit.parameters.priors import (
+    HalfCauchy,
+    HalfNormal,
+    JohnsonSU,
+    LogNormal,
+    Normal,
+    Prior,
+    TruncatedNormal,
+    Uniform,
+)
 from bowdenfit.parameters.space import Parameter, ParameterSpace
 
 # Each prior with the same distribution as scipy writes it.

@@ -94,4 +94,5 @@ VERB = Verb(
     used, and a flag says so.
     """,
     warns=True,
+    needs_coefficients=True,
 )

@@ -25,7 +25,7 @@ from bowdenfit.questions.export.tables import (
 from bowdenfit.questions.export.text import make_identifier, wrap_comment
 from bowdenfit.questions.export.yaml import yaml_parameters
 from bowdenfit.questions.predict.verb import predict
-from bowdenfit.questions.summary.verdict import assess_fit
+from bowdenfit.questions.summary.verdict import assess_for
 from bowdenfit.results.folder import file_to_write
 from bowdenfit.results.record import Record
 from bowdenfit.units import conversion_factor, route_conversion_factor
@@ -311,7 +311,7 @@ def export_fit(fit: Record, output: Path | None, options: ExportOptions) -> Expo
     fit.draws()
     refuse_inexpressible(fit, to, options.draws)
     compensation = None if options.device is None else _estimate_parameters(fit, to, options.device)
-    trust = assess_fit(fit)
+    trust = assess_for(fit, "coefficients")
     tables = tabulate_transmission(fit, options.points, options.draws, " and ".join(trust.troubles))
     point = convert_point(fit, tables.points, to, options.at)
     file = formats[to].write(ExportRequest(fit, tables, path, point, compensation))

@@ -112,20 +112,34 @@ def _analyze_groups(
     return analyses
 
 
-def describe_unidentified(fit: Record) -> str:
-    """Name the friction coefficients that the measurements do not determine; empty where they determine all.
+@dataclass(frozen=True)
+class Unidentified:
+    """Friction coefficients that rest on their default priors.
+
+    Args:
+        names: Their names; empty where the measurements determine all.
+        combination: What the measurements determine of them; None if nothing.
+        in_part: Whether the prior and the measurements count about equally.
+    """
+
+    names: tuple[str, ...]
+    combination: Combination | None = None
+    in_part: bool = False
+
+
+@cached_per_fit
+def find_unidentified(fit: Record) -> Unidentified:
+    """Find the friction coefficients that the measurements do not determine.
 
     Only coefficients with the weak default prior count: who states a coefficient as measured, or gives it a prior, knows
     that it rests on that. The same holds for what the data sheet of a load cell says.
     """
     names = [p.name for p in fit.model.space.free if p.role == "friction" and not _has_stated_prior(fit, p.name)]
     if fit.sampled is None:
-        return _unidentified_sentence(
-            [name for name in names if _is_undetermined(fit, name) or _may_be_zero_or_usual(fit, name)], None
-        )
+        return Unidentified(tuple(n for n in names if _is_undetermined(fit, n) or _may_be_zero_or_usual(fit, n)))
     friction = assess_identifiability(fit).groups.get("friction")
     if friction is None:
-        return ""
+        return Unidentified(())
     share = {p.name: p.share for p in friction.parameters}
     unidentified = [
         n
@@ -135,9 +149,27 @@ def describe_unidentified(fit: Record) -> str:
         or (_is_undetermined(fit, n) and n in friction.unidentified)
     ]
     if not unidentified and not friction.identified and not friction.determined:
-        return _unidentified_sentence(names, None, " in good part")
+        return Unidentified(tuple(names), in_part=True)
     combination = next((c for c in friction.determined if set(c.weights) & set(unidentified)), None)
-    return _unidentified_sentence(unidentified, combination)
+    return Unidentified(tuple(unidentified), combination)
+
+
+def describe_unidentified(fit: Record) -> str:
+    """Name the friction coefficients that the measurements do not determine; empty where they determine all."""
+    unidentified = find_unidentified(fit)
+    if not unidentified.names:
+        return ""
+    return (
+        f"{_separation_sentence(unidentified)} Efficiencies where you measured still hold, the coefficients do not: measure "
+        "where the wrap angles change in other proportions, or state a coefficient that was measured separately under "
+        "[friction.NAME]."
+    )
+
+
+def describe_coefficients_to_leave(fit: Record) -> str:
+    """Name the coefficients that must not be used by themselves, of a fit whose design answer holds; empty if all may be."""
+    unidentified = find_unidentified(fit)
+    return f"{_separation_sentence(unidentified)} Do not use {_pronoun(unidentified)}." if unidentified.names else ""
 
 
 def _is_as_wide_as_prior(fit: Record, name: str) -> bool:
@@ -165,22 +197,22 @@ def _may_be_zero_or_usual(fit: Record, name: str) -> bool:
     return not estimate.upper < value_at(parameter.prior, 0.0) * parameter.shown_scale
 
 
-def _unidentified_sentence(names: list[str], combination: Combination | None, how_much: str = "") -> str:
-    """Return the sentence about coefficients that are not identified, with a remedy."""
-    if not names:
-        return ""
-    them = listed(names)
-    if combination is not None:
-        precision = describe_precision(combination)
-        sentence = f"The measurements do not separate {them}: what they determine is {combination.words}, {precision}"
+def _separation_sentence(unidentified: Unidentified) -> str:
+    """Sentence on what the measurements do not determine, what they determine instead, and on what the rest hangs."""
+    them, several = listed(unidentified.names), len(unidentified.names) > 1
+    if unidentified.combination is not None:
+        determined = f"{unidentified.combination.words}, {describe_precision(unidentified.combination)}"
+        sentence = f"The measurements do not separate {them}: what they determine is {determined}"
     else:
         sentence = f"The measurements do not determine {them}"
-    remark = "rest on their priors" if len(names) > 1 else "rests on its prior"
-    return (
-        f"{sentence}; {them} by {'themselves' if len(names) > 1 else 'itself'} {remark}{how_much}. Efficiencies where you "
-        "measured still hold, the coefficients do not: measure where the wrap angles change in other proportions, or state a "
-        "coefficient that was measured separately under [friction.NAME]."
-    )
+    remark = "rest on their priors" if several else "rests on its prior"
+    how_much = " in good part" if unidentified.in_part else ""
+    return f"{sentence}; {them} by {'themselves' if several else 'itself'} {remark}{how_much}."
+
+
+def _pronoun(unidentified: Unidentified) -> str:
+    """Words for the coefficients alone."""
+    return "them by themselves" if len(unidentified.names) > 1 else "it by itself"
 
 
 def _has_stated_prior(fit: Record, name: str) -> bool:

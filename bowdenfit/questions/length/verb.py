@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from bowdenfit import results
 from bowdenfit.arguments import FIT, RESULTS, read_first
-from bowdenfit.verb import Reply, Verb
+from bowdenfit.verb import NOT_TRUSTED, Reply, Verb
 
 if TYPE_CHECKING:
     from bowdenfit.results.optimal_length import OptimalLength
@@ -27,7 +27,7 @@ def length(fit: Annotated["Record", RESULTS, FIT]) -> "OptimalLength":
 
 def _reply(answer: "OptimalLength", _: object) -> Reply:
     """Return what the command line prints."""
-    return Reply(f"{answer}\n", lambda: answer, csv=answer.to_csv)
+    return Reply(f"{answer}\n", lambda: answer, csv=answer.to_csv, exit_code=0 if answer.is_certain else NOT_TRUSTED)
 
 
 def _reply_from_stored(answers: Mapping[str, Any], options: Mapping[str, Any]) -> Reply | None:

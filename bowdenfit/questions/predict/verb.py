@@ -267,5 +267,6 @@ VERB = Verb(
     """,
     csv="Print as CSV, with mean, sd and quantiles.",
     warns=True,
+    needs_coefficients=True,
     kept=_reply_from_stored,
 )

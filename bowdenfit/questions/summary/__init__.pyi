@@ -7,3 +7,4 @@ from .figure_data import collect_sampled_quantities as collect_sampled_quantitie
 from .figure_files import prepare_figures as prepare_figures
 from .page import summarize as summarize
 from .verdict import assess_fit as assess_fit
+from .verdict import assess_for as assess_for

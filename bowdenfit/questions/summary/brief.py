@@ -4,6 +4,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bowdenfit.arguments import Purpose
 from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.inference.interval import NORMAL_90, Interval
 from bowdenfit.inference.least_squares import Estimate
@@ -17,9 +18,11 @@ from bowdenfit.questions.groups import contrast_groups
 from bowdenfit.questions.loss import loss_by_contact
 from bowdenfit.questions.recorded.friction_effects import compare_speeds, compute_lost_force
 from bowdenfit.questions.recorded.presliding import estimate_presliding
+from bowdenfit.questions.summary.usable_answers import find_usable_answers
 from bowdenfit.questions.summary.verdict import (
     BETWEEN_MOUNTINGS,
     assess_fit,
+    assess_for,
     collect_checked_readings,
     distrust_warning,
     find_outliers,
@@ -43,9 +46,14 @@ _FEW = 3  # coefficients and contrasts that the answer names
 _COEFFICIENT = "friction coefficient"
 
 
-def summary_text(fit: Record) -> str:
-    """Return one page for people: at most `LINES` lines, as a terminal of 80 columns shows them."""
-    (answer, verdict), outlier_lines = _sentence_lines(fit), _outlier_lines(fit)
+def summary_text(fit: Record, purpose: Purpose = "design") -> str:
+    """Return one page for people: at most `LINES` lines, as a terminal of 80 columns shows them.
+
+    Args:
+        fit: The fit.
+        purpose: What the answer is for; it comes first.
+    """
+    (answer, verdict), outlier_lines = _sentence_lines(fit, purpose), _outlier_lines(fit)
     sentences = [*answer, *verdict]
     shown, complete = _quantity_lines(fit, LINES - sum(map(len, sentences)) - len(outlier_lines) - _OTHER_LINES)
     if not complete and assess_fit(fit).trusted and not assess_fit(fit).doubts:  # that all readings agree is said above already
@@ -72,16 +80,17 @@ def _shorten_to(answer: list[list[str]], verdict: list[list[str]], room: int) ->
     return [line for sentence in (first, *kept, [more], last) for line in sentence][:room]
 
 
-def _sentence_lines(fit: Record) -> tuple[list[list[str]], list[list[str]]]:
+def _sentence_lines(fit: Record, purpose: Purpose) -> tuple[list[list[str]], list[list[str]]]:
     """Return the lines of each sentence of the answer, and of whether to trust it and what to do next.
 
     Of a fit that is not to be trusted, why comes first and the answer last.
     """
-    fit_verdict, name = assess_fit(fit), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
-    first, *others = summary_sentences(fit)
+    fit_verdict, name = assess_for(fit, purpose), textwrap.shorten(fit.name, _LONGEST_NAME, placeholder="...")
+    first, *others = summary_sentences(fit, purpose)
     first = first[0].lower() + first[1:]
     if fit_verdict.trusted:
-        n_first = 1 if fit.dataset.description.route is not None else 0  # the lengths that are good enough
+        # the lengths that are good enough
+        n_first = 1 if fit.dataset.description.route is not None and purpose == "design" else 0
         answer = [f"{name}: {first}", *others[:n_first], widening_sentence(fit), *others[n_first:]]
         verdict = [*reasons_to_trust(fit), suggest_next_step(fit)]
     else:
@@ -189,10 +198,12 @@ def key_quantities(fit: Record) -> list[KeyQuantity]:
     return [row for row in rows if row is not None]
 
 
-def summary_sentences(fit: Record) -> list[str]:
+def summary_sentences(fit: Record, purpose: Purpose = "design") -> list[str]:
     """Return the answer in sentences: the first says what to do, or what the coefficients are."""
     if fit.sampled is not None and fit.dataset.description.route is not None:
         best = fit.optimal_length()
+        if purpose == "coefficients":
+            return [_coefficient_sentence(fit), *_loss_sentence(fit), *_option_sentences(fit), best.headline]
         return [best.headline, *best.sentences(), *_loss_sentence(fit), *_option_sentences(fit)]
     return [_coefficient_sentence(fit), *_preload_advice(fit), *_loss_sentence(fit), *_option_sentences(fit)]
 
@@ -202,6 +213,8 @@ def _key_quantity(fit: Record, parameter: Parameter) -> KeyQuantity | None:
     is_run_scatter = parameter.name == RUN_SCATTER
     unit, scale = ("%", 100.0) if is_run_scatter else ("" if parameter.unit == "1" else parameter.unit, 1.0)
     description = BETWEEN_MOUNTINGS if is_run_scatter else _describe(parameter)
+    if fit.sampled is not None and parameter.name in find_usable_answers(fit).undetermined:
+        description = f"NOT DETERMINED: {description}"
     if parameter.fixed is not None:
         return KeyQuantity(parameter.name, description, unit, f"{parameter.fixed * parameter.shown_scale:.4g}", "as stated")
     if fit.sampled is not None:

@@ -21,7 +21,7 @@ from bowdenfit.questions.figures import (
     warning_mark,
     write_figure_files,
 )
-from bowdenfit.results.answer_cache import read_answers
+from bowdenfit.results.answer_cache import TROUBLES, read_answers
 from bowdenfit.results.folder import FIT, read_page
 
 # Captions of the figures by name, the order of all figures in captions.txt, and a function that writes the files of the
@@ -75,7 +75,7 @@ def _collect_data(fit: Any, names: Sequence[str]) -> tuple[dict[str, Any], str, 
     stored = results if data else None
     if stored is not None:
         with damage_as(StoreError(f"{stored} is damaged; fit again, or restore the folder from a copy.")):
-            cable, troubles = read_page(stored / FIT)["description"]["name"], read_answers(stored)["troubles"]
+            cable, troubles = read_page(stored / FIT)["description"]["name"], read_answers(stored)[TROUBLES]
     else:
         record = results_door.load(results) if results is not None else fit
         data, cable = dict(collect_figure_data(record, names)), record.name

@@ -62,8 +62,10 @@ def summarize(fit: Record) -> dict[str, Any]:
         "verdict": {
             "converged": fit.converged,
             "trusted": fit_verdict.trusted,
+            "usable": fit_verdict.may_be_used_for("design"),
             "reasons": list(fit_verdict.reasons),
             "doubts": list(fit_verdict.doubts),
+            "answers": fit_verdict.answers,
         },
         "parameters": {p.name: _parameter_row(fit, p.name) for p in fit.model.space.parameters},
         "curves": {name: _curve_row(fit, name) for name in curve_coefficients(fit)},

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from bowdenfit import results as results_door
-from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, Quantity, as_pair, number_with_unit, read_first
+from bowdenfit.arguments import PATH, RESULTS, TEXTS, Output, Purpose, Quantity, as_pair, number_with_unit, read_first
 from bowdenfit.errors import StoreError
 from bowdenfit.questions import summary as room
 from bowdenfit.results.answer_cache import are_texts_unchanged
@@ -20,18 +20,25 @@ if TYPE_CHECKING:
 
 
 @read_first
-def summary(results: Annotated[str | Path, RESULTS, PATH], *, full: bool = False) -> "tuple[str, Any] | Record":
+def summary(
+    results: Annotated[str | Path, RESULTS, PATH],
+    *,
+    full: bool = False,
+    purpose: Purpose = "design",
+) -> "tuple[str, Any] | Record":
     """The summary of a finished fit, for people and as JSON; or the fit, where they are not there as this version writes them.
 
     Args:
         results: Its folder.
         full: Everything that the fit says, instead of one page.
+        purpose: What the answer is for, "design" or "coefficients": the first line answers that, and the exit code says
+            whether it may be used for that.
 
     Raises:
         StoreError: The folder is missing, unfinished or damaged, or one of the texts was changed.
     """
     folder = Path(results)
-    if not are_texts_unchanged(folder):
+    if purpose == "coefficients" or not are_texts_unchanged(folder):
         return results_door.load(folder)
     text, page = read_text(folder / (DETAILS_TEXT if full else SUMMARY_TEXT)), read_page(folder / SUMMARY)
     if not _says_whether_trusted(page):
@@ -40,16 +47,18 @@ def summary(results: Annotated[str | Path, RESULTS, PATH], *, full: bool = False
 
 
 def _says_whether_trusted(page: Any) -> bool:
-    return isinstance(page, dict) and isinstance(page.get("verdict"), dict) and type(page["verdict"].get("trusted")) is bool
+    return isinstance(page, dict) and isinstance(page.get("verdict"), dict) and type(page["verdict"].get("usable")) is bool
 
 
 def reply(results: "tuple[str, Any] | Record", options: Mapping[str, Any]) -> Reply:
     """Return what is printed of a fit."""
     if isinstance(results, tuple):
         text, page = results
-        return Reply(text, lambda: page, exit_code=0 if page["verdict"]["trusted"] else NOT_TRUSTED)
-    text = room.details_text(results) if options.get("full") else room.summary_text(results)
-    return Reply(text, lambda: room.summarize(results), exit_code=0 if room.assess_fit(results).trusted else NOT_TRUSTED)
+        return Reply(text, lambda: page, exit_code=0 if page["verdict"]["usable"] else NOT_TRUSTED)
+    purpose: Purpose = options.get("purpose", "design")
+    text = room.details_text(results) if options.get("full") else room.summary_text(results, purpose)
+    exit_code = 0 if room.assess_fit(results).may_be_used_for(purpose) else NOT_TRUSTED
+    return Reply(text, lambda: room.summarize(results), exit_code=exit_code)
 
 
 @read_first

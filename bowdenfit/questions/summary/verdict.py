@@ -1,9 +1,10 @@
 """Whether a fit may be trusted, and if not, why; whatever the summary says is wrong is wrong here too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from bowdenfit.arguments import Purpose
 from bowdenfit.cable.sensors import RUN_SCATTER
 from bowdenfit.display import Display, Rows
 from bowdenfit.inference.disagreement import NOTICEABLE_SDS, Disagreement
@@ -22,10 +23,16 @@ from bowdenfit.questions.check.implausible_readings import (
 from bowdenfit.questions.check.lack_of_fit import describe_lack_of_fit
 from bowdenfit.questions.check.table_checks import CheckedReading
 from bowdenfit.questions.check.words import describe_assumed_widths, describe_misfits
-from bowdenfit.questions.identify.judgment import assess_identifiability, confounded_pairs, describe_unidentified
+from bowdenfit.questions.identify.judgment import (
+    assess_identifiability,
+    confounded_pairs,
+    describe_coefficients_to_leave,
+    describe_unidentified,
+)
 from bowdenfit.questions.identify.verb import NOT_IDENTIFIABLE
 from bowdenfit.questions.next.candidates import has_candidates, rests_on_one_mounting
 from bowdenfit.questions.summary.curve_departures import describe_refuted_families
+from bowdenfit.questions.summary.usable_answers import UsableAnswers, find_usable_answers
 from bowdenfit.results.record import Record, cached_per_fit
 from bowdenfit.results.serialization import values_by_key
 from bowdenfit.words import decimals, few, filled, listed
@@ -46,7 +53,17 @@ _PROBLEMS = {
     NOT_DESCRIBED: "the model does not describe these readings",
     NOT_IDENTIFIABLE: "the measurements do not determine every coefficient",
 }
+_NO_LENGTH = "the measurements determine neither every coefficient nor which lengths are good enough"
+_NO_EFFICIENCY = "the measurements determine neither every coefficient nor the efficiency at the best length"
 _TRUSTED = "You can trust this: the fit has converged, and the readings agree with the model and with each other."
+_LENGTH_TRUSTED = (
+    "You can trust the best length and the efficiency there: the fit has converged, the readings agree with the model and with "
+    "each other, and other coefficients that agree with them give the same."
+)
+_NUMBERS_TRUSTED = (
+    "You can trust these numbers: the fit has converged, and the readings agree with the model and with each other. They do "
+    "not tell yet which length is good enough."
+)
 _TRUSTED_ALONE = "You can trust this: the fit has converged, and the reading agrees with the model."
 _IN_DOUBT = (
     "The fit has converged, and nothing speaks clearly against the model, but {}, by more than happens by chance in one fit "
@@ -77,11 +94,16 @@ class Verdict(Display):
             `NOT_DESCRIBED`, `COPIED`, `CUT_OFF`, `COARSE`; each with sentences.
         sampled: Whether there are draws.
         doubts: What chance does in one fit in a hundred or less, and is not enough to distrust it; clauses without a stop.
+        usable: Which answers rest on the readings, and which on priors of coefficients.
+        coefficients_to_leave: Sentence on the coefficients that must not be used by themselves, where the design answer holds
+            all the same; empty where there are none.
     """
 
     troubles: dict[str, tuple[str, ...]]
     sampled: bool = True
     doubts: tuple[str, ...] = ()
+    usable: UsableAnswers = field(default_factory=lambda: UsableAnswers(None, None, ()))
+    coefficients_to_leave: str = ""
 
     @property
     def trusted(self) -> bool:
@@ -93,6 +115,30 @@ class Verdict(Display):
         """Every sentence."""
         return tuple(sentence for sentences in self.troubles.values() for sentence in sentences)
 
+    @property
+    def answers(self) -> dict[str, Any]:
+        """Whether each answer may be used, by name; of coefficients by theirs those that may not."""
+        design = {
+            name: bool(usable) and self.trusted
+            for name, usable in (("best_length", self.usable.length), ("efficiency", self.usable.efficiency))
+            if usable is not None
+        }
+        return design | {"coefficients_to_leave": list(self.usable.undetermined)}
+
+    def may_be_used_for(self, purpose: Purpose) -> bool:
+        """Whether the answer for a purpose may be used: a length that is good enough, or else the numbers."""
+        if purpose == "coefficients":
+            return self.for_coefficients().trusted
+        return self.trusted and self.usable.length is not False and self.usable.efficiency is not False
+
+    def for_coefficients(self) -> "Verdict":
+        """Return the verdict for somebody who wants the coefficients: all of them must be determined."""
+        if not self.coefficients_to_leave:
+            return self
+        return replace(
+            self, troubles={**self.troubles, NOT_IDENTIFIABLE: (self.coefficients_to_leave,)}, coefficients_to_leave=""
+        )
+
     def _table(self) -> Rows:
         return [{"trouble": kind, "reason": reason} for kind, reasons in self.troubles.items() for reason in reasons], {}
 
@@ -100,10 +146,10 @@ class Verdict(Display):
 @cached_per_fit
 def assess_fit(fit: Record) -> Verdict:
     """Return the verdict on a fit."""
-    copies = describe_copied_readings(fit.dataset)
+    copies, usable = describe_copied_readings(fit.dataset), find_usable_answers(fit)
     troubles = {
         NOT_CONVERGED: () if fit.converged else fit.reasons or ("the fit did not converge",),
-        NOT_IDENTIFIABLE: _sentences(describe_unidentified(fit)),
+        NOT_IDENTIFIABLE: () if usable.holds else _sentences(describe_unidentified(fit)),
         CONTRADICTORY: describe_wrong_angles(fit.dataset) + _sentences(describe_contradiction(fit)),
         IMPOSSIBLE: _sentences(describe_impossible_efficiencies(fit)) + _sentences(describe_implausible_friction(fit)),
         COPIED: copies,
@@ -112,7 +158,13 @@ def assess_fit(fit: Record) -> Verdict:
         NOT_DESCRIBED: () if copies else describe_lack_of_fit(fit),  # copies make the least departure certain
     }
     by_kind = {kind: sentences for kind, sentences in troubles.items() if sentences}
-    return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit))
+    to_leave = describe_coefficients_to_leave(fit) if usable.holds else ""
+    return Verdict(by_kind, fit.sampled is not None, _describe_doubts(fit), usable, to_leave)
+
+
+def assess_for(fit: Record, purpose: Purpose) -> Verdict:
+    """Return the verdict on a fit for a purpose."""
+    return assess_fit(fit) if purpose == "design" else assess_fit(fit).for_coefficients()
 
 
 def _describe_doubts(fit: Record) -> tuple[str, ...]:
@@ -156,6 +208,8 @@ def verdict_text(verdict_on_fit: Verdict) -> str:
 def distrust_warning(fit_verdict: Verdict) -> str:
     """Return the first line of a fit that is not to be trusted; empty of one that is."""
     kinds = [words for kind, words in _PROBLEMS.items() if kind in fit_verdict.troubles]
+    if NOT_IDENTIFIABLE in fit_verdict.troubles and fit_verdict.usable.length is not None and not fit_verdict.usable.holds:
+        kinds[kinds.index(_PROBLEMS[NOT_IDENTIFIABLE])] = _NO_LENGTH if not fit_verdict.usable.length else _NO_EFFICIENCY
     return f"DO NOT USE THESE NUMBERS: {listed(kinds)}." if kinds else ""
 
 
@@ -175,6 +229,8 @@ def reasons_to_trust(fit: Record) -> list[str]:
     checks, fit_verdict = check_readings(fit), assess_fit(fit)
     is_alone = checks is not None and len(checks.readings) == 1 and not fit_verdict.doubts
     trusted = _TRUSTED_ALONE if is_alone else _trusted_sentence(fit_verdict)
+    if fit_verdict.coefficients_to_leave:
+        return [trusted, fit_verdict.coefficients_to_leave, *describe_refuted_families(fit)]
     return [trusted, *describe_refuted_families(fit)] + [
         sentence
         for sentence in (_prior_driven_sentence(fit), _correlation_sentence(fit), _prior_conflict_sentence(fit))
@@ -184,7 +240,11 @@ def reasons_to_trust(fit: Record) -> list[str]:
 
 def _trusted_sentence(fit_verdict: Verdict) -> str:
     """Say that a fit may be trusted, and what speaks a little against it."""
-    return _IN_DOUBT.format(listed(fit_verdict.doubts)) if fit_verdict.doubts else _TRUSTED
+    if fit_verdict.doubts:
+        return _IN_DOUBT.format(listed(fit_verdict.doubts))
+    if fit_verdict.usable.length is False:
+        return _NUMBERS_TRUSTED
+    return _LENGTH_TRUSTED if fit_verdict.coefficients_to_leave else _TRUSTED
 
 
 def suggest_next_step(fit: Record) -> str:

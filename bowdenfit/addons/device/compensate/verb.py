@@ -96,4 +96,5 @@ COMPENSATE = Verb(
     json="Print as JSON.",
     csv="Print all bends as CSV.",
     warns=True,
+    needs_coefficients=True,
 )

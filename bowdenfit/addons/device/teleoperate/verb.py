@@ -73,5 +73,6 @@ TELEOPERATE = Verb(
     json="Print as JSON.",
     csv="Print probabilities by wall as CSV.",
     warns=True,
+    needs_coefficients=True,
     reads="device.toml",
 )
